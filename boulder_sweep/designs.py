@@ -190,8 +190,8 @@ REASONS = (
     "unusual",
 )
 UNUSUAL = REASONS[-1]
-"""Stands among what is given of designs for whether some of it is so far from usual that the file must allow it, 1 or 0;
-of a file without a list of designs no such value is read."""
+"""Stands among what is given of designs for whether some of it is so far from usual that the file must allow it, 1 or
+0; a file without a list of designs is refused for such a value."""
 
 
 def embedment_of_ratio(ratio: np.ndarray, height: np.ndarray) -> np.ndarray:

@@ -27,15 +27,14 @@ from boulder_sweep.settings.problems import (
     refuse,
     shorten,
 )
-from boulder_sweep.settings.units import STANDARD_GRAVITY, UnitError, factor
+from boulder_sweep.settings.units import UnitError, factor
 from boulder_sweep.settings.values import NumberError, split_number
 
 MOST_ROWS, MOST_COLUMNS = 2_000_000, 1000
 MAX_BYTES = 500_000_000
-_BRACKETS = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\])]*)[\])]\s*")
+_BRACKETS = re.compile(r"(?P<name>[^\[(]*?)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))\s*")
 _SUFFIXES = {"m_s2": "m/s^2", "ft_s2": "ft/s^2", "m_s": "m/s", "km_h": "km/h", "ft_s": "ft/s"}
 _PLAIN_SUFFIXES = ("s", "ms", "m", "mm", "cm", "in", "ft", "deg", "rad", "mph", "g")
-_GRAVITY_NAMES = ("g", "G", "g0", "gee")
 
 
 class Signal(NamedTuple):
@@ -185,7 +184,8 @@ def _column(cell: str, position: Position, wanted: Sequence[Signal], problems: P
     signal = known.get(plain)
     if signal is None:
         names = ", ".join(signal.name for signal in wanted)
-        problems.add(position, shorten(cell), f"is not known{did_you_mean(plain, known)}; a file may hold {names}")
+        fitting = [word for word, one in known.items() if not unit or _is_unit(unit, one.unit)]
+        problems.add(position, shorten(cell), f"is not known{did_you_mean(plain, fitting)}; a file may hold {names}")
         return None
     if not unit:
         problems.add(
@@ -193,7 +193,7 @@ def _column(cell: str, position: Position, wanted: Sequence[Signal], problems: P
         )
         return None
     try:
-        return _Column(signal, _factor(unit, signal.unit))
+        return _Column(signal, float(factor(unit, signal.unit)))
     except UnitError as error:
         problems.add(position, shorten(cell), str(error))
         return None
@@ -203,23 +203,19 @@ def _split_header(cell: str) -> tuple[str, str]:
     """Split ``name [unit]`` or ``name_unit``."""
     match = _BRACKETS.fullmatch(cell)
     if match:
-        return match["name"], match["unit"].strip()
+        return match["name"], (match["square"] or match["round"] or "").strip()
     for suffix, unit in (*_SUFFIXES.items(), *((word, word) for word in _PLAIN_SUFFIXES)):
         if cell.endswith(f"_{suffix}"):
             return cell.removesuffix(f"_{suffix}"), unit
     return cell, ""
 
 
-def _factor(unit: str, target: str) -> float:
-    """Return the factor from a unit to the one wanted."""
-    if target != "m/s^2":
-        return float(factor(unit, target))
-    if unit in _GRAVITY_NAMES:
-        return float(STANDARD_GRAVITY)
+def _is_unit(unit: str, target: str) -> bool:
+    """Whether a unit is of the kind that is wanted."""
     try:
-        return float(factor(f"({unit})*s", "m/s"))
+        return factor(unit, target) > 0
     except UnitError:
-        raise UnitError(f"'{shorten(unit)}' is not a unit of acceleration (m/s^2, ft/s^2 or g)") from None
+        return False
 
 
 def _values(rows: list[_Row], columns: Sequence[_Column | None], problems: ProblemList) -> dict[str, np.ndarray]:

@@ -106,9 +106,9 @@ def _far_words(values: np.ndarray, field: Field, written: str = "") -> str:
     assert field.usual is not None
     low, high = float(values.min()), float(values.max())
     usual = range_words(field.usual.low, field.usual.high, field.unit, written)
-    far = f"less than 1/{fields.UNUSUAL:g} of" if high < field.usual.low else f"more than {fields.UNUSUAL:g} times"
+    far = f"less than 1/{fields.FAR:g} of" if high < field.usual.low else f"more than {fields.FAR:g} times"
     if low < field.usual.low < high:
-        far = f"more than {fields.UNUSUAL:g} times outside"
+        far = f"more than {fields.FAR:g} times outside"
     return f"{range_words(low, high, field.unit, written)} is {far} the usual {usual} ({field.usual.remark})"
 
 
@@ -270,7 +270,7 @@ def _remarks(sweep: Sweep, written: Mapping[str, str]) -> Iterator[tuple[str, st
         field = BY_NAME[name]
         off = is_unusual(of_input, field) if sweep.is_held(name) else np.zeros(of_input.shape, dtype=bool)
         if off.any():  # in a table: of single values and axes the file has been refused
-            rows = counted(np.count_nonzero(off), "design")
+            rows = counted(int(off.sum()), "design")
             words = f"{_far_words(of_input[off], field)}: {rows} not computed (error, unusual), the first is design"
             yield field.path, f"{words} {off.argmax()}; {_allowing([*sweep.allowed, field.path])}"
         yield field.path, _unusual(name, of_input[~off], written.get(name, ""))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import re
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -34,7 +33,7 @@ from boulder_sweep.settings.table_columns import (
     to_input_unit,
 )
 from boulder_sweep.settings.tree import Scalar
-from boulder_sweep.settings.values import NumberError, split_number
+from boulder_sweep.settings.values import DECIMAL_COMMA, NumberError, split_number
 from boulder_sweep.text import one_line
 
 if TYPE_CHECKING:
@@ -50,7 +49,6 @@ _MAX_PIECE = 10 * MAX_CELL
 """Longest stretch between two tags of a spreadsheet: a cell with every character written as ``&#x10FFFF;`` [bytes]."""
 CHUNK = 20_000
 """Rows that are converted and checked at once."""
-_DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+(\s.*)?")
 
 Origin = tuple[int, str]
 """Where a row stands: number of the line, and its text where that is needed to find a cell."""
@@ -180,7 +178,7 @@ class _RowReader:
         assert column.field is not None
         values = np.full(len(cells), np.nan)
         for row, cell in enumerate(cells):
-            if _DECIMAL_COMMA.fullmatch(cell):
+            if DECIMAL_COMMA.fullmatch(cell.strip()):
                 message = f"'{shorten(cell)}' has a decimal comma; save the file with decimal points"
                 self.alike.add("", self.position(self.origins[row], index), "", message, most=1)
                 continue
@@ -254,7 +252,8 @@ def _read_lines(source: _Lines, path: Location, problems: ProblemList) -> Design
     if header is None:
         raise refuse(label, "is empty; the first line must hold the column names")
     delimiter = next((sign for sign in ",;\t" if sign in header), ",")
-    hint = " (numbers need a decimal point, and text with a comma needs quotation marks)" if delimiter == "," else ""
+    hint = " (a comma begins a cell: write 15000 for 15,000, 1.5 for 1,5, and text with a comma in quotation marks)"
+    hint = hint if delimiter == "," else ""
     rows = _RowReader(path, problems, lambda origin, index: cell_position(label, *origin, delimiter, index))
     try:
         names = [cell.strip() for cell in next(csv.reader([header], delimiter=delimiter))]

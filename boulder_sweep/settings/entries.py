@@ -13,12 +13,12 @@ import numpy as np
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.choices import SIDES, read_setting, shares_of, sides_of, unfold_scan
 from boulder_sweep.settings.distributions import Distribution, Input, SetDistributions, read_input
-from boulder_sweep.settings.problems import Mistakes, Position, ProblemList, nearest, shorten, unknown_word, wrong
+from boulder_sweep.settings.problems import Mistakes, Position, ProblemList, shorten, unknown_word, wrong
 from boulder_sweep.settings.shape import ProfilePoint
 from boulder_sweep.settings.soil_readings import CORRELATION, METHODS, SOIL_KEYS, unfold_soils
 from boulder_sweep.settings.sweep import SECTION, DesignList
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
-from boulder_sweep.settings.values import read_single
+from boulder_sweep.settings.values import meant_by, read_single
 from boulder_sweep.settings.vehicle import APPROACH, unfold_approaches, unfold_springs
 
 NAMED_SETS = ("soil", "vehicle")
@@ -240,19 +240,19 @@ class Entries:
         return [field for field in fields.fields_of(section) if field.name in self.leaves]
 
     def unknown(self, entry: Entry, section: str, known: tuple[str, ...]) -> None:
-        """Report an unknown key, with the nearest known one."""
+        """Report an unknown key, with the one that is meant."""
         word = entry.key.lower()
-        synonym = next((field.key for field in fields.fields_of(section) if word in field.also), None)
-        elsewhere = bool(section) and any(field.key == word for field in fields.FIELDS)
-        meant = synonym or (None if self.problems.full or elsewhere else nearest(entry.key, known))
-        hint = f"; did you mean {meant}?" if meant else ""
+        by_key = {key: fields.BY_PATH.get(f"{section}.{key}") for key in known}
+        if bool(section) and any(field.key == word for field in fields.FIELDS):  # it is one of another block
+            by_key = {key: field for key, field in by_key.items() if field is not None and word in field.also}
+        meant, hint = ("", "") if self.problems.full else meant_by(entry, by_key)
         if meant and not section:
             self.misspelled |= {field.path for field in fields.fields_of(meant)}
         elif meant:
             self.misspelled.add(f"{section}.{meant}")
         else:
             other = next((field for field in fields.FIELDS if word in (field.key, *field.also)), None)
-            if other is not None:
+            if other is not None and other.section != section:
                 hint = f"; {other.key} belongs under {other.section}"
         where = section or "the file"
         name = shorten(entry.key) or "(empty)"

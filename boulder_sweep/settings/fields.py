@@ -7,7 +7,7 @@ path, its key or its column: see `named`.
 
 The admitted range is wide: at least a million times either side of what is normal wherever a material or
 mechanical constant is concerned. A value beyond it is a typing mistake and refused. A value outside the usual range
-is computed as given, with a note; of masses, densities, springs, dampers and speeds one that is more than `UNUSUAL`
+is computed as given, with a note; of masses, densities, springs, dampers and speeds one that is more than `FAR`
 times outside must be allowed by the file.
 """
 
@@ -38,9 +38,9 @@ def _input(path: str, name: str, admitted: Bound, usual: Usual | None = None, **
     return Field(section, key, name, column.unit, column.meaning, admitted, usual, **more)
 
 
-UNUSUAL = 30.0
-"""How many times outside the usual range a value must be for the file to have to allow it: a slip of unit, kN for N or t
-for kg, is a factor of 1000."""
+FAR = 30.0
+"""How many times outside the usual range a value is refused unless the file allows it. A slip of the unit, kN for N or
+t for kg, is a factor of 1000."""
 ALLOW_UNUSUAL, EVERYTHING = "allow_unusual", "all"
 """The entry that allows such values, and its word for all of them."""
 _SIZE = Bound(0.01, 20.0, "the model is for boulders between a pebble and a house")

@@ -232,9 +232,10 @@ def nearest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:
 
 def _may_be_meant(word: str, known: str) -> bool:
     """Return whether a word may be a slip of a known one, both in lower case."""
-    letters = [sorted(filter(str.isalnum, one)) for one in (word, known)]
+    letters = [{*filter(str.isalnum, one)} for one in (word, known)]
     numbers = ["".join(filter(str.isdigit, one)) for one in (word, known)]
-    return numbers[0] == numbers[1] and (letters[0] == letters[1] or max(map(len, letters)) > _SHORT_WORD)
+    is_short = max(len(word), len(known)) <= _SHORT_WORD
+    return numbers[0] == numbers[1] and (letters[0] == letters[1] or not is_short)
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:

@@ -28,6 +28,7 @@ _READINGS = {
     "spt": (
         ("n", "n", "1", "blows for the last 300 mm (1 ft), as logged", _BLOWS),
         ("energy_ratio", "energy_ratio", "1", "energy of the hammer that reaches the rods", _SHARE),
+        ("n60", "n60", "1", "in place of these two: blows at an energy ratio of 60 %", _BLOWS),
         _DEPTH,
         ("n1_60", "n1_60", "1", "in place of the three: blow count corrected for energy and stress", _BLOWS),
     ),
@@ -88,12 +89,17 @@ def readings_of(node: Node, method: str, density_kg_m3: float | None) -> list[di
 def _reading(node: Node, method: str, density_kg_m3: float | None) -> dict[str, float]:
     """Return one reading of a penetration test."""
     values = read_block(node, READING_FIELDS[method], "a reading")
+    if "n60" in values:
+        if {"n", "energy_ratio"} & set(values):
+            raise wrong(node.position, "n60 is at an energy ratio of 60 %; give it, or n and energy_ratio, not both")
+        values |= {"n": values.pop("n60"), "energy_ratio": 0.6}
     position, raw = node.position, {"n", "energy_ratio", "depth_m"}
     if method == "spt":
         if "n1_60" in values and raw & set(values):
             raise wrong(position, "give n, energy_ratio and depth, or n1_60, not both")
         if "n1_60" not in values and not raw <= set(values):
-            message = "a reading is n, the blows as logged, with energy_ratio and depth, or n1_60, which is corrected"
+            message = "a reading is n, the blows as logged, with energy_ratio and depth; n60, the blows at an energy "
+            message += "ratio of 60 %, with depth; or n1_60, which is corrected for the stress, too"
             raise wrong(position, message)
     elif len(values) < 2:
         raise wrong(position, "a reading of a cone has q_c and depth")

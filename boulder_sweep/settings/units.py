@@ -16,6 +16,8 @@ from typing import NamedTuple
 from boulder_sweep.settings.problems import shorten
 
 STANDARD_GRAVITY = Fraction("9.80665")
+_GRAVITY_NAMES = ("g", "g's", "g’s", "gs", "g0", "gee", "gees")
+"""In small letters; a unit of acceleration only, for g is a gram elsewhere."""
 
 # Name = value = alias = alias ...; each line may use the lines above. Compound units follow from these.
 _DEFINITIONS = """
@@ -86,7 +88,7 @@ EXPECTED: dict[str, Expected] = {
     "kg": Expected("a mass", "kg, t, lb or short_ton", "6800 kg or 15000 lb"),
     "s": Expected("a time", "s or ms", "1 s"),
     "m/s": Expected("a speed", "m/s, km/h, mph or ft/s", "13.4 m/s or 30 mph"),
-    "m/s^2": Expected("an acceleration", "m/s^2 or ft/s^2", "1.5 m/s^2"),
+    "m/s^2": Expected("an acceleration", "m/s^2, ft/s^2 or g", "1.5 m/s^2"),
     "deg": Expected("an angle", "deg or rad", "36 deg"),
     "kg/m^3": Expected("a density", "kg/m^3, t/m^3, pcf or kN/m^3", "2650 kg/m^3 or 116 pcf"),
     "MN/m^3": Expected("a subgrade reaction (pressure per length)", "MN/m^3, kN/m^3 or pci", "95 MN/m^3 or 350 pci"),
@@ -166,6 +168,8 @@ def factor(text: str, target: str) -> Fraction:
     """
     expected = EXPECTED[target]
     allowed = f"{expected.words} is needed ({expected.examples})"
+    if target == "m/s^2" and text.strip().lower() in _GRAVITY_NAMES:
+        return STANDARD_GRAVITY
     try:
         names = _read(text)
     except _UnknownUnitError as unknown:

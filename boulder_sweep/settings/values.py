@@ -15,20 +15,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from boulder_sweep.settings.fields import UNUSUAL, Field
+from boulder_sweep.settings.fields import FAR, Field
 from boulder_sweep.settings.problems import (
     LeafError,
     Mistake,
     Mistakes,
     Position,
     did_you_mean,
+    nearest,
     shorten,
-    unknown_word,
     wrong,
 )
 from boulder_sweep.settings.shown_units import SYSTEMS, shown_unit
-from boulder_sweep.settings.tree import Mapping, Node, Scalar, Sequence
-from boulder_sweep.settings.units import EXPECTED, UnitError, factor
+from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
+from boulder_sweep.settings.units import EXPECTED, UnitError, factor, suffix_unit
 
 MAX_AXIS = 1_000_000
 """Most values on one axis."""
@@ -53,7 +53,7 @@ _FEET_AND_A_NUMBER = re.compile(rf"[+-]?{_FEET}\s*\d{{1,2}}(?:\.\d*)?", re.ASCII
 _SEPARATED = re.compile(r"([+-]?)(\d[\d\s.,'’_]*\d)((?:[eE][+-]?\d+)?.*)", re.DOTALL)
 _GROUPS = re.compile(r"([1-9]\d{0,2}(?:([\s.,'’_])\d{3})(?:\2\d{3})*)(?:(?!\2)[.,](\d+))?")
 """Digits in groups of three, and perhaps decimals behind another sign."""
-_DECIMAL_COMMA = re.compile(r"0,\d+|\d+,(?!\d{3}$)\d+")
+DECIMAL_COMMA = re.compile(r"[+-]?(?:0,\d+|\d+,(?!\d{3}$)\d+)")
 """A comma that stands for a decimal point: before three digits it separates thousands."""
 EMPTY, NOT_A_NUMBER = "is empty", "is not a number"
 """What may be wrong with a number; the page of a report says the same."""
@@ -159,7 +159,8 @@ def read_entries(node: Node, known: dict[str, Field], what: str, mistakes: Mista
     for entry in node:
         field = known.get(entry.key)
         if field is None:
-            mistakes.add(entry.position, unknown_word(entry.key, f"a key of {what}", known))
+            message = f"'{shorten(entry.key)}' is not a key of {what} ({', '.join(known)}){meant_by(entry, known)[1]}"
+            mistakes.add(entry.position, message)
             continue
         try:
             values[entry.key] = read_single(entry.value, field)
@@ -167,6 +168,44 @@ def read_entries(node: Node, known: dict[str, Field], what: str, mistakes: Mista
             for mistake in error.mistakes:
                 mistakes.add(mistake.position, f"{entry.key}: {mistake.message}")
     return values
+
+
+def meant_by(entry: Entry, known: dict[str, Field] | dict[str, Field | None]) -> tuple[str, str]:
+    """Return the known key that an unknown one stands for, and ``"; did you mean ...?"``; both empty where none does.
+
+    Parameters
+    ----------
+    entry : Entry
+        The unknown key with its value.
+    known : dict of str to Field or None
+        Known keys with what is known of their values: a key is meant only where it takes the value, unit and all.
+    """
+    stem, _, suffix = entry.key.partition("_")
+    while suffix:
+        field = known.get(stem)
+        unit = suffix_unit(suffix, field.unit) if field is not None and field.unit in EXPECTED else ""
+        if unit:
+            number = entry.value.text if isinstance(entry.value, Scalar) else "..."
+            return stem, f"; did you mean {stem}: {shorten(number)} {unit}?"
+        word, _, suffix = suffix.partition("_")
+        stem += f"_{word}"
+    fitting = {key: field for key, field in known.items() if field is None or _fits(entry.value, field)}
+    synonyms = (key for key, field in fitting.items() if field is not None and entry.key.lower() in field.also)
+    key = next(synonyms, None) or nearest(entry.key, fitting)
+    return (key, f"; did you mean {key}?") if key else ("", "")
+
+
+def _fits(value: Node, field: Field) -> bool:
+    """Return whether an entry may have a value: its unit, if it has one, is of the kind that is needed."""
+    if not isinstance(value, Scalar) or field.unit not in EXPECTED:
+        return True
+    try:
+        unit = split_number(value.text, field.unit)[1]
+        return not unit or factor(unit, field.unit) > 0
+    except NumberError:
+        return True
+    except UnitError:
+        return False
 
 
 def read_block(node: Node, known: dict[str, Field], what: str) -> dict[str, float]:
@@ -204,7 +243,7 @@ def is_unusual(values: np.ndarray, field: Field) -> np.ndarray:
     """
     if field.usual is None or not field.held:
         return np.zeros(values.shape, dtype=bool)
-    low, high = field.usual.low / UNUSUAL, field.usual.high * UNUSUAL
+    low, high = field.usual.low / FAR, field.usual.high * FAR
     return (values != 0.0) & ((values < low * (1.0 - 1e-9)) | (values > high * (1.0 + 1e-9)))
 
 
@@ -443,10 +482,10 @@ def _feet_and_inches(text: str) -> tuple[Fraction, str] | None:
 
 
 def plainly(text: str) -> str:
-    """Return a number with its unit as it must be written, ``15000 lb`` for ``15,000 lb``; empty if that is not certain.
+    """Return a number with its unit as it must be written, ``15000 lb`` for ``15,000 lb``; empty if it is not certain.
 
-    What stands before exactly three digits separates thousands, as a decimal comma would be read too small by a
-    thousand; a comma before any other number of digits is a decimal one.
+    A sign before exactly three digits separates thousands: a decimal point in its place would make the number too small
+    by a factor of 1000. A comma before any other number of digits, or behind a zero, is a decimal one.
     """
     match = _SEPARATED.fullmatch(text)
     if match is None:
@@ -456,11 +495,11 @@ def plainly(text: str) -> str:
     if groups is not None:
         whole = re.sub(r"\D", "", groups[1])
         return f"{sign}{whole}{'' if groups[3] is None else '.' + groups[3]}{rest}"
-    return f"{sign}{number.replace(',', '.')}{rest}" if _DECIMAL_COMMA.fullmatch(number) else ""
+    return f"{sign}{number.replace(',', '.')}{rest}" if DECIMAL_COMMA.fullmatch(number) else ""
 
 
 def refuse_bare(option: str, texts: list[str], unit: str) -> None:
-    """Refuse numbers of an option that have a dimension and no unit: they could be meant in feet, and be read in metres.
+    """Refuse numbers of an option that have a dimension and no unit: meant in feet, they would be read in metres.
 
     Parameters
     ----------
@@ -486,15 +525,11 @@ def refuse_bare(option: str, texts: list[str], unit: str) -> None:
             written.append(None)
     if "" not in written:
         return
-    space = "" if option.endswith("=") else " "
     units = [one for one in written if one] or [shown_unit(unit, system).unit for system in SYSTEMS]
+    space = "" if option.endswith("=") else " "
+    pairs = [*zip(texts, written, strict=True)]
     forms = (
-        space.join(
-            [
-                option,
-                *(f"'{text} {one}'" if own == "" else f"'{text}'" for text, own in zip(texts, written, strict=True)),
-            ]
-        )
+        space.join([option, *(f"'{text}{'' if own else f' {one}'}'" for text, own in pairs)])
         for one in dict.fromkeys(units[:2])
     )
     allowed = EXPECTED[unit].examples
