@@ -166,19 +166,23 @@ def factor(text: str, target: str) -> Fraction:
     Weights stand for masses where a mass or a density is asked (116 pcf, 18.2 kN/m^3, 15 kip), and a pound
     is a force where a force is asked (350 lb/in^3), with standard gravity in between.
     """
-    expected = EXPECTED[target]
-    allowed = f"{expected.words} is needed ({expected.examples})"
     if target == "m/s^2" and text.strip().lower() in _GRAVITY_NAMES:
         return STANDARD_GRAVITY
     try:
         names = _read(text)
     except _UnknownUnitError as unknown:
         meant = _meant(unknown.word, text, target)
-        raise UnitError(f"{unknown}; " + (f"did you mean {meant}?" if meant else allowed)) from None
+        raise UnitError(f"{unknown}; " + (f"did you mean {meant}?" if meant else _needed(target))) from None
     ratio = _ratio(names, target)
     if ratio is None:
-        raise UnitError(f"'{shorten(text)}' is {_kind(_product(names).dimension)}; {allowed}")
+        raise UnitError(f"'{shorten(text)}' is {_kind(_product(names).dimension)}; {_needed(target)}")
     return ratio
+
+
+def _needed(target: str) -> str:
+    """Return what a unit of the table stands for, and units in which it may be written."""
+    expected = EXPECTED[target]
+    return f"{expected.words} is needed ({expected.examples})"
 
 
 def _ratio(names: dict[str, int], target: str) -> Fraction | None:

@@ -529,7 +529,7 @@ def refuse_bare(option: str, texts: list[str], unit: str) -> None:
     space = "" if option.endswith("=") else " "
     pairs = [*zip(texts, written, strict=True)]
     forms = (
-        space.join([option, *(f"'{text}{'' if own else f' {one}'}'" for text, own in pairs)])
+        space.join([option, *(f"'{text} {one}'" if own == "" else f"'{text}'" for text, own in pairs)])
         for one in dict.fromkeys(units[:2])
     )
     allowed = EXPECTED[unit].examples

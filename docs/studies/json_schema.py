@@ -9,7 +9,18 @@ from typing import Any
 from boulder_sweep.settings.choices import LAYER_FIELDS, MOST_LAYERS, MOST_POINTS, PROFILE_FIELDS, SCAN_KEYS, SIDES
 from boulder_sweep.settings.distributions import NEEDED
 from boulder_sweep.settings.entries import NAME, NAMED_SETS
-from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT, FIELDS, INPUTS, MAX_ELEMENTS, SECTIONS, Field
+from boulder_sweep.settings.fields import (
+    ALLOW_UNUSUAL,
+    BY_NAME,
+    EMBEDMENT,
+    EVERYTHING,
+    FIELDS,
+    HELD,
+    INPUTS,
+    MAX_ELEMENTS,
+    SECTIONS,
+    Field,
+)
 from boulder_sweep.settings.model import (
     ACCURACIES,
     CLOSED_FORM,
@@ -49,6 +60,10 @@ def schema() -> Schema:
                 "description": "heading of a report",
                 "additionalProperties": False,
                 "properties": {key: {"type": ["string", "number"]} for key in Heading._fields},
+            },
+            ALLOW_UNUSUAL: {
+                "description": "entries whose values may be far from usual",
+                "anyOf": [_words(EVERYTHING, *HELD), _list(_words(*HELD))],
             },
             "table": {"type": "string", "pattern": r"\.([cC][sS][vV]|[pP][aA][rR][qQ][uU][eE][tT]|[xX][lL][sS][xX])$"},
         },

@@ -41,8 +41,8 @@ def test_it_is_the_speed_of_the_file(sweep, grid):
     ("words", "said"),
     [
         ((), "lacks length"),
-        (("--length", "80", "--from", "0 mph", "--acceleration", "1 m/s^2"), "--length '80': write the unit too"),
-        (("--length", "80 m", "--from", "0", "--acceleration", "1 m/s^2"), "--from '0': write the unit too"),
+        (("--length", "80", "--from", "0 mph", "--acceleration", "1 m/s^2"), "--length 80: write the unit too"),
+        (("--length", "80 m", "--from", "0", "--acceleration", "1 m/s^2"), "--from 0: write the unit too"),
         (("--length", "80 m", "--from", "0 mph"), "lacks acceleration"),
         (("--length", "80 m", "--from", "0 mph", "--acceleration", "fast"), "'fast' is not a number"),
         (("--length", "80 m", "--from", "0 mph", "--acceleration", "0 m/s^2"), "does not reach the boulder"),

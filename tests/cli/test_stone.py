@@ -154,7 +154,7 @@ def test_a_picture(sweep, block):
         (["block.ply", "--up", "a"], "--up and --facing belong together"),
         (["block.ply", "--up", "a", "--facing", "-a"], "error: up: a and facing: -a do not go together"),
         (["block.ply", "--up", "top", "--facing", "a"], "error: up: 'top' is no end of a stone"),
-        (["block.ply", "--mass", "18.2"], "--mass '18.2': write the unit too"),
+        (["block.ply", "--mass", "18.2"], "--mass 18.2: write the unit too"),
         (["block.ply", "--mass", "18.2 m"], "--mass"),
         (["block.ply", "--mass", "-1 t"], "must be positive"),
         (["block.ply", "--unit", "kg"], "--unit"),

@@ -84,7 +84,7 @@ def test_rows_that_go_on_past_the_horizon_are_confirmed_alike(tmp_path, opened):
 
 def test_what_needs_the_last_resort_has_it_in_the_page_too(tmp_path, opened):
     designs(tmp_path / "designs.parquet", 40, damper=0.1)
-    table, judged, page = judged_by_both(tmp_path, (), opened)
+    table, judged, page = judged_by_both(tmp_path, ("allow_unusual=[vehicle.damper]",), opened)
     assert_alike(judged, table)
     assert (table.step_s[table.verdict != "error"] < 0.0005).sum() >= 20
     shown = page.evaluate("() => page.simulator.whole(page.design).judged")  # refused beyond the limit of rotation

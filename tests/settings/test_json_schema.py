@@ -73,6 +73,8 @@ def test_the_examples_of_the_tests_are_valid(example, minimal):
         ("vehicle:", "model: {readings: {preset: as_printed, inertia: box}, soil: {elements: 500}}\nvehicle:"),
         ("vehicle:", "solver: {accuracy: 0.01 deg, horizon: 1 s}\nvehicle:"),
         ("vehicle:", "criterion:\nvehicle:"),
+        ("vehicle:", "allow_unusual: all\nvehicle:"),
+        ("vehicle:", "allow_unusual: [vehicle.mass, soil.density]\nvehicle:"),
         (
             "soil:\n  density: 1859.9\n  friction_angle: 43.2\n  subgrade_reaction: 95\n",
             "soil: [{name: a, density: 1700, friction_angle: 30 deg, subgrade_reaction: 10}]\n",
@@ -120,6 +122,7 @@ def test_what_the_program_takes_is_valid(load_it, minimal, old, new):
         ("vehicle:", "model: {soil: {elements: 0}}\nvehicle:", "$.model.soil"),
         ("vehicle:", "solver: {accuracy: quick}\nvehicle:", "$.solver.accuracy"),
         ("vehicle:", "name: a/b\nvehicle:", "$.name"),
+        ("vehicle:", "allow_unusual: [vehicle.wheels]\nvehicle:", "$.allow_unusual"),
         ("vehicle:", "table: designs.txt\nvehicle:", "$.table"),
     ],
 )

@@ -142,6 +142,19 @@ def test_beside_a_table_its_columns_win(load_it, minimal, tmp_path):
     assert list(sweep.distributions) == [DENSITY]
 
 
+def test_blows_at_an_energy_ratio_of_60_percent(load_it, minimal):
+    """N60 is N corrected for the energy alone, so it is not (N1)60, which is that at 100 kPa."""
+    readings = ("n60: 13", "n: 13, energy_ratio: 60 %", "n: 10, energy_ratio: 78 %")
+    by_n60, by_n, by_ratio = (
+        load_it(minimal.replace(CONSTANTS, f"  spt: {{{one}, depth: 1.5 m}}\n")) for one in readings
+    )
+    assert by_n60.derived == by_n.derived
+    angles = [sweep.constants[ANGLE] for sweep in (by_n60, by_ratio)]
+    assert angles[0] == pytest.approx(angles[1], rel=1e-12)
+    corrected = load_it(minimal.replace(CONSTANTS, "  spt: {n1_60: 13}\n"))
+    assert corrected.constants[ANGLE] != pytest.approx(angles[0], abs=1.0)
+
+
 @pytest.mark.parametrize(
     ("entry", "position", "words"),
     [
@@ -155,11 +168,14 @@ def test_beside_a_table_its_columns_win(load_it, minimal, tmp_path):
         (
             "spt: {n: 20, depth: 1.5 m}",
             "9:8",
-            "with energy_ratio and depth, or n1_60",
+            "or n1_60, which is corrected for the stress, too",
         ),
         ("spt: {n: 20, n1_60: 30}", "9:8", "not both"),
         ("spt: {n: 20, energy: 60 %, depth: 1 m}", "9:16", "'energy' is not a key of a reading"),
-        ("spt: 20", "9:8", "a reading must be a block of keys: n, energy_ratio, depth, n1_60"),
+        ("spt: 20", "9:8", "a reading must be a block of keys: n, energy_ratio, n60, depth, n1_60"),
+        ("spt: {n60: 20, energy_ratio: 70 %, depth: 1.5 m}", "9:8", "n60 is at an energy ratio of 60 %"),
+        ("spt: {n60: 20, n1_60: 30}", "9:8", "not both"),
+        ("spt: {n60: 20}", "9:8", "n60, the blows at an energy ratio of 60 %, with depth"),
         ("spt: []", "9:8", "the list is empty"),
         ("cpt: {q_c: 14 MPa}", "9:8", "a reading of a cone has q_c and depth"),
         ("cpt: {q_c: 14 m, depth: 1 m}", "9:14", "a pressure is needed (MPa, kPa or tsf)"),
