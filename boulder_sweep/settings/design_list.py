@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -33,7 +34,7 @@ from boulder_sweep.settings.table_columns import (
     to_input_unit,
 )
 from boulder_sweep.settings.tree import Scalar
-from boulder_sweep.settings.values import DECIMAL_COMMA, NumberError, split_number
+from boulder_sweep.settings.values import NumberError, split_number
 from boulder_sweep.text import one_line
 
 if TYPE_CHECKING:
@@ -49,6 +50,8 @@ _MAX_PIECE = 10 * MAX_CELL
 """Longest stretch between two tags of a spreadsheet: a cell with every character written as ``&#x10FFFF;`` [bytes]."""
 CHUNK = 20_000
 """Rows that are converted and checked at once."""
+
+_COMMA = re.compile(r"\d,\d")
 
 Origin = tuple[int, str]
 """Where a row stands: number of the line, and its text where that is needed to find a cell."""
@@ -110,6 +113,8 @@ class _RowReader:
         self.alike = Alike(problems)
         self.columns: list[TableColumn | None] = []
         self.positions: list[Position] = []
+        self.has_commas = False
+        """Whether a comma does not separate cells, so that all numbers of the file may have one."""
         self.numbers: dict[str, list[np.ndarray]] = {}
         self.texts: dict[str, list[str]] = {}
         self.rows: list[list[str]] = []
@@ -178,8 +183,8 @@ class _RowReader:
         assert column.field is not None
         values = np.full(len(cells), np.nan)
         for row, cell in enumerate(cells):
-            if DECIMAL_COMMA.fullmatch(cell.strip()):
-                message = f"'{shorten(cell)}' has a decimal comma; save the file with decimal points"
+            if self.has_commas and _COMMA.search(cell):
+                message = f"'{shorten(cell)}' has a comma; save the file with decimal points, and thousands unseparated"
                 self.alike.add("", self.position(self.origins[row], index), "", message, most=1)
                 continue
             try:
@@ -255,6 +260,7 @@ def _read_lines(source: _Lines, path: Location, problems: ProblemList) -> Design
     hint = " (a comma begins a cell: write 15000 for 15,000, 1.5 for 1,5, and text with a comma in quotation marks)"
     hint = hint if delimiter == "," else ""
     rows = _RowReader(path, problems, lambda origin, index: cell_position(label, *origin, delimiter, index))
+    rows.has_commas = delimiter != ","
     try:
         names = [cell.strip() for cell in next(csv.reader([header], delimiter=delimiter))]
         rows.header(names, (source.number, header))

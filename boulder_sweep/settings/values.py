@@ -53,7 +53,7 @@ _FEET_AND_A_NUMBER = re.compile(rf"[+-]?{_FEET}\s*\d{{1,2}}(?:\.\d*)?", re.ASCII
 _SEPARATED = re.compile(r"([+-]?)(\d[\d\s.,'’_]*\d)((?:[eE][+-]?\d+)?.*)", re.DOTALL)
 _GROUPS = re.compile(r"([1-9]\d{0,2}(?:([\s.,'’_])\d{3})(?:\2\d{3})*)(?:(?!\2)[.,](\d+))?")
 """Digits in groups of three, and perhaps decimals behind another sign."""
-DECIMAL_COMMA = re.compile(r"[+-]?(?:0,\d+|\d+,(?!\d{3}$)\d+)")
+_DECIMAL_COMMA = re.compile(r"[+-]?(?:0,\d+|\d+,(?!\d{3}$)\d+)")
 """A comma that stands for a decimal point: before three digits it separates thousands."""
 EMPTY, NOT_A_NUMBER = "is empty", "is not a number"
 """What may be wrong with a number; the page of a report says the same."""
@@ -495,7 +495,7 @@ def plainly(text: str) -> str:
     if groups is not None:
         whole = re.sub(r"\D", "", groups[1])
         return f"{sign}{whole}{'' if groups[3] is None else '.' + groups[3]}{rest}"
-    return f"{sign}{number.replace(',', '.')}{rest}" if DECIMAL_COMMA.fullmatch(number) else ""
+    return f"{sign}{number.replace(',', '.')}{rest}" if _DECIMAL_COMMA.fullmatch(number) else ""
 
 
 def refuse_bare(option: str, texts: list[str], unit: str) -> None:

@@ -102,6 +102,22 @@ def test_digits_of_other_scripts_are_no_numbers_as_in_the_file(messages_of):
     ]
 
 
+@pytest.mark.parametrize(
+    ("cell", "words"),
+    [
+        ("15,000", "vehicle_mass_lb: '15,000' is not a plain number; write 15000"),
+        ("1,500.5", "vehicle_mass_lb: '1,500.5' is not a plain number; write 1500.5"),
+        ("15.000,5", "vehicle_mass_lb: '15.000,5' is not a plain number; write 15000.5"),
+        ("15 000", "vehicle_mass_lb: '15 000' is not a plain number; write 15000"),
+        ("15000,5", "vehicle_mass_lb: '15000,5' is not a plain number; write 15000.5"),
+    ],
+)
+def test_separators_in_a_cell(messages_of, cell, words):
+    table = HEADER.replace("\n", ",vehicle_mass_lb\n") + f'1,1,2,1,"{cell}"\n'
+    (message,) = messages_of(table, grid=GRID.replace("mass: 6800, ", ""))
+    assert message == f"designs.csv:2: {words}"
+
+
 def test_cells_are_reported_with_line_and_column_all_at_once(messages_of):
     text = HEADER + '0.762,x,2.2,1.2\n1.65,1.68,nan,\n1.65,-1,3.44,2.03\n1,2\n1.65 m,1,"3,44",1\n1_0,1,1,010\n'
     messages = messages_of(text)
@@ -139,10 +155,12 @@ def test_the_header_is_checked(messages_of):
 
 def test_decimal_commas_are_one_mistake(messages_of):
     (message,) = messages_of((HEADER + 100 * ROWS).replace(",", ";").replace(".", ","))
-    assert message == "designs.csv:2:1: '0,762' has a decimal comma; save the file with decimal points"
+    assert (
+        message == "designs.csv:2:1: '0,762' has a comma; save the file with decimal points, and thousands unseparated"
+    )
     (*lines, rest) = messages_of(HEADER + 100 * ROWS.replace(".", ","))
     assert len(lines) == 5
-    assert "has 8 cells; the first line has 4 (numbers need a decimal point" in lines[0]
+    assert "has 8 cells; the first line has 4 (a comma begins a cell: write 15000 for 15,000" in lines[0]
     assert rest == "designs.csv:201: and 195 more lines like these"
 
 
