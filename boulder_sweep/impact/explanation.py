@@ -25,7 +25,7 @@ from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import UNLOADINGS, Criterion, Ground, Model, ReadingChoice, SolverSettings, completed
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import shown_values
-from boulder_sweep.settings.sweep import allowed_in
+from boulder_sweep.settings.sweep import DesignList, allowed_in
 from boulder_sweep.store.manifest import load as load_manifest
 from boulder_sweep.store.provenance import differences, identity, judged_by
 from boulder_sweep.store.reader import read_row
@@ -155,11 +155,14 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
 
 def one_design(settings: dict[str, Any], inputs: dict[str, float | None], control: Control, step_s: float) -> Sweep:
     """Return a sweep of the one design, with the model and the step its row was computed with."""
+    given = {name: float(value) for name, value in inputs.items() if value is not None}
+    is_listed = settings["order"] == "table"
     return Sweep(
         name=settings["name"],
         path=None,
         axes=(),
-        constants={name: float(value) for name, value in inputs.items() if value is not None},
+        constants={} if is_listed else given,
+        table=DesignList("", {name: np.array([value]) for name, value in given.items()}) if is_listed else None,
         criterion=Criterion(**settings["criterion"]),
         model=model_of(settings, control),
         solver=SolverSettings(

@@ -189,13 +189,12 @@ class Sweep:
         if self.table is not None:
             given |= {name: Source(values, (0,)) for name, values in self.table.columns.items()}
             labels = self.table.labels
-        rows = np.zeros(1 if self.table is None else len(self.table), dtype=bool)
-        for name, source in given.items():
-            # A file with axes has been refused for such values.
-            if self.is_held(name) and (self.table is not None or not source.axes):
-                rows |= is_unusual(source.values, BY_NAME[name])
-        if rows.any():
-            given[UNUSUAL] = Source(rows.astype(np.float64), () if self.table is None else (0,))
+            rows = np.zeros(len(self.table), dtype=bool)
+            for name, values in self.table.columns.items():
+                if self.is_held(name):  # of anything but a list, the file has been refused for such a value
+                    rows |= is_unusual(values, BY_NAME[name])
+            if rows.any():
+                given[UNUSUAL] = Source(rows.astype(np.float64), (0,))
         return DesignPlan(self.lengths, given, labels)
 
     def is_held(self, name: str) -> bool:
