@@ -67,7 +67,7 @@ def check_complete(entries: Entries) -> None:
 
 
 def check_usual(entries: Entries) -> None:
-    """Report values so far from usual that the file must allow them; those of a table are left to its rows."""
+    """Report values so far from usual that the file must allow them. In a table such a value makes its row an error."""
     found: list[tuple[Position, str, Field, np.ndarray, str]] = []
     for field in fields.INPUTS:
         leaf = entries.leaves.get(field.name)

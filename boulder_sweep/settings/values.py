@@ -87,7 +87,7 @@ class Leaf:
     written : str
         The unit in which it was written; empty for bare numbers.
     positions : tuple of Position
-        Where each value stands; empty where all of them stand at `position`, as those of a range.
+        Where each value stands; empty where all of them stand at `position`, as in a range.
     """
 
     values: np.ndarray
