@@ -89,7 +89,7 @@ def firmness_of(sweep: Sweep) -> Firmness:
         The sweep.
     """
     count = min(DESIGNS, max(FEWEST_DESIGNS, sweep.n_designs // SHARE))
-    evaluation = evaluation_of(sweep, accuracy_of(sweep), proved=False)
+    evaluation = evaluation_of(sweep, accuracy_of(sweep))
     designs, limits = sampled_designs(sweep, count), evaluation.limits
     control, readings = evaluation.control._replace(elements=0, unloading=ELASTIC), evaluation.readings
     law = sweep.model.resistance

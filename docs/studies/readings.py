@@ -199,7 +199,7 @@ def passing(sweep: Sweep, choice: ReadingChoice, every: int = 1) -> np.ndarray:
         Only every so many-th design, from the first on.
     """
     read_so = dataclasses.replace(sweep, model=dataclasses.replace(sweep.model, readings=choice))
-    evaluation = evaluation_of(read_so, accuracy_of(read_so), proved=False)
+    evaluation = evaluation_of(read_so, accuracy_of(read_so))
     passes = []
     for start in range(0, sweep.n_designs, BLOCK):
         block = sweep.block(start, min(start + BLOCK, sweep.n_designs))
