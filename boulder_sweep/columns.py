@@ -28,8 +28,8 @@ WAY_OUT = {
     "or bury it deeper and test",
     "shape": "the boulder fills less than 95 % of the box of its length, width and height, and no box of the same mass "
     "stands for it: give its profile (boulder.profile or boulder.taper)",
-    "validity": "the model does not hold beyond 20 deg of rotation, nor for a boulder less deep than 0.35 of its height "
-    "that slides by more than 0.5 m: bury it deeper, or test it",
+    "validity": "the model does not hold beyond 20 deg of rotation, nor for a boulder less deep than 0.35 of its "
+    "height that slides by more than 0.5 m: bury it deeper, or test it",
     "slower_truck": "a slower truck overturns it, which does not push it aside as far: bury it deeper",
 }
 """What to do about a design for the reasons that more accuracy or a longer simulation does not resolve."""
@@ -133,8 +133,8 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "dictionary",
         "",
         "why: empty for a pass; no_contact, overturns, penetration or slower_truck (it stops this truck, but a slower "
-        "one overturns it) for a fail; horizon, error, crush, override, foot, shape or validity where undecided; or why "
-        "the row could not be computed",
+        "one overturns it) for a fail; horizon, error, crush, override, foot, shape or validity where undecided; or "
+        "why the row could not be computed",
         lambda facts: facts.reason,
         rows="all",
         words=REASONS,
