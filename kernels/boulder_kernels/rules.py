@@ -341,13 +341,13 @@ class Confirmation(NamedTuple):
 
 @exact_inlined
 def is_late(rule: Any, t_end: Any, control: Control) -> Any:
-    """Whether other solutions must agree with a row before it passes or overturns.
+    """Whether other solutions must agree with a row before it passes, with or without `VALIDITY`, or overturns.
 
     Never where errors are not confirmed, as by ``fast``. Nor in plastic soil, where every motion goes on until it
     rests, and loses its energy to the soil instead of rocking.
     """
     counted = control.error_estimate and not is_plastic(control.unloading)
-    return counted & (t_end > control.horizon) & ((rule == PASSES) | (rule == OVERTURNS))
+    return counted & (t_end > control.horizon) & ((rule == PASSES) | (rule == VALIDITY) | (rule == OVERTURNS))
 
 
 @exact_inlined

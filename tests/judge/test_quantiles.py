@@ -129,7 +129,8 @@ def test_a_design_that_overturns_in_the_mean_soil_is_no_pass(text: str, tmp_path
     assert (row["verdict"], row["reason"]) == ("fail", "overturns")
     assert "changes_side" in row["validity"].split(";")
     (mean,) = rows(text, tmp_path, at="mean")
-    assert (mean["verdict"], mean["time_to_limit_s"]) == ("fail", row["time_to_limit_s"])
+    assert (mean["verdict"], mean["reason"]) == ("fail", "overturns")
+    assert row["time_to_limit_s"] <= mean["time_to_limit_s"]
     assert "changes_side" not in mean["validity"].split(";")
 
 

@@ -64,7 +64,7 @@ def test_inside_there_are_none() -> None:
         ("vehicle", {"k_v": 1.7e6}, {}),  # mass and speed of a truck, the spring of a softer one
         ("vehicle", {"k_v": 1e8}, {}),
         ("vehicle", {"c_v": 3e5}, {}),
-        ("soil", {"phi": math.radians(50.0), "beta": 250.0}, {}),
+        ("soil", {"phi": math.radians(50.0), "beta": 200.0}, {}),
         ("soil", {"rho_s": 1500.0}, {}),
         ("soil", {"rho_s": 2260.0}, {}),
         ("soil", {"K_epsilon": 1.3}, {}),
