@@ -48,7 +48,7 @@ jobs_option = click.option("--jobs", type=JOBS, help="Threads [default: all core
 at_option = click.option(
     "--at",
     metavar="QUANTILE",
-    help="Value of uncertain inputs: unfavourable quantile, p5 [default], p10, ..., or mean.",
+    help="Uncertain inputs: at both ends, p5 [default], p10, ..., and the mean, or mean alone.",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout.")
 units_option = click.option("--units", type=click.Choice(SYSTEMS), default="si", show_default=True, help="Units shown.")
