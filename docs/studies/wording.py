@@ -65,8 +65,8 @@ def _preset_words(printed: ReadingRow, corrected: ReadingRow, designs: int) -> s
     lost = int((corrected.stands & ~printed.stands).sum())
     return (
         f"About as many designs stand by both presets, {printed.share:.1%} as printed and {corrected.share:.1%} "
-        f"corrected, because the misprints partly cancel; but they are not the same designs. {unsafe / designs:.1%} of all stand "
-        f"as printed and not corrected, {lost / designs:.1%} corrected and not as printed."
+        f"corrected, because the misprints partly cancel; but they are not the same designs. {unsafe / designs:.1%} "
+        f"of all stand as printed and not corrected, {lost / designs:.1%} corrected and not as printed."
     )
 
 
