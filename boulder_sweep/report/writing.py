@@ -244,8 +244,8 @@ def _general_notes(settings: Mapping[str, Any], control: Control, units: str) ->
     notes += [f"{words}." for words in derived_words(settings.get("derived", {}), units)]
     if taken := [_taken(name, how, settings["inputs"], units) for name, how in settings.get("taken_at", {}).items()]:
         judged = (
-            "; every row of the table is judged at the means and at the other ends, too, and has the worst verdict, while "
-            "simulations in this page take the values shown"
+            "; every row of the table is judged at the means and at the other ends, too, and has the worst verdict, "
+            "while simulations in this page take the values shown"
         )
         notes.append(f"Uncertain inputs are taken at {', '.join(taken)}{judged if 'judged_at' in settings else ''}.")
     for factor in settings.get("partial_factor", {}).values():
