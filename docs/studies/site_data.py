@@ -29,7 +29,7 @@ def notes_of_borehole(root: Path) -> str:
 
 def angles_of_counts(_: Path) -> str:
     """Return the friction angles by some blow counts at 1.5 m, and what is taken of them."""
-    lines = []
+    lines: list[str] = []
     for n in (10, 16, 22, 30):
         node = block_of(Position(""), {"n": f"{n}", "energy_ratio": "60 %", "depth": "1.5 m"})
         soil = soil_of(node, "spt", ("friction_angle",), None)
