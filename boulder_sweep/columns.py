@@ -18,15 +18,21 @@ ColumnType = Literal["int64", "float64", "dictionary"]
 RowKind = Literal["all", "judged", "computed", "free", "rated", "overturned", "passing"]
 
 VERDICTS = ("pass", "fail", "undecided", "error")
-REASONS = ("", "no_contact", "overturns", "penetration", "horizon", "error", "crush", "override", "foot", "shape")
+REASONS = (
+    *("", "no_contact", "overturns", "penetration", "horizon", "error", "crush", "override", "foot", "shape"),
+    *("slower_truck", "validity"),
+)
 """The reasons of every verdict but ``error``, which has reasons of its own."""
 WAY_OUT = {
     "foot": "soil that presses on a rounded foot also lifts, which is not modelled: bed it in concrete, cut it flat, "
     "or bury it deeper and test",
     "shape": "the boulder fills less than 95 % of the box of its length, width and height, and no box of the same mass "
     "stands for it: give its profile (boulder.profile or boulder.taper)",
+    "validity": "the model does not hold beyond 20 deg of rotation, nor for a boulder less deep than 0.35 of its "
+    "height that slides by more than 0.5 m: bury it deeper, or test it",
+    "slower_truck": "a slower truck overturns it, which does not push it aside as far: bury it deeper",
 }
-"""What to do about the reasons that more accuracy or a longer simulation does not resolve."""
+"""What to do about a design for the reasons that more accuracy or a longer simulation does not resolve."""
 GRADES = ("robust", "sensitive", "open")
 """What is known of a pass under other forms of the model."""
 STANDINGS = ("paper", "paper;broms", "paper;width_capped", "paper;broms;width_capped")
@@ -126,8 +132,9 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "reason",
         "dictionary",
         "",
-        "why: empty for a pass; no_contact, overturns or penetration for a fail; horizon, error, crush, override, foot "
-        "or shape where undecided; or why the row could not be computed",
+        "why: empty for a pass; no_contact, overturns, penetration or slower_truck (it stops this truck, but a slower "
+        "one overturns it) for a fail; horizon, error, crush, override, foot, shape or validity where undecided; or "
+        "why the row could not be computed",
         lambda facts: facts.reason,
         rows="all",
         words=REASONS,
@@ -137,7 +144,8 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "float64",
         "1",
         "least distance to a limit as a fraction of that limit, positive where the design passes; "
-        "null where it overturned, was not touched, or is undecided for another reason than error",
+        "null where it overturned, was not touched, fails by a slower truck, or is undecided for another reason than "
+        "error",
         lambda facts: facts.margin,
         rows="rated",
     ),

@@ -119,6 +119,8 @@ class DesignBlock:
         Text columns that are carried along.
     numbers : ndarray of int64, shape (n,), or None
         Numbers of the designs where they are not all of ``[start, stop)``.
+    cases : tuple of DesignBlock
+        The same rows with other values of their uncertain inputs, by which they are judged, too; none as a rule.
     """
 
     start: int
@@ -127,6 +129,7 @@ class DesignBlock:
     reasons: Reasons
     labels: dict[str, Label] = field(default_factory=dict)
     numbers: np.ndarray | None = None
+    cases: tuple[DesignBlock, ...] = ()
 
     def __len__(self) -> int:
         return self.stop - self.start if self.numbers is None else len(self.numbers)
@@ -295,11 +298,18 @@ class DesignPlan:
         ``impact_height_m`` are computed here.
     labels : mapping of str to Label
         Text columns to carry along.
+    cases : sequence of DesignPlan
+        Plans of the same lengths with other values of uncertain inputs, see `DesignBlock.cases`.
     """
 
     def __init__(
-        self, lengths: Sequence[int], given: Mapping[str, Source], labels: Mapping[str, Label] | None = None
+        self,
+        lengths: Sequence[int],
+        given: Mapping[str, Source],
+        labels: Mapping[str, Label] | None = None,
+        cases: Sequence[DesignPlan] = (),
     ) -> None:
+        self.cases = tuple(cases)
         self.labels = dict(labels or {})
         self.lengths = tuple(int(length) for length in lengths)
         self.n_designs = math.prod(self.lengths)
@@ -352,10 +362,13 @@ class DesignPlan:
         columns = {name: rows.column(quantity) for name, quantity in self.columns.items()}
         labels = {name: label.at(rows.index((label.axis,))) for name, label in self.labels.items()}
         reasons = Reasons(rows.values(self.refusals), REASONS)
-        return DesignBlock(rows.start, rows.stop, columns, reasons, labels, rows.numbers)
+        cases = tuple(case._block(_RowIndices(case, rows.start, rows.stop, rows.numbers)) for case in self.cases)
+        return DesignBlock(rows.start, rows.stop, columns, reasons, labels, rows.numbers, cases)
 
     def given_rows(self, start: int, stop: int) -> dict[str, np.ndarray]:
         """Return what is given of the designs ``[start, stop)``, one value a row; what follows from it is left out.
+
+        What differs in a case is there again under the name of `in_case`.
 
         Raises
         ------
@@ -363,13 +376,28 @@ class DesignPlan:
             The rows are not within the sweep.
         """
         rows = self._rows(start, stop)
-        return {name: rows.values(source) for name, source in self.given.items()}
+        given = {name: rows.values(source) for name, source in self.given.items()}
+        for number, case in enumerate(self.cases):
+            for name, values in case.given_rows(start, stop).items():
+                if not np.array_equal(values, given[name]):
+                    given[in_case(name, number)] = values
+        return given
 
     def _rows(self, start: int, stop: int, numbers: np.ndarray | None = None) -> _RowIndices:
         """Return a range of rows that must be within the sweep, or some rows of it."""
         if not 0 <= start <= stop <= self.n_designs:
             raise IndexError(f"rows {start} to {stop} are not within the {self.n_designs} designs of this sweep")
         return _RowIndices(self, start, stop, numbers)
+
+
+def in_case(name: str, number: int) -> str:
+    """Return the name of an input in a case, among what is given row by row."""
+    return f"{name}@{number}"
+
+
+def input_of(name: str) -> str:
+    """Return the input that a name of `in_case` is about; any other name is its own."""
+    return name.partition("@")[0]
 
 
 def block_of(given: Mapping[str, np.ndarray]) -> DesignBlock:
@@ -379,22 +407,32 @@ def block_of(given: Mapping[str, np.ndarray]) -> DesignBlock:
     ----------
     given
         Arrays of shape (n,) by column name, in the units of the table; ``embedment_ratio`` may stand in place of
-        ``embedment_depth_m``, and ``impact_height_m`` may be missing, as in a file.
+        ``embedment_depth_m``, and ``impact_height_m`` may be missing, as in a file. What differs in a case of the
+        block stands under the name of `in_case`.
 
     Returns
     -------
     DesignBlock
         The designs, numbered from 0, with the same bits as the same designs in a grid.
     """
-    values, codes = _completed(given, np.zeros(1), lambda function, *inputs: function(*inputs))
+    base = {name: values for name, values in given.items() if input_of(name) == name}
+    values, codes = _completed(base, np.zeros(1), lambda function, *inputs: function(*inputs))
     columns = {name: Column(None, np.ascontiguousarray(one)) for name, one in values.items()}
-    return DesignBlock(0, len(codes), columns, Reasons(codes, REASONS))
+    numbers = sorted({int(name.rpartition("@")[2]) for name in given.keys() - base.keys()})
+    cases = (
+        {input_of(name): values for name, values in given.items() if name == in_case(input_of(name), number)}
+        for number in numbers
+    )
+    return DesignBlock(
+        0, len(codes), columns, Reasons(codes, REASONS), cases=tuple(block_of(base | case) for case in cases)
+    )
 
 
 def some(block: DesignBlock, rows: np.ndarray) -> DesignBlock:
     """Return some rows of a block by their indices, without labels, numbered from 0."""
     columns = {name: Column(None, column.to_numpy()[rows]) for name, column in block.columns.items()}
-    return DesignBlock(0, len(rows), columns, Reasons(np.asarray(block.reasons.codes)[rows], block.reasons.texts))
+    reasons = Reasons(np.asarray(block.reasons.codes)[rows], block.reasons.texts)
+    return DesignBlock(0, len(rows), columns, reasons, cases=tuple(some(case, rows) for case in block.cases))
 
 
 class _RowIndices:

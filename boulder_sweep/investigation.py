@@ -1,14 +1,17 @@
 """Sand by what an investigation measures: blow counts, cone resistance, relative density, in plain numbers.
 
-Published correlations for clean sand. Where a source leaves a choice, the one with the weaker soil is taken: the stress
-that a reading is normalized by is that of dense soil without water where no density is measured, the normalization is
-limited to 1.7 (Youd et al. 2001), rods count as no longer than the depth (Skempton 1986), the excess pore pressure
-behind a cone is left out, and nothing is extrapolated. `docs/site_data.md` tells which of the sources were seen.
+Published correlations for clean sand. Several are in wide use and differ by up to 6 deg: every one of the tables
+`BY_BLOW_COUNT` and `BY_CONE` is worked out, and the one with the weakest soil counts. Where a source leaves a choice,
+the weaker soil is taken, too: the stress that a reading is normalized by is that of dense soil without water where no
+density is measured, the normalization is limited to 1.7 (Youd et al. 2001), rods count as no longer than the depth
+(Skempton 1986), the excess pore pressure behind a cone is left out, and nothing is extrapolated. `docs/site_data.md`
+tells which of the sources were seen.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -45,14 +48,16 @@ class Range(NamedTuple):
 
 
 BLOW_COUNTS = Range(3.5 * HAMMERS / 0.6, 30.0 * HAMMERS / 0.6)
-"""(N1)60 that Hatanaka and Uchida's line is taken for: N1 from 3.5 to 30 with their hammers."""
+"""(N1)60 that blow counts are taken for: N1 from 3.5 to 30 with the hammers of Hatanaka and Uchida. Peck, Hanson and
+Thornburn's curve goes on to about 60; there, the two cannot be compared."""
 CONE_ANGLES = Range(30.0, 46.0)
-"""Friction angles [deg] that Kulhawy and Mayne's line is taken for."""
+"""Friction angles [deg] that cones are taken for."""
 RELATIVE_DENSITIES = Range(0.15, 0.85)
 """Where the table of EM 1110-2-2504 gives both ends of the friction angle."""
 SPT_SD_DEG, CPT_SD_DEG, DENSITY_SD_DEG = 3.0, 2.8, 2.0
-"""Transformation uncertainty of the friction angle [deg], as a standard deviation: the scatter about Hatanaka and
-Uchida's line; that of Kulhawy and Mayne, with which Phoon and Kulhawy (1999) calculate; Bowles (1996), Table 3-4."""
+"""Scatter of the friction angle about a correlation [deg], as a standard deviation: that of Hatanaka and Uchida, taken
+for Wolff's, too; that of Kulhawy and Mayne, with which Phoon and Kulhawy (1999) calculate, taken for Robertson and
+Campanella's, too; Bowles (1996), Table 3-4."""
 
 # Constant of horizontal subgrade reaction [MN/m^3] over friction angle [deg] of the two families in use.
 API_ANGLES, _API = np.array([30.0, 43.0]), np.array([10.5, 110.0])
@@ -120,8 +125,51 @@ def normalized_blow_count(n: float, energy_ratio: float, depth_m: float, stress_
     return n * energy_ratio / 0.6 * rod_factor(depth_m) * stress_factor(stress_kPa)
 
 
-def angle_by_blow_count(n1_60: float) -> float:
-    """Return the friction angle [deg], sqrt(15.4 (N1)60) + 20 (Hatanaka and Uchida 1996; UFC 3-220-10, Eq 8-6).
+def hatanaka_uchida(n1_60: float) -> float:
+    """Return the friction angle [deg] by (N1)60, sqrt(15.4 (N1)60) + 20 (1996; UFC 3-220-10, Eq 8-6)."""
+    return math.sqrt(15.4 * n1_60) + 20.0
+
+
+def wolff(n1_60: float) -> float:
+    """Return the friction angle [deg] by (N1)60, 27.1 + 0.30 (N1)60 - 0.00054 (N1)60^2 (1989; UFC 3-220-10, Eq 8-5).
+
+    Wolff's fit to the curve of Peck, Hanson and Thornburn (1974).
+    """
+    return 27.1 + 0.30 * n1_60 - 0.00054 * n1_60**2
+
+
+def kulhawy_mayne(resistance_MPa: float, stress_kPa: float) -> float:
+    """Return the friction angle [deg] by a cone, 17.6 + 11 lg(q_c / p_a sqrt(p_a / sigma')) (1990).
+
+    The square root is limited as for blow counts. UFC 3-220-10, Eq 8-7, prints the stress without the root, which would
+    give larger angles below one atmosphere.
+    """
+    return 17.6 + 11.0 * math.log10(1e3 * resistance_MPa / ATMOSPHERE_KPA * stress_factor(stress_kPa))
+
+
+def robertson_campanella(resistance_MPa: float, stress_kPa: float) -> float:
+    """Return the friction angle [deg] by a cone, tan(phi') = (lg(q_c / sigma') + 0.29) / 2.68 (1983).
+
+    The stress is limited as for blow counts: near the surface it counts as p_a / 1.7^2 = 35 kPa.
+    """
+    ratio = 1e3 * resistance_MPa / ATMOSPHERE_KPA * stress_factor(stress_kPa) ** 2
+    return math.degrees(math.atan((math.log10(ratio) + 0.29) / 2.68))
+
+
+BY_BLOW_COUNT: dict[str, Callable[[float], float]] = {
+    "Hatanaka and Uchida 1996": hatanaka_uchida,
+    "Wolff 1989": wolff,
+}
+"""Friction angle [deg] over (N1)60 by each correlation, under its source."""
+BY_CONE: dict[str, Callable[[float, float], float]] = {
+    "Kulhawy and Mayne 1990": kulhawy_mayne,
+    "Robertson and Campanella 1983": robertson_campanella,
+}
+"""Friction angle [deg] over the resistance of the cone [MPa] and the vertical stress [kPa], likewise."""
+
+
+def angles_by_blow_count(n1_60: float) -> dict[str, float]:
+    """Return the friction angle [deg] by each of `BY_BLOW_COUNT`.
 
     Raises
     ------
@@ -129,24 +177,20 @@ def angle_by_blow_count(n1_60: float) -> float:
         Outside `BLOW_COUNTS`.
     """
     BLOW_COUNTS.check(n1_60, "(N1)60")
-    return math.sqrt(15.4 * n1_60) + 20.0
+    return {source: angle(n1_60) for source, angle in BY_BLOW_COUNT.items()}
 
 
-def angle_by_cone(resistance_MPa: float, stress_kPa: float) -> float:
-    """Return the friction angle [deg], 17.6 + 11 lg(q_c / p_a sqrt(p_a / sigma')) (Kulhawy and Mayne 1990).
-
-    The square root is limited as for blow counts. UFC 3-220-10, Eq 8-7, prints the stress without the root, which would
-    give larger angles below one atmosphere.
+def angles_by_cone(resistance_MPa: float, stress_kPa: float) -> dict[str, float]:
+    """Return the friction angle [deg] by each of `BY_CONE`.
 
     Raises
     ------
     OutsideError
-        The angle is outside `CONE_ANGLES`.
+        The lowest angle is outside `CONE_ANGLES`.
     """
-    normalized = 1e3 * resistance_MPa / ATMOSPHERE_KPA * stress_factor(stress_kPa)
-    angle = 17.6 + 11.0 * math.log10(normalized)
-    CONE_ANGLES.check(angle, f"the friction angle by {resistance_MPa:g} MPa", " deg")
-    return angle
+    angles = {source: angle(resistance_MPa, stress_kPa) for source, angle in BY_CONE.items()}
+    CONE_ANGLES.check(min(angles.values()), f"the friction angle by {resistance_MPa:g} MPa", " deg")
+    return angles
 
 
 def angle_by_relative_density(ratio: float) -> float:

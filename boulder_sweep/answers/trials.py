@@ -12,7 +12,7 @@ import numpy as np
 
 from boulder_kernels._jit import plain
 from boulder_kernels.settling import proof_is_possible
-from boulder_sweep.designs import REASONS, DesignBlock, Label, block_of, some
+from boulder_sweep.designs import REASONS, DesignBlock, Label, block_of, input_of, some
 from boulder_sweep.judge.accuracy import Accuracy, accuracy_of, steps_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 from boulder_sweep.judge.judged import PASS, Judged, joined
@@ -62,7 +62,8 @@ class Open:
             kept = {name: values for name, values in table.columns.items() if name not in self._left_out}
             table = DesignList(table.file, kept, table.labels) if kept else None
         axes = tuple(axis for axis in sweep.axes if axis.name not in self._left_out)
-        self.sweep = dataclasses.replace(sweep, axes=axes, constants=constants, table=table)
+        cases = tuple(Open(case, names).sweep for case in sweep.cases)
+        self.sweep = dataclasses.replace(sweep, axes=axes, constants=constants, table=table, cases=cases)
 
     @property
     def count(self) -> int:
@@ -76,7 +77,7 @@ class Open:
     def rows(self, start: int, stop: int) -> InputRows:
         """Return the other inputs of the combinations ``[start, stop)``."""
         given = self.sweep.plan.given_rows(start, stop)
-        return {name: values for name, values in given.items() if name not in self._left_out}
+        return {name: values for name, values in given.items() if input_of(name) not in self._left_out}
 
 
 def rows_at(rows: InputRows, index: np.ndarray | slice) -> InputRows:
@@ -142,7 +143,7 @@ class Remembered:
 
     def __call__(self, block: DesignBlock) -> Judged:
         """Return the judged rows of a block."""
-        inputs = [column.to_numpy() for column in block.columns.values()]
+        inputs = [column.to_numpy() for each in (block, *block.cases) for column in each.columns.values()]
         keys = [row.tobytes() for row in np.stack(inputs, axis=1)]
         new = {key: row for row, key in enumerate(keys) if key not in self._indices}
         if new or not self._judged:
@@ -160,8 +161,7 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0, *, compared: bool = False
     Parameters
     ----------
     sweep
-        The sweep. Where its readings allow no proof of rest, as the printed ones, a design passes that stands to the
-        longest horizon.
+        The sweep.
     least_margin
         As of `Judges`.
     compared
@@ -171,10 +171,12 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0, *, compared: bool = False
         As of `Judges`.
     """
     accuracy = accuracy_of(sweep)
-    final = dataclasses.replace(evaluation_of(sweep, accuracy, proved=False), least_margin=least_margin)
-    coarse = evaluation_of(sweep, Accuracy("fast", steps_of(sweep)["fast"], error_estimate=False), proved=False)
+    final = dataclasses.replace(evaluation_of(sweep, accuracy), least_margin=least_margin)
+    coarse = evaluation_of(sweep, Accuracy("fast", steps_of(sweep)["fast"], error_estimate=False))
     searched = coarse.limits._replace(guarded=False)
-    coarse = dataclasses.replace(coarse, only=SEARCHED, least_margin=least_margin, limits=searched)
+    # A late row is found by the quick solution, too, and confirmed by the other.
+    control = coarse.control._replace(longest_horizon=final.control.longest_horizon)
+    coarse = dataclasses.replace(coarse, only=SEARCHED, least_margin=least_margin, limits=searched, control=control)
     if compared and not plain(proof_is_possible)(final.readings):
         final, coarse = (
             dataclasses.replace(each, control=each.control._replace(longest_horizon=0.0)) for each in (final, coarse)

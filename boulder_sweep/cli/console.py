@@ -110,6 +110,10 @@ def firmness_lines(firmness: Mapping[str, Any]) -> list[str]:
     error, lost = firmness["numerical_error_deg"], firmness["lost"]
     exact = "no numerical error estimated" if error is None else f"numerical error at most {error:g} deg (99.9 %)"
     lines = [f"firm?  {exact}, sample of {counted(firmness['designs'], 'design')}"]
+    if firmness.get("changing"):
+        share = firmness["changing"] / firmness["designs"]
+        changing = f"the verdict of {share:.0%} changes with the uncertain inputs; it is the worst (changes_side)"
+        lines += _indent(changing, "       ")
     if not lost:
         return lines
     laws = ", ".join(f"{law} {share:.0%}" for law, share in lost.items() if law in RESISTANCES)

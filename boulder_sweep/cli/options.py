@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from boulder_sweep.cli.output import say, wrap
+from boulder_sweep.cli.output import say, working, wrap
 from boulder_sweep.runner.pool import BACKENDS, MOST_JOBS
 from boulder_sweep.text import counted
 
@@ -74,7 +74,7 @@ jobs_option = click.option("--jobs", type=JOBS, help="Threads [default: all core
 at_option = click.option(
     "--at",
     metavar="QUANTILE",
-    help="Value of uncertain inputs: unfavourable quantile, p5 [default], p10, ..., or mean.",
+    help="Uncertain inputs: at both ends, p5 [default], p10, ..., and the mean, or mean alone.",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout.")
 units_option = click.option("--units", type=click.Choice(SYSTEMS), default="si", show_default=True, help="Units shown.")
@@ -124,7 +124,10 @@ def cluster_options(function: Command) -> Command:
 def load_sweep(
     path: str, overrides: Sequence[str], quiet: bool, units: str = "si", *, second_opinion: bool = False
 ) -> Sweep:
-    """Load settings and print the notes on them, and how inputs follow from the data of a site, in these units."""
+    """Load settings and print the notes on them, and how inputs follow from the data of a site, in these units.
+
+    Where the soil has too few elements, some designs are simulated to say what that costs.
+    """
     from boulder_sweep.settings import load
     from boulder_sweep.settings.loader import ALL_OPINIONS
     from boulder_sweep.settings.sweep import derived_words
@@ -135,6 +138,12 @@ def load_sweep(
             say("\n".join(textwrap.wrap(f"note: {words}", 80, subsequent_indent="  ")))
         for note in sweep.notes:
             say(f"note: {note}")
+        if sweep.model.has_few_elements:
+            from boulder_sweep.judge.few_elements import words_of_few_elements  # the kernels are heavy
+
+            with working(quiet):
+                words = words_of_few_elements(sweep)
+            say("\n".join(textwrap.wrap(f"note: model.soil: {words}", 80, subsequent_indent="  ")))
     return sweep
 
 

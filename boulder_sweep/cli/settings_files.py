@@ -95,7 +95,7 @@ Example:
 @grid_argument
 @set_option
 def check(grid: str, overrides: tuple[str, ...]) -> int:
-    """Check GRID without simulating: all mistakes at once, with file, line and column."""
+    """Check GRID: all mistakes at once, with file, line and column, and notes on what deserves a second look."""
     from boulder_sweep.cli import console
 
     sweep = load_sweep(grid, overrides, quiet=False)

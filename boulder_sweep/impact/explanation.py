@@ -14,6 +14,7 @@ import numpy as np
 
 from boulder_kernels import Control, Readings
 from boulder_sweep.columns import BY_NAME, INPUT_COLUMNS, OPTIONAL_COLUMNS, OutcomeColumn
+from boulder_sweep.designs import embedment_of_ratio
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.accuracy import known_control
 from boulder_sweep.judge.evaluation import Evaluation
@@ -154,10 +155,19 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
 
 
 def one_design(settings: dict[str, Any], inputs: dict[str, float | None], control: Control, step_s: float) -> Sweep:
-    """Return a sweep of the one design, with the model and the step its row was computed with."""
+    """Return a sweep of the one design, with the model and the step its row was computed with, and its cases.
+
+    Raises
+    ------
+    LookupError
+        The table does not list the values of its uncertain inputs, because there are too many.
+    """
+    at = [_in_case(case, settings["inputs"], inputs) for case in settings.get("judged_at", ())]
+    cases = tuple(one_design(settings | {"judged_at": ()}, case, control, step_s) for case in at)
     given = {name: float(value) for name, value in inputs.items() if value is not None}
     is_listed = settings["order"] == "table"
     return Sweep(
+        cases=cases,
         name=settings["name"],
         path=None,
         axes=(),
@@ -172,6 +182,35 @@ def one_design(settings: dict[str, Any], inputs: dict[str, float | None], contro
         ),
         allowed=allowed_in(settings),
     )
+
+
+def _in_case(case: dict[str, Any], given: dict[str, Any], inputs: dict[str, float | None]) -> dict[str, float | None]:
+    """Return the inputs of a row in a case, by the place that its own values have among those of the settings.
+
+    Parameters
+    ----------
+    case
+        What was taken in the case, and the values of these inputs by column name: a number, or a list.
+    given, inputs
+        The same of the table, for all inputs, and the inputs of the row.
+    """
+    height = inputs["boulder_height_m"]
+    own = inputs | {"embedment_ratio": inputs["embedment_depth_m"]}  # of a list of ratios the depths are compared
+    found = dict(inputs)
+    if isinstance(given["impact_height_m"], str):
+        del found["impact_height_m"]  # it follows from what may be uncertain
+    for name in case["taken_at"]:
+        values, taken = case[name], given[name]
+        ratio = name == "embedment_ratio"
+        if isinstance(values, list):
+            places = embedment_of_ratio(np.array(taken), np.array(height)).tolist() if ratio else taken
+            values = values[places.index(own[name])]
+        elif not isinstance(values, float):
+            raise LookupError("the table does not list the values of its uncertain inputs")
+        found[name] = values
+        if ratio:
+            del found["embedment_depth_m"]
+    return found
 
 
 def model_of(settings: dict[str, Any], control: Control) -> Model:

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from boulder_kernels import Control, OutcomeTable, Readings, Status, simulate_table
+from boulder_kernels._jit import plain
+from boulder_kernels.settling import proof_is_possible
 from boulder_kernels.table import finer_step, is_paired
 from boulder_sweep.judge.inputs import Designs, sampled_designs
 from boulder_sweep.settings.model import UNLOADINGS
@@ -125,16 +127,21 @@ def known_control(recorded: Mapping[str, Any]) -> Control:
 
 
 def control_of(sweep: Sweep, accuracy: Accuracy) -> Control:
-    """Return how the motion is integrated for a sweep: step, horizon, limit, soil, error estimate."""
-    shape = sweep.model.shape
+    """Return how the motion is integrated for a sweep: step, horizon, limit, soil, error estimate.
+
+    What goes on past the horizon is followed only where finer steps can confirm it, and where a proof of its end is
+    possible at all.
+    """
+    shape, horizon = sweep.model.shape, float(sweep.solver.horizon_s)
+    goes_on = accuracy.error_estimate and plain(proof_is_possible)(readings_of(sweep))
     return Control(
         h=accuracy.steps.step_s,
-        horizon=float(sweep.solver.horizon_s),
+        horizon=horizon,
         theta_limit=math.radians(sweep.criterion.max_rotation_deg),
         elements=int(sweep.model.elements),
         error_estimate=accuracy.error_estimate,
         locate_yield=accuracy.steps.locate_yield,
-        longest_horizon=LONGEST_HORIZON * float(sweep.solver.horizon_s),
+        longest_horizon=LONGEST_HORIZON * horizon if goes_on else 0.0,
         unloading=UNLOADINGS.index(sweep.model.unloading),
         paired=accuracy.paired,
         side_by_side=shape.is_box or len(shape.points) == 2 or sweep.n_designs >= OUTLINES_IN_LANES,

@@ -14,17 +14,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, SecondSprings, simulate_table
+from boulder_kernels._jit import plain
 from boulder_kernels.plastic import is_plastic
+from boulder_kernels.rules import SLOWER_SPEEDS, after_slower, is_asked_slower
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_kernels.table import some_rows
 from boulder_sweep.columns import AT_REST, OUTCOMES, OutcomeColumn
 from boulder_sweep.designs import SECOND_SPRING
 from boulder_sweep.judge.accuracy import LONGEST_HORIZON, Accuracy, control_of, readings_of
 from boulder_sweep.judge.inputs import Designs, designs_of
-from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed, with_rows
+from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed, with_rows, worst_of
 from boulder_sweep.judge.refinement import RowStates, finer_controls
 from boulder_sweep.judge.robustness import can_be_asked, with_second_opinions
-from boulder_sweep.judge.verdict import JudgedOnce, Limits, judge, judge_once, limits_of
+from boulder_sweep.judge.verdict import JudgedOnce, Limits, judge_once, limits_of
 from boulder_sweep.settings.model import SECOND_OPINIONS, Model
 from boulder_sweep.soils import with_soil
 
@@ -32,6 +34,8 @@ if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
     from boulder_sweep.settings import Sweep
 
+SLOWER_AT_ONCE = 150
+"""Designs that are simulated at once with all their slower trucks: an interruption waits for the current call."""
 Simulate = Callable[..., OutcomeTable]
 """Function that simulates a table of designs, with the arguments of `by_kernels`, which it always is outside tests."""
 
@@ -97,8 +101,10 @@ class Evaluation:
         Returns
         -------
         Judged
-            n rows, in the same order.
+            n rows, in the same order. Of a block with cases, each row has the worst of their verdicts.
         """
+        if block.cases:
+            return worst_of([self(replace(block, cases=())), *(self(case) for case in block.cases)])
         if not block.reasons.any:
             return self.judged(self.designs(block))
         codes = np.asarray(block.reasons.codes)
@@ -121,8 +127,8 @@ class Evaluation:
         """Simulate and judge designs that can be computed.
 
         Rows that are refused for their time steps, undecided for their numerical error, or late are simulated again
-        by finer steps until they are decided or `finer_controls` ends, see `refinement`. A row depends on nothing but
-        its own design.
+        by finer steps until they are decided or `finer_controls` ends, see `refinement`. Shallow boulders that would
+        pass and slide are simulated with slower trucks, too. A row depends on nothing but its own design.
 
         Parameters
         ----------
@@ -141,17 +147,7 @@ class Evaluation:
         reduced by it. Those that do not pass so, too, keep their verdict and get a margin just below the one asked for.
         Second opinions are asked with the reduced limit.
         """
-        rows = RowStates(designs, self.control, self._once(designs, self.control))
-        for control in finer_controls(self.control):
-            again = rows.wanted(control)
-            if len(again):
-                rows.update(again, control, self._once(designs.rows(again), control))
-            elif not len(rows.unconfirmed):
-                break
-        judged = rows.judged
-        if len(rows.unconfirmed):
-            judged = self._judge_doubted(judged, rows.unconfirmed, designs, rows.outcomes)
-        judged = joined([judged])
+        judged = joined([self._holding_slower(self._decided(designs), designs)])
         if self.least_margin > 0.0:
             judged = self._margins_proved(judged, designs)
         if not self.second_opinion or (self.only and "robustness" not in self.only):
@@ -159,6 +155,44 @@ class Evaluation:
         limits = self.limits._replace(rotation=(1.0 - self.least_margin) * self.limits.rotation)
         passes = designs.rows(judged.verdict == PASS)
         return with_second_opinions(judged, passes, self.second_opinion, self.model.resistance, limits, self.longest_s)
+
+    def _decided(self, designs: Designs) -> JudgedOnce:
+        """Simulate and judge designs until each is decided at its own speed."""
+        rows = RowStates(designs, self.control, self._once(designs, self.control))
+        for control in finer_controls(self.control):
+            again = rows.wanted(control)
+            if len(again):
+                rows.update(again, control, self._once(designs.rows(again), control))
+            elif not len(rows.unconfirmed):
+                break
+        judged, rule = rows.judged, rows.rule
+        if len(rows.unconfirmed):
+            doubted = self._doubted(rows.unconfirmed, designs, rows.outcomes)
+            judged = with_rows(judged, rows.unconfirmed, doubted.judged)
+            rule[rows.unconfirmed] = doubted.rule
+        return JudgedOnce(judged, rows.outcomes, rule)
+
+    def _holding_slower(self, decided: JudgedOnce, designs: Designs) -> Judged:
+        """Return decided rows, those of shallow boulders that slide judged by slower trucks as well."""
+        judged, outcomes, rule = decided
+        table = designs.table
+        asked = np.flatnonzero(plain(is_asked_slower)(rule, table.d / table.H, outcomes.x_b_max))
+        if not len(asked):
+            return judged
+        alone, steps = replace(self, only=("verdict", "reason")), len(SLOWER_SPEEDS)
+        ruled = rule[asked]
+        for at in range(0, len(asked), SLOWER_AT_ONCE):
+            some = asked[at : at + SLOWER_AT_ONCE]
+            trucks = designs.rows(np.repeat(some, steps))
+            v_0 = trucks.table.v_0 * np.tile(SLOWER_SPEEDS, len(some))
+            slower = alone._decided(trucks._replace(table=trucks.table._replace(v_0=v_0))).rule
+            for each in slower.reshape(-1, steps).T:
+                ruled[at : at + SLOWER_AT_ONCE] = plain(after_slower)(ruled[at : at + SLOWER_AT_ONCE], each)
+        changed = asked[ruled != rule[asked]]
+        if not len(changed):
+            return judged
+        again = some_rows(outcomes, changed), designs.rows(changed), self.limits, self.only, ruled[ruled != rule[asked]]
+        return with_rows(judged, changed, judge_once(*again).judged)
 
     def asked(self) -> Evaluation:
         """Return the same with every second opinion, where they can be asked."""
@@ -200,11 +234,11 @@ class Evaluation:
         outcomes = self.simulate(designs.table, self.readings, control, *designs.laws)
         return judge_once(outcomes, designs, self.limits, self.only)
 
-    def _judge_doubted(self, judged: Judged, rows: np.ndarray, designs: Designs, outcomes: OutcomeTable) -> Judged:
-        """Judge late rows, on which no two solutions agree, as of unknown error."""
+    def _doubted(self, rows: np.ndarray, designs: Designs, outcomes: OutcomeTable) -> JudgedOnce:
+        """Judge late rows, on which no two solutions agree, with an unknown error."""
         unknown = np.full(len(rows), np.inf)
         doubted = some_rows(outcomes, rows)._replace(theta_error=unknown, x_error=unknown)
-        return with_rows(judged, rows, judge(doubted, designs.rows(rows), self.limits, self.only))
+        return judge_once(doubted, designs.rows(rows), self.limits, self.only)
 
     @property
     def columns(self) -> tuple[OutcomeColumn, ...]:
@@ -251,15 +285,13 @@ PLAIN_SPRINGS = SecondSprings(k_2=np.array([9e6]), s_2=np.array([1.0]))
 """A second spring for its vehicle."""
 
 
-def evaluation_of(
-    sweep: Sweep, accuracy: Accuracy, simulate: Simulate = by_kernels, *, proved: bool = True
-) -> Evaluation:
-    """Return how the designs of a sweep are simulated, with a given accuracy, and judged; `proved` as of `Limits`."""
+def evaluation_of(sweep: Sweep, accuracy: Accuracy, simulate: Simulate = by_kernels) -> Evaluation:
+    """Return how the designs of a sweep are simulated, with a given accuracy, and judged."""
     askable = can_be_asked(sweep)
     return Evaluation(
         readings=readings_of(sweep),
         control=control_of(sweep, accuracy),
-        limits=limits_of(sweep, proved=proved),
+        limits=limits_of(sweep),
         simulate=simulate,
         model=sweep.model,
         second_spring=SECOND_SPRING in sweep.plan.columns,

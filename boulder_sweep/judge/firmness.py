@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,10 +16,10 @@ import numpy as np
 from boulder_kernels import ELASTIC, DesignTable, Readings, as_printed, corrected
 from boulder_sweep.judge.accuracy import QUANTILE, STEPS, STEPS_PRINTED, accuracy_of, simulated
 from boulder_sweep.judge.evaluation import evaluation_of
-from boulder_sweep.judge.inputs import plain_designs, sampled_designs
-from boulder_sweep.judge.judged import PASS
+from boulder_sweep.judge.inputs import plain_designs, sampled_designs, sampled_rows
+from boulder_sweep.judge.judged import CHANGES_SIDE, FAIL, PASS
 from boulder_sweep.judge.refinement import reported_step_s
-from boulder_sweep.judge.validity import flag_counts
+from boulder_sweep.judge.validity import SEPARATOR, flag_counts
 from boulder_sweep.judge.verdict import judge
 from boulder_sweep.settings.model import RESISTANCES
 from boulder_sweep.soils import plain, with_soil
@@ -59,13 +59,15 @@ class Firmness:
     designs : int
         Designs of the sample; those that cannot be computed are left out.
     lost : dict of str to float
-        Fraction of the passes of the sample that no longer pass after each of `CHANGES`; empty where none passes.
+        Fraction of the passes of the sample that fail after each of `CHANGES`; empty where none passes.
     numerical_error_deg, numerical_error_m : float or None
         Estimated error not exceeded by 99.9 % of those that did not overturn; None if none is estimated.
     passes : int
         Passes of the sample.
     flags : dict of str to int
         Passes of the sample with each flag of `boulder_sweep.judge.validity`; under ``""`` those without any.
+    changing : int
+        Designs of the sample whose verdict changes with the uncertain inputs.
     """
 
     designs: int
@@ -74,6 +76,7 @@ class Firmness:
     numerical_error_m: float | None
     passes: int
     flags: dict[str, int] = field(default_factory=dict)
+    changing: int = 0
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data."""
@@ -89,7 +92,7 @@ def firmness_of(sweep: Sweep) -> Firmness:
         The sweep.
     """
     count = min(DESIGNS, max(FEWEST_DESIGNS, sweep.n_designs // SHARE))
-    evaluation = evaluation_of(sweep, accuracy_of(sweep), proved=False)
+    evaluation = evaluation_of(sweep, accuracy_of(sweep))
     designs, limits = sampled_designs(sweep, count), evaluation.limits
     control, readings = evaluation.control._replace(elements=0, unloading=ELASTIC), evaluation.readings
     law = sweep.model.resistance
@@ -111,7 +114,14 @@ def firmness_of(sweep: Sweep) -> Firmness:
     least = math.radians(LEAST_ANGLE_DEG)
     table = designs.table
     judged = verdicts(table, readings)
-    passes = judged.verdict == PASS
+    passes, changing = judged.verdict == PASS, 0
+    if sweep.cases:
+        block = sweep.plan.selection(sampled_rows(sweep, count))
+        only = ("verdict", "reason", "margin", "time_to_limit_s", "validity")
+        worst = replace(evaluation, only=only, second_opinion=())(block).rows(np.asarray(block.reasons.codes) == 0)
+        passes &= worst.verdict == PASS
+        flagged = [CHANGES_SIDE in word.split(SEPARATOR) for word in worst.words["validity"]]
+        changing = int(np.array(flagged)[worst["validity"]].sum())
     variants = {
         "reading": (table, other),
         "friction_angle": (by(law, -math.radians(ANGLE_DEG)), readings),
@@ -121,7 +131,7 @@ def firmness_of(sweep: Sweep) -> Firmness:
     lost = {}
     if passes.any():
         for name, (variant, read) in variants.items():
-            lost[name] = float((verdicts(variant, read).verdict[passes] != PASS).mean())
+            lost[name] = float((verdicts(variant, read).verdict[passes] == FAIL).mean())
     words = Counter(judged.words["validity"][code] for code in judged["validity"][passes].tolist())
     return Firmness(
         designs=designs.size,
@@ -129,6 +139,7 @@ def firmness_of(sweep: Sweep) -> Firmness:
         **_numerical_errors(designs, readings, control),
         passes=int(passes.sum()),
         flags=flag_counts(words.items()),
+        changing=changing,
     )
 
 

@@ -57,6 +57,8 @@ class Designs(NamedTuple):
     """`solidity` where the file gives masses or a shape; None of boxes."""
     rocks: np.ndarray | None = None
     """Density of the rock where the file gives masses, so that it is not that of what is simulated [kg/m^3]."""
+    factors: np.ndarray | None = None
+    """Strain rate factor as given, where that of `table` also holds what law, slope and water make of it."""
 
     @property
     def size(self) -> int:
@@ -71,7 +73,13 @@ class Designs(NamedTuple):
             springs = SecondSprings(*(np.ascontiguousarray(column[chosen]) for column in springs))
         fills = None if self.fills is None else self.fills[chosen]
         rocks = None if self.rocks is None else self.rocks[chosen]
-        return Designs(table, self.bed_offset[chosen], springs, fills, rocks)
+        factors = None if self.factors is None else self.factors[chosen]
+        return Designs(table, self.bed_offset[chosen], springs, fills, rocks, factors)
+
+    @property
+    def given_factors(self) -> np.ndarray:
+        """Strain rate factor as given [-], shape (n,)."""
+        return self.table.K_epsilon if self.factors is None else self.factors
 
     @property
     def solidity(self) -> np.ndarray:
@@ -135,8 +143,10 @@ def designs_of(
         # What is simulated has the mass of the boulder.
         volume = sides[0] * sides[1] * sides[2]
         columns["rho_b"] = mass / (volume if shape.is_box else volume * shape.filled)
-    table = with_soil(DesignTable(**columns), model.resistance, model.ground, shape=shape)
-    return Designs(table, _values(block, "bed_offset_m", rows), springs, fills, rocks)
+    given = DesignTable(**columns)
+    table = with_soil(given, model.resistance, model.ground, shape=shape)
+    factors = None if table is given else given.K_epsilon
+    return Designs(table, _values(block, "bed_offset_m", rows), springs, fills, rocks, factors)
 
 
 def _values(block: DesignBlock, name: str, rows: np.ndarray | None) -> np.ndarray:

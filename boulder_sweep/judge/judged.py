@@ -12,9 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from boulder_sweep.columns import AT_REST, OUTCOMES, REASONS, VERDICTS, OutcomeColumn
+from boulder_sweep.columns import AT_REST, GRADES, OUTCOMES, REASONS, VERDICTS, OutcomeColumn
 
 PASS, FAIL, UNDECIDED, ERROR = range(len(VERDICTS))
+_ORDER = np.array([3, 0, 2, 1])
+"""Where each verdict stands among the verdicts of one row, the worst first: a fail is one, whatever the others are."""
+CHANGES_SIDE = "changes_side"
+"""Flag of a row whose verdict depends on which value its uncertain inputs have."""
 NO_REASON, NO_CONTACT, OVERTURNS, PENETRATION, HORIZON, NUMERICAL_ERROR, CRUSH, OVERRIDE = range(8)
 
 
@@ -134,6 +138,56 @@ def with_rows(judged: Judged, indices: np.ndarray, rows: Judged) -> Judged:
     order = np.arange(len(judged))
     order[indices] = len(judged) + np.arange(len(rows))
     return joined([judged, rows]).rows(order)
+
+
+def worst_of(cases: list[Judged]) -> Judged:
+    """Return for every row the worst of several judgements, and flag those on whose verdict they differ.
+
+    Parameters
+    ----------
+    cases
+        The same n rows under different inputs, at least once.
+
+    Returns
+    -------
+    Judged
+        Each row whole from one of them: a fail before an error, what is undecided, and a pass; of equal verdicts the
+        one with the least reserve, and of equal reserves the first. A pass is graded by the worst of its grades.
+    """
+    worst = cases[0]
+    for case in cases[1:]:
+        rank, worst_rank = _ORDER[case.verdict], _ORDER[worst.verdict]
+        worse = (rank < worst_rank) | ((rank == worst_rank) & (reserves(case) < reserves(worst)))
+        worst = with_rows(worst, np.flatnonzero(worse), case.rows(worse)) if worse.any() else worst
+    columns, words = dict(worst.columns), dict(worst.words)
+    passing = worst.verdict == PASS
+    if "robustness" in columns:
+        grades = np.stack([case["robustness"] for case in cases])
+        open_too = np.where((grades == GRADES.index("open")).any(axis=0), GRADES.index("open"), grades.max(axis=0))
+        graded = np.where((grades == GRADES.index("sensitive")).any(axis=0), GRADES.index("sensitive"), open_too)
+        columns["robustness"] = np.where(passing, graded, columns["robustness"]).astype(np.int32)
+    if "stands_under" in columns:
+        # The codes are bits, one for each second opinion; -1 where none was asked for.
+        standing = np.bitwise_and.reduce([case["stands_under"] for case in cases])
+        unasked = np.min([case["stands_under"] for case in cases], axis=0) < 0
+        columns["stands_under"] = np.where(passing & ~unasked, standing, columns["stands_under"]).astype(np.int32)
+    if "validity" in columns:
+        changes = np.any([case.verdict != cases[0].verdict for case in cases], axis=0)
+        flagged = tuple(";".join(part for part in (word, CHANGES_SIDE) if part) for word in words["validity"])
+        changes &= columns["validity"] >= 0
+        columns["validity"] = (columns["validity"] + changes * len(words["validity"])).astype(np.int32)
+        words["validity"] = (*words["validity"], *flagged)
+    return joined([Judged(columns, words)])
+
+
+def reserves(judged: Judged) -> np.ndarray:
+    """Return what n rows have left before a limit, shape (n,).
+
+    It is the margin; below -1 where a boulder overturns, the less the earlier; and 0 where there is neither.
+    """
+    margin, time = judged["margin"], judged["time_to_limit_s"]
+    overturned = np.where(np.isnan(time), 0.0, -1.0 - 1.0 / np.maximum(time, 1e-3))
+    return np.where(np.isnan(margin), overturned, margin)
 
 
 def _words_in_use(spec: OutcomeColumn, pieces: list[Judged]) -> tuple[str, ...]:

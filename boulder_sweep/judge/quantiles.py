@@ -1,36 +1,54 @@
-"""Files with uncertain inputs where one value of each is needed: an unfavourable quantile, or the mean.
+"""Files with uncertain inputs where one value of each is needed: every row is judged at both ends and at the mean.
 
-Which end of a distribution is unfavourable is found by simulation: designs spread over the sweep are judged with an
-input at its low and at its high quantile, all others at their medians, and that end is taken at which more of them are
-worse off.
+A design that passes with its uncertain inputs at their unfavourable ends need not pass at their means: shallow boulders
+pass by sliding in weak soil and overturn in better. So the rows of a file with uncertain inputs are judged with all of
+them at their unfavourable quantiles, at their means and at their favourable quantiles, and have the worst of the
+verdicts (`boulder_sweep.judge.judged.worst_of`). Which end is the unfavourable one is a fixed table, `WEAK`; an input
+without a sense, such as the damper of the vehicle, is taken at both ends in turn.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import re
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from boulder_sweep.errors import QuestionError
-from boulder_sweep.judge.accuracy import Accuracy, steps_of
-from boulder_sweep.judge.evaluation import evaluation_of
-from boulder_sweep.judge.inputs import sampled_rows
 from boulder_sweep.settings.distributions import SetDistributions
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.shown_units import quantity_text
 
 if TYPE_CHECKING:
-    from boulder_sweep.judge.judged import Judged
     from boulder_sweep.settings import Sweep
     from boulder_sweep.settings.distributions import Distribution
 
 MEAN, UNFAVOURABLE = "mean", "p5"
 """What ``--at`` may be beside other percentages, and its default."""
-DESIGNS = 64
-"""Most designs that decide which end of a distribution is unfavourable."""
 LOW, HIGH = "low", "high"
+WEAK = {
+    "boulder_length_m": LOW,
+    "boulder_width_m": LOW,
+    "boulder_density_kg_m3": LOW,
+    "boulder_mass_kg": LOW,
+    "embedment_depth_m": LOW,
+    "embedment_ratio": LOW,
+    "impact_height_m": HIGH,
+    "soil_density_kg_m3": LOW,
+    "friction_angle_deg": LOW,
+    "subgrade_reaction_MN_m3": LOW,
+    "strain_rate_factor": LOW,
+    "vehicle_mass_kg": HIGH,
+    "impact_speed_m_s": HIGH,
+    "bumper_height_m": HIGH,
+    "hood_height_m": HIGH,
+    "bed_offset_m": LOW,
+}
+"""The unfavourable end of each input: weak soil, a light boulder, a heavy and fast vehicle that strikes high. Others,
+such as spring and damper of the vehicle and the height of the boulder, have no sense."""
 
 
 def at_values(sweep: Sweep, at: str | None = None) -> Sweep:
@@ -41,13 +59,14 @@ def at_values(sweep: Sweep, at: str | None = None) -> Sweep:
     sweep
         The sweep.
     at
-        ``p5``, the default: the quantile of 5 % on the unfavourable side of each input, found by simulation; ``p10``
-        and so on up to ``p50``; or ``mean``, the means of the file.
+        ``p5``, the default: the quantile of 5 % on the unfavourable side of each input, see `WEAK`; ``p10`` and so on
+        up to ``p50``; or ``mean``, the means of the file alone.
 
     Returns
     -------
     Sweep
-        With `Sweep.taken_at`, which says for each input what was taken. Quantiles are those of each input alone: a
+        With `Sweep.taken_at`, which says for each input what was taken, and but for ``mean`` with `Sweep.cases`: the
+        means, the other ends, and the ends of inputs without a sense. Quantiles are those of each input alone: a
         correlation has no part in them.
 
     Raises
@@ -60,11 +79,29 @@ def at_values(sweep: Sweep, at: str | None = None) -> Sweep:
             raise QuestionError(f"{sweep.name}: no input has a distribution, so there is nothing to take at {at}")
         return sweep
     at = UNFAVOURABLE if at is None else at
+    means = _with_quantiles(sweep, {}, dict.fromkeys(sweep.distributions, MEAN))
     if at == MEAN:
-        return _with_quantiles(sweep, {}, dict.fromkeys(sweep.distributions, MEAN))
-    share = _share(at)
-    sides = {name: _unfavourable(sweep, name, share) for name in sweep.distributions}
-    normals = {name: _normal(share, side) for name, side in sides.items()}
+        return means
+    base, *ends = (_at_ends(sweep, sides, at) for sides in _sides(tuple(sweep.distributions)))
+    return dataclasses.replace(base, cases=(means, *ends))
+
+
+def _sides(names: tuple[str, ...]) -> Iterator[dict[str, str]]:
+    """Yield at which end each input is taken: all unfavourable first, then all favourable."""
+    aimless = [name for name in names if name not in WEAK]
+    for favourable in (False, True):
+        aimed = {name: WEAK[name] for name in names if name in WEAK}
+        if favourable:
+            aimed = {name: HIGH if side == LOW else LOW for name, side in aimed.items()}
+        if favourable and not aimed:
+            return  # nothing differs from before
+        for ends in itertools.product((LOW, HIGH), repeat=len(aimless)):
+            yield aimed | dict(zip(aimless, ends, strict=True))
+
+
+def _at_ends(sweep: Sweep, sides: dict[str, str], at: str) -> Sweep:
+    """Return a sweep with each uncertain input at one end; ``p5 high`` is the quantile that 5 % exceed."""
+    normals = {name: _normal(_share(at), side) for name, side in sides.items()}
     return _with_quantiles(sweep, normals, {name: f"{at} {side}" for name, side in sides.items()})
 
 
@@ -81,33 +118,6 @@ def _normal(share: float, side: str) -> float:
     from scipy.special import ndtri  # a quarter of a second, which files without distributions need not wait
 
     return float(ndtri(share)) if side == LOW else -float(ndtri(share))
-
-
-def _unfavourable(sweep: Sweep, name: str, share: float) -> str:
-    """Return the end of the distribution of an input at which more designs are worse off."""
-    rows = sampled_rows(sweep, DESIGNS)
-    ends = []
-    for side in (LOW, HIGH):
-        normals = dict.fromkeys(sweep.distributions, 0.0) | {name: _normal(share, side)}
-        taken = _with_quantiles(sweep, normals, {})
-        accuracy = Accuracy("fast", steps_of(taken)["fast"], error_estimate=False)
-        evaluation = dataclasses.replace(evaluation_of(taken, accuracy, proved=False), second_opinion=())
-        ends.append(evaluation(taken.plan.selection(rows)))
-    (low, low_turned), (high, high_turned) = map(_reserves, ends)
-    # Where the verdict has no margin, as of a boulder that hardly overlaps the bumper, the rotation tells.
-    worse_low = (low < high) | ((low == high) & (low_turned > high_turned))
-    worse_high = (high < low) | ((low == high) & (high_turned > low_turned))
-    return HIGH if worse_high.sum() > worse_low.sum() else LOW
-
-
-def _reserves(judged: Judged) -> tuple[np.ndarray, np.ndarray]:
-    """Return what designs have left before a limit, below -1 where they overturn, and how far they turn [deg].
-
-    The reserve is the margin, for designs that overturn the less the earlier, and 0 where there is neither.
-    """
-    margin, time = judged["margin"], judged["time_to_limit_s"]
-    overturned = np.where(np.isnan(time), 0.0, -1.0 - 1.0 / np.maximum(time, 1e-3))
-    return np.where(np.isnan(margin), overturned, margin), np.nan_to_num(judged["max_rotation_deg"], nan=0.0)
 
 
 def _with_quantiles(sweep: Sweep, normals: dict[str, float], taken_at: dict[str, str]) -> Sweep:
@@ -142,7 +152,10 @@ def words_of(sweep: Sweep, units: str = "si") -> str:
     for name, how in sweep.taken_at.items():
         ends, field = (np.min(columns[name]), np.max(columns[name])), BY_NAME[name]
         parts.append(f"{field.path} {quantity_text(field.unit, units, *ends)} ({how})")
-    return "uncertain inputs taken at one value each: " + ", ".join(parts) if parts else ""
+    if not parts:
+        return ""
+    judged = "; every design is judged at the means and at the other ends, too, and has the worst verdict"
+    return f"uncertain inputs taken at {', '.join(parts)}{judged if sweep.cases else ''}"
 
 
 def values_of(

@@ -89,13 +89,15 @@ class RowStates:
         The rows as judged by the solution that counts so far.
     outcomes : OutcomeTable
         That solution, written in place.
+    rule : ndarray of int, shape (n,)
+        The rule of `boulder_kernels.rules` that decides each row by it.
     """
 
     def __init__(self, designs: Designs, control: Control, once: JudgedOnce) -> None:
         n = designs.size
         self._v_0 = designs.table.v_0
-        self.judged, self.outcomes, self._rule = once
-        late = plain(is_late)(self._rule, self.outcomes.t_end, control)
+        self.judged, self.outcomes, self.rule = once
+        late = plain(is_late)(self.rule, self.outcomes.t_end, control)
         self._confirmation = Confirmation(AGREEING * late, np.full(n, control.h), np.zeros(n, dtype=bool))
 
     @property
@@ -105,7 +107,7 @@ class RowStates:
 
     def wanted(self, control: Control) -> np.ndarray:
         """Return the numbers of the rows that a solution by some control may decide or confirm."""
-        return np.flatnonzero(plain(is_wanted)(self._confirmation, self._rule, self.outcomes.status, control))
+        return np.flatnonzero(plain(is_wanted)(self._confirmation, self.rule, self.outcomes.status, control))
 
     def update(self, rows: np.ndarray, control: Control, once: JudgedOnce) -> None:
         """Compare a finer solution of some rows with what counts so far: it confirms it, or takes its place.
@@ -121,10 +123,10 @@ class RowStates:
         alike = plain(agree)(some_rows(self.outcomes, rows), outcomes, self._v_0[rows])
         late = plain(is_late)(rule, outcomes.t_end, control)
         confirmation = some_rows(self._confirmation, rows)
-        confirmation, replaces = plain(after_finer)(confirmation, self._rule[rows], rule, alike, late, control)
+        confirmation, replaces = plain(after_finer)(confirmation, self.rule[rows], rule, alike, late, control)
         replaced = rows[replaces]
         for values, new in zip(self._confirmation, confirmation, strict=True):
             values[rows] = new
-        for values, new in zip((*self.outcomes, self._rule), (*outcomes, rule), strict=True):
+        for values, new in zip((*self.outcomes, self.rule), (*outcomes, rule), strict=True):
             values[replaced] = new[replaces]
         self.judged = with_rows(self.judged, replaced, judged.rows(replaces))

@@ -2,8 +2,9 @@
 
 A second opinion is the same impact with friction and vertical motion, under a law of the soil that resists less
 (`boulder_kernels.second_opinion`). A pass that stands under both laws is *robust*, one that does not under one of them
-*sensitive*. Where no second opinion was asked for, a pass is robust if it lies where the study of the documentation has
-found none that is not (`FREE`), and otherwise *open*.
+*sensitive*. A pass that stands, but lies outside the ranges from which the study of the documentation draws, is *open*:
+nobody has looked at what second opinions are worth there. Where no second opinion was asked for, a pass is robust if it
+lies where that study has found none that is not (`FREE`), and otherwise open, too.
 
 A sensitive pass is not a fail: the crash test that passed stands, and one of its second opinions turns it nearly to the
 limit. It needs a better test of the soil, a deeper bed, or a crash test.
@@ -20,12 +21,14 @@ import numpy as np
 from boulder_kernels import Status
 from boulder_kernels._jit import plain
 from boulder_kernels.heave import bearing_capacity_factor
+from boulder_kernels.rules import UNSTUDIED
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_kernels.table import some_rows
 from boulder_sweep.columns import GRADES
 from boulder_sweep.designs import SECOND_SPRING
 from boulder_sweep.investigation import family_bounds
 from boulder_sweep.judge.judged import PASS, Judged
+from boulder_sweep.judge.validity import VEHICLE, are_studied
 from boulder_sweep.settings.model import RESISTANCES, SECOND_OPINIONS, UNLOADINGS
 from boulder_sweep.soils import with_law
 
@@ -51,6 +54,11 @@ MEANINGS = {
     "corrected readings only",
 }
 """What a grade means of a pass of which second opinions were asked, if they could be."""
+UNSTUDIED_IN_WORDS = (
+    "stands under the second opinions that were asked, but outside the ranges of their study, as its flags say "
+    f"({', '.join(UNSTUDIED)})"
+)
+"""And ``open``, where they were asked."""
 GIVES_WAY = (
     "no second opinion: by the density and friction angle of the soil the ground under the foot cannot carry the "
     "boulder's own weight; ask for a better soil test, a deeper bed (sweep need --robust) or a foundation"
@@ -67,10 +75,7 @@ FREE = {
     "rho_s": (1520.0, 2240.0),
     "phi": (math.radians(36.0), math.radians(42.0)),
     "K_epsilon": (1.0, 1.2),
-    "m_v": (5000.0, 9000.0),
-    "v_0": (11.0, 18.0),
-    "k_v": (0.75 * 3103.3e3, 1.25 * 3103.3e3),
-    "c_v": (0.75 * 138.91e3, 1.25 * 138.91e3),
+    **VEHICLE,
 }
 """in these ranges of the inputs, where the study found none that is lost (SI, `boulder_kernels.DesignTable`),"""
 FREE_EMBEDMENT = (0.5, 0.75)
@@ -79,6 +84,9 @@ FREE_LIMIT_DEG = 20.0
 """The limit of rotation that the study asks about; a higher one is no easier to stay below for a second opinion."""
 ROUNDING = 1e-9
 """Ends of ranges are met by values that were rounded."""
+NUMERICAL_ERROR_DEG = 0.3
+"""By how much the rotation of a second opinion may be wrong near the limit: a pass that is nearer to it does not stand.
+Against a fine solution all that stood and should not were within 0.25 deg of the limit."""
 AT_ONCE = 400
 """Designs simulated per call: an interruption waits for the current call."""
 
@@ -105,6 +113,8 @@ def meaning_of(row: Mapping[str, Any]) -> str | None:
         load = row["boulder_density_kg_m3"] * row["boulder_height_m"]
         if load >= row["soil_density_kg_m3"] * row["embedment_depth_m"] * plain(bearing_capacity_factor)(angle):
             return GIVES_WAY
+    if row["robustness"] == "open" and row["stands_under"]:
+        return UNSTUDIED_IN_WORDS
     return MEANINGS.get(row["robustness"])
 
 
@@ -151,7 +161,7 @@ def stands(designs: Designs, law: str, present: str, limits: Any, longest_s: flo
         Longest simulated time; what is not proved to stand by then does not.
     """
     table = with_law(designs.table, law, present)
-    control = HeaveControl(limits.rotation, longest_s)
+    control = HeaveControl(limits.rotation - math.radians(NUMERICAL_ERROR_DEG), longest_s)
     passes = np.empty(designs.size, dtype=bool)
     for at in range(0, designs.size, AT_ONCE):
         some = np.arange(at, min(at + AT_ONCE, designs.size))
@@ -166,7 +176,8 @@ def with_second_opinions(
 ) -> Judged:
     """Return judged rows with every pass simulated again.
 
-    Where all of `SECOND_OPINIONS` are asked and a pass stands, it is robust; where one overturns it, it is sensitive.
+    Where all of `SECOND_OPINIONS` are asked and a pass stands, it is robust, or open outside their study; where one
+    overturns it, it is sensitive.
 
     Parameters
     ----------
@@ -187,7 +198,9 @@ def with_second_opinions(
         turned |= ~there
     grade[passing[turned]] = SENSITIVE
     if laws == SECOND_OPINIONS:
-        grade[passing[~turned]] = ROBUST
+        studied = are_studied(passes, limits)
+        grade[passing[~turned & studied]] = ROBUST
+        grade[passing[~turned & ~studied]] = OPEN
     columns: dict[str, Any] = judged.columns | {"robustness": grade, "stands_under": standing}
     return Judged(columns, judged.words)
 

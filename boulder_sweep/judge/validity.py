@@ -1,8 +1,9 @@
-"""Flags on rows outside what the model was tested on. They do not change a verdict.
+"""Flags on rows outside what the model was tested on. They change no verdict, but some of them a grade.
 
 This is the one register of what they mean: the words of the column ``validity`` in summaries and pictures, and the page
-of the documentation follow from it. `boulder_kernels.rules` raises them. What the two crash tests of the paper cover is
-taken from their data (`boulder_sweep.crash_tests.cases`).
+of the documentation follow from it. `boulder_kernels.rules` raises them, all but ``changes_side``, for which a design
+has to be judged more than once (`boulder_sweep.judge.quantiles`). What the two crash tests of the paper cover is taken
+from their data (`boulder_sweep.crash_tests.cases`).
 """
 
 from __future__ import annotations
@@ -15,9 +16,12 @@ from typing import Any
 import numpy as np
 
 from boulder_kernels._jit import plain
-from boulder_kernels.rules import FlagInputs, Tested, flags_of
+from boulder_kernels.rules import FLAGS as RAISED
+from boulder_kernels.rules import ISLAND_SLIDE, UNSTUDIED, FlagInputs, Tested, flags_of
 from boulder_sweep.investigation import FAMILY_FACTOR, family_bounds
+from boulder_sweep.judge.judged import CHANGES_SIDE
 from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.settings.model import Ground
 
 TESTED_OVERLAP_M = 0.49
 """Overlap of bumper and boulder in the tests: 0.492 m and 0.91 m."""
@@ -55,11 +59,34 @@ def usual_range(name: str) -> tuple[float, float]:
     usual = BY_NAME[name].usual
     if usual is None:
         raise KeyError(name)
-    return usual.low * (1.0 - 1e-9), usual.high * (1.0 + 1e-9)
+    return _rounded(usual.low, usual.high)
 
 
+def _rounded(low: float, high: float) -> tuple[float, float]:
+    """Return the ends of a range, with room for values that were rounded."""
+    return low * (1.0 - 1e-9), high * (1.0 + 1e-9)
+
+
+VEHICLE = {
+    "m_v": (5000.0, 9000.0),
+    "v_0": (11.0, 18.0),
+    "k_v": (0.75 * 3103.3e3, 1.25 * 3103.3e3),
+    "c_v": (0.75 * 138.91e3, 1.25 * 138.91e3),
+}
+"""Vehicles from which the study of second opinions draws, about the one that was tested, SI."""
+RATE = (math.sqrt(VEHICLE["k_v"][0] / VEHICLE["m_v"][1]), math.sqrt(VEHICLE["k_v"][1] / VEHICLE["m_v"][0]))
+"""Their angular frequency sqrt(k/m) [1/s],"""
+DAMPING = (
+    VEHICLE["c_v"][0] / math.sqrt(VEHICLE["k_v"][1] * VEHICLE["m_v"][1]),
+    VEHICLE["c_v"][1] / math.sqrt(VEHICLE["k_v"][0] * VEHICLE["m_v"][0]),
+)
+"""and their damper over sqrt(k m) [-]."""
+NOWHERE = 1e9
+"""A friction angle that no soil has [deg]."""
 _SIZES = [usual_range(f"boulder_{side}_m") for side in ("length", "width", "height")]
 _EMBEDMENT, _ROCK = usual_range("embedment_ratio"), usual_range("boulder_density_kg_m3")
+_ANGLE, _SOIL = usual_range("friction_angle_deg"), usual_range("soil_density_kg_m3")
+_RATE_FACTOR = usual_range("strain_rate_factor")
 
 FLAGS = (
     Flag(
@@ -111,14 +138,41 @@ FLAGS = (
         "The tests had 0.49 m and 0.91 m. With less the truck may ride over, which the planar model cannot show.",
     ),
     Flag(
-        "unproved",
-        "no proof that the rotation stays below its limit",
-        "restoring moment or separation read as printed, not overturned up to the longest horizon",
-        "Forces read as printed feed energy into the motion, so nothing is proved of later times. A table leaves such "
-        "rows undecided; answers and comparisons of readings count them as passing.",
+        "slides",
+        "a boulder that slides",
+        f"displacement above {ISLAND_SLIDE:g} m",
+        "Shallow boulders may stop a truck by sliding with it, and overturn in better soil or by a slower truck, which "
+        "does not push them aside. The boulder that passed its test moves by 0.28 m in the model.",
+    ),
+    Flag(
+        "vehicle",
+        "a vehicle unlike the one that was tested",
+        f"mass outside {VEHICLE['m_v'][0]:.0f} to {VEHICLE['m_v'][1]:.0f} kg, speed outside {VEHICLE['v_0'][0]:g} to "
+        f"{VEHICLE['v_0'][1]:g} m/s, √(k/m) outside {RATE[0]:.1f} to {RATE[1]:.1f} 1/s, or c/√(k m) outside "
+        f"{DAMPING[0]:.2f} to {DAMPING[1]:.2f}",
+        "Spring and damper were fitted to one truck of 6.8 t at 13.4 m/s, and no other was tested. The ranges are "
+        "those from which the study of second opinions draws.",
+    ),
+    Flag(
+        "soil",
+        "a soil outside the realistic range",
+        f"friction angle outside {_ANGLE[0]:.0f} to {_ANGLE[1]:.0f}°, density outside {_SOIL[0]:.0f} to "
+        f"{_SOIL[1]:.0f} kg/m³, or strain rate factor outside {_RATE_FACTOR[0]:.1f} to {_RATE_FACTOR[1]:.1f}, in any "
+        "layer",
+        "From loose sand to very dense gravel. Beyond, resistance grows without bound with the friction angle, and no "
+        "soil is known to gain more strength under rapid loading.",
+    ),
+    Flag(
+        CHANGES_SIDE,
+        "a verdict that changes with the uncertain inputs",
+        "another verdict with the uncertain inputs at their 5 %, at their mean or at their 95 % quantiles",
+        "The row has the worst of the verdicts. Shallow boulders may pass in weak soil, by sliding, and fail in better "
+        "soil. How likely a pass is, `sweep uncertainty` says.",
     ),
 )
 """In the order of the kernels, and of the column."""
+_UNSTUDIED = sum(1 << RAISED.index(name) for name in UNSTUDIED)
+"""Bits of the flags of designs that the study of second opinions does not speak for."""
 BY_FLAG = {flag.name: flag for flag in FLAGS}
 
 
@@ -127,10 +181,22 @@ def largest_tested_rotation(preset: str) -> float:
     return math.radians(TESTED_ROTATION_DEG.get(preset, min(TESTED_ROTATION_DEG.values())))
 
 
-def tested_of(calibrated_crush: float, rotation: float) -> Tested:
+def tested_of(calibrated_crush: float, rotation: float, *, odd_layers: bool) -> Tested:
     """Return what the model was tested on; arguments: see `boulder_sweep.judge.verdict.Limits`."""
-    ranges = [end for low_high in (*_SIZES, _EMBEDMENT, _ROCK) for end in low_high]
-    return Tested(calibrated_crush, rotation, TESTED_OVERLAP_M, *ranges)
+    # No friction angle of the uppermost layer makes up for deeper ones.
+    angle = (NOWHERE, NOWHERE) if odd_layers else _ANGLE
+    vehicle = (_rounded(*VEHICLE["m_v"]), _rounded(*RATE), _rounded(*DAMPING), _rounded(*VEHICLE["v_0"]))
+    ranges = (*_SIZES, _EMBEDMENT, _ROCK, *vehicle, angle, _SOIL, _RATE_FACTOR)
+    return Tested(calibrated_crush, rotation, TESTED_OVERLAP_M, *(end for low_high in ranges for end in low_high))
+
+
+def has_odd_layers(ground: Ground) -> bool:
+    """Return whether a deeper layer of the soil has a friction angle or density outside the realistic range."""
+
+    def outside(value: float, ends: tuple[float, float]) -> bool:
+        return not ends[0] <= value <= ends[1]
+
+    return any(outside(one.friction_angle_deg, _ANGLE) or outside(one.density_kg_m3, _SOIL) for one in ground.layers)
 
 
 def run_by_run(function: Callable[[np.ndarray], np.ndarray], column: np.ndarray) -> np.ndarray:
@@ -150,18 +216,32 @@ def run_by_run(function: Callable[[np.ndarray], np.ndarray], column: np.ndarray)
     return np.repeat(function(column[starts]), np.diff(starts, append=len(column)), axis=-1)
 
 
-def flagged(facts: Any) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Return the column ``validity`` of n rows: codes, and the words they stand for."""
-    outcomes, designs, limits, table = facts.outcomes, facts.designs, facts.limits, facts.designs.table
+def _bits(designs: Any, limits: Any, *reached: Any) -> np.ndarray:
+    """Return the flags of n designs as bits, from what they reach: the first four of `FlagInputs`."""
+    table = designs.table
     rocks = table.rho_b if designs.rocks is None else designs.rocks
     soil = run_by_run(lambda phi: family_bounds(np.degrees(phi)), table.phi)
-    reached = outcomes.status, outcomes.crush_max, outcomes.theta_max, facts.overlap
-    rows = FlagInputs(*reached, table.L, table.W, table.H, table.d, rocks, table.beta, *soil)
-    bits = plain(flags_of)(rows, tested_of(limits.calibrated_crush, limits.tested_rotation))
+    vehicle = (table.m_v, table.v_0, table.k_v, table.c_v)
+    sizes = (table.L, table.W, table.H, table.d, rocks, table.beta)
+    rows = FlagInputs(*reached, *sizes, *soil, *vehicle, np.degrees(table.phi), table.rho_s, designs.given_factors)
+    tested = tested_of(limits.calibrated_crush, limits.tested_rotation, odd_layers=limits.odd_layers)
+    return plain(flags_of)(rows, tested)
+
+
+def are_studied(designs: Any, limits: Any) -> np.ndarray:
+    """Return which of n designs lie where the study of second opinions has drawn, bool, shape (n,)."""
+    return _bits(designs, limits, 0.0, 0.0, 0.0, math.inf) & _UNSTUDIED == 0
+
+
+def flagged(facts: Any) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Return the column ``validity`` of n rows: codes, and the words they stand for."""
+    outcomes = facts.outcomes
+    reached = (outcomes.x_b_max, outcomes.crush_max, outcomes.theta_max, facts.overlap)
+    bits = _bits(facts.designs, facts.limits, *reached)
     used = np.flatnonzero(np.bincount(bits, minlength=1))
     words = {mask: SEPARATOR.join(flag.name for k, flag in enumerate(FLAGS) if mask >> k & 1) for mask in used.tolist()}
     named = ("", *sorted(set(words.values()) - {""}))
-    codes = np.zeros(1 << len(FLAGS), dtype=np.int32)
+    codes = np.zeros(1 << len(RAISED), dtype=np.int32)
     for mask, word in words.items():
         codes[mask] = named.index(word)
     return codes.take(bits), named

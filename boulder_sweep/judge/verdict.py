@@ -7,20 +7,25 @@ for the page of a report:
 2. ``fail / no_contact``: the truck passes over the boulder, H - d <= bumper height.
 3. ``fail / overturns``: the rotation reached its limit. A small penetration does not change that.
 4. ``fail / penetration``: the truck's cargo bed ends further behind the boulder than its rating allows.
-5. ``undecided / foot``: the foot of the boulder is rounded, on which the soil also lifts, or small.
-6. ``undecided / shape``: by its mass the boulder fills less than 95 % of the box of its sides, and has no profile.
-7. ``undecided / crush``: the front of the truck is crushed by more than its length; the model no longer describes it.
-8. ``undecided / override``: the boulder overlaps the bumper by less than is required; the truck may ride over.
-9. ``undecided / horizon``: the simulated time ended, the longer one of such rows too, without proof that rotation and
-   penetration stay below their limits.
-10. ``undecided / error``: a peak below its limit is closer to it than the estimated numerical error.
-11. ``pass``. Where a reading lets forces feed energy, as the printed ones do, nothing can be proved of later times;
-    such rows are undecided by rule 9, unless a comparison of readings asks only what stands to the end of the
-    simulated time.
+5. ``fail / slower_truck``: a shallow boulder that slides would stop the truck, but a slower truck overturns it
+   (`boulder_kernels.rules.SLOWER_SPEEDS`).
+6. ``undecided / foot``: the foot of the boulder is rounded, on which the soil also lifts, or small.
+7. ``undecided / shape``: by its mass the boulder fills less than 95 % of the box of its sides, and has no profile.
+8. ``undecided / crush``: the front of the truck is crushed by more than its length; the model no longer describes it.
+9. ``undecided / override``: the boulder overlaps the bumper by less than is required; the truck may ride over.
+10. ``undecided / horizon``: the simulated time ended, the longer one of such rows too, without proof that rotation and
+    penetration stay below their limits. Where a reading lets forces feed energy, as the printed ones do, nothing can be
+    proved of later times: there every boulder that stands at the horizon is undecided.
+11. ``undecided / error``: a peak below its limit is closer to it than the estimated numerical error.
+12. ``undecided / validity``: it stands, but turns by more than 20 degrees, beyond which the model does not hold, or is
+    less deep than 0.35 of its height and slides by more than 0.5 m: then whether it stands changes with every hundredth
+    of the speed.
+13. ``pass``.
 
 A peak beyond its limit is decided even where the error is larger than the excess: that is the safe side. But where only
 one of the two solutions from which the error is estimated overturns, the error is infinite and nothing is decided.
-Where errors are those of one solution, as by ``fast``, rows of rule 10 stay as they are; else finer steps decide them.
+Where errors are those of one solution, as by ``fast``, rows of rule 11 stay as they are, and motion beyond the horizon
+is not simulated, since nothing would confirm it; else finer steps decide them.
 """
 
 from __future__ import annotations
@@ -37,7 +42,7 @@ from boulder_sweep.columns import AT_REST, OUTCOMES, RATINGS, REASONS, VERDICTS,
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import ERROR, NUMERICAL_ERROR, PASS, UNDECIDED, Judged
 from boulder_sweep.judge.robustness import grades_without_asking, is_studied
-from boulder_sweep.judge.validity import flagged, largest_tested_rotation
+from boulder_sweep.judge.validity import flagged, has_odd_layers, largest_tested_rotation
 from boulder_sweep.settings.model import Criterion, Model
 
 if TYPE_CHECKING:
@@ -76,8 +81,8 @@ class Limits(NamedTuple):
     """Crush beyond which a row is flagged [m]."""
     tested_rotation: float = largest_tested_rotation("corrected")
     """Rotation beyond which a row is flagged [rad]."""
-    proved: bool = True
-    """Whether a pass must be proved also where the readings allow no proof; without, such rows pass and are flagged."""
+    odd_layers: bool = False
+    """Whether a deeper layer of the soil is outside what is usual."""
     studied: bool = False
     """Whether the study of second opinions speaks for the model, see `boulder_sweep.judge.robustness`."""
     flat_foot: bool = True
@@ -161,9 +166,23 @@ def judge(
     return judge_once(outcomes, designs, limits, only).judged
 
 
-def judge_once(outcomes: OutcomeTable, designs: Designs, limits: Limits, only: tuple[str, ...] = ()) -> JudgedOnce:
-    """Apply the rules of this module to n rows, and tell which one decides each; see `judge`."""
-    facts = facts_of(outcomes, designs, limits)
+def judge_once(
+    outcomes: OutcomeTable,
+    designs: Designs,
+    limits: Limits,
+    only: tuple[str, ...] = (),
+    rule: np.ndarray | None = None,
+) -> JudgedOnce:
+    """Apply the rules of this module to n rows, and tell which one decides each; see `judge`.
+
+    Parameters
+    ----------
+    outcomes, designs, limits, only
+        As of `judge`.
+    rule
+        The rule that decides each row, shape (n,), where other simulations decide it than that of `outcomes`.
+    """
+    facts = facts_of(outcomes, designs, limits, rule)
     columns, words = {}, {}
     for spec in (*OUTCOMES, *(AT_REST if isinstance(outcomes, OutcomesAtRest) else ())):
         if only and spec.name not in only:
@@ -183,8 +202,8 @@ def judge_once(outcomes: OutcomeTable, designs: Designs, limits: Limits, only: t
     return JudgedOnce(Judged(columns, words), outcomes, facts.rule)
 
 
-def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
-    """Apply the rules; see `judge`."""
+def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits, rule: np.ndarray | None = None) -> Facts:
+    """Apply the rules; see `judge_once`."""
     status = np.asarray(outcomes.status)
     table = designs.table
     flat = np.full(designs.size, float(limits.flat_foot))
@@ -196,9 +215,10 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
         unknown = np.full(len(status), np.nan)
         given = given._replace(theta_error=unknown, x_error=unknown)
     further = (getattr(limits.criterion, name) for name in OF_CRITERION)
-    held = VerdictLimits(limits.rotation, limits.penetration, float(limits.proved), *further)
+    held = VerdictLimits(limits.rotation, limits.penetration, *further)
     write_rulings(given, sizes, held, rulings)
-    rule, overlap, penetration, margin = rulings[0].astype(np.intp), *rulings[1:]
+    rule = rulings[0].astype(np.intp) if rule is None else rule
+    overlap, penetration, margin = rulings[1:]
     verdict, reason = _VERDICTS.take(rule), _REASONS.take(rule)
     failed = rule == verdicts.NOT_COMPUTED
     reasons: tuple[str, ...] = REASONS
@@ -206,7 +226,7 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
         reason[failed], reasons = _error_reasons(status[failed])
     standing, overturned = rule >= verdicts.PENETRATION, rule == verdicts.OVERTURNS
     computed = standing | overturned
-    rated = standing & ~((verdict == UNDECIDED) & (reason != NUMERICAL_ERROR))
+    rated = standing & (rule != verdicts.SLOWER_TRUCK) & ~((verdict == UNDECIDED) & (reason != NUMERICAL_ERROR))
     return Facts(
         outcomes=outcomes,
         designs=designs,
@@ -233,8 +253,8 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits) -> Facts:
     )
 
 
-def limits_of(sweep: Sweep, *, proved: bool = True) -> Limits:
-    """Return the limits of a sweep; `proved` as of `Limits`."""
+def limits_of(sweep: Sweep) -> Limits:
+    """Return the limits of a sweep."""
     return Limits(
         rotation=math.radians(sweep.criterion.max_rotation_deg),
         rating=sweep.criterion.rating,
@@ -242,7 +262,7 @@ def limits_of(sweep: Sweep, *, proved: bool = True) -> Limits:
         calibrated_crush=sweep.model.calibrated_crush_m,
         tested_rotation=largest_tested_rotation(sweep.model.preset),
         studied=is_studied(sweep),
-        proved=proved,
+        odd_layers=has_odd_layers(sweep.model.ground),
         flat_foot=sweep.model.stands_flat,
     )
 

@@ -20,7 +20,7 @@ from boulder_sweep.designs import LEAST_SOLIDITY, MOST_SOLIDITY, REASONS
 from boulder_sweep.investigation import family_bounds
 from boulder_sweep.judge.inputs import SOURCES
 from boulder_sweep.judge.refinement import finer_controls, reported_step_s
-from boulder_sweep.judge.validity import FLAGS, largest_tested_rotation, tested_of
+from boulder_sweep.judge.validity import FLAGS, has_odd_layers, largest_tested_rotation, tested_of
 from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, STATUS_REASONS
 from boulder_sweep.report import page_records
 from boulder_sweep.report.build import KERNEL
@@ -74,7 +74,7 @@ MOST_CELLS = 1_500_000
 out."""
 MOST_POINTS = 20_000
 """The same for a list of designs, each of which carries its inputs."""
-OF_FLAGS = {"rock": "boulder_density_kg_m3"}
+OF_FLAGS = {"rock": "boulder_density_kg_m3", "phi_deg": "friction_angle_deg"}
 """The same for what the flags take."""
 ANGLES = np.arange(20.0, 61.0)
 """Friction angles [deg] at which the page knows which soil constants belong together."""
@@ -282,11 +282,13 @@ def _rules(rotation: float, settings: Mapping[str, Any]) -> dict[str, Any]:
     """Limits of the criterion, and the words of every verdict."""
     criterion, rating, model = settings["criterion"], settings["criterion"]["rating"], settings["model"]
     least, most = family_bounds(ANGLES)
-    limits = [rotation, PENETRATION_LIMITS_M[rating], 1.0, *(criterion[name] for name in OF_CRITERION)]
+    odd = has_odd_layers(Ground.of_dict(model.get("ground", {})))
+    tested = tested_of(model["calibrated_crush_m"], largest_tested_rotation(model["preset"]), odd_layers=odd)
+    limits = [rotation, PENETRATION_LIMITS_M[rating], *(criterion[name] for name in OF_CRITERION)]
     return {
         "rotation": rotation,
         "rating": rating,
-        "limits": [*limits, *tested_of(model["calibrated_crush_m"], largest_tested_rotation(model["preset"]))],
+        "limits": [*limits, *tested],
         "verdicts": RULES,
         "not_finite": NOT_FINITE,
         "ratings": list(PENETRATION_LIMITS_M.items()),

@@ -38,10 +38,15 @@ from boulder_kernels.outcomes import COARSER, FINER, NONE_NEEDED, SECOND, STEP, 
 from boulder_kernels.plastic import memory_of
 from boulder_kernels.rules import (
     AGREEING,
+    SLOWER_SPEEDS,
     Confirmation,
+    Ruling,
+    VerdictLimits,
     after_finer,
+    after_slower,
     agree,
     flags_of,
+    is_asked_slower,
     is_late,
     is_wanted,
     limits_in,
@@ -66,6 +71,8 @@ from boulder_sweep.report.page_records import (
     SETTINGS_COUNT,
     SIZES_COUNT,
     V_0,
+    D,
+    H,
     copy_row,
     first_control,
     flag_inputs_at,
@@ -307,6 +314,46 @@ def solve_for_error(
 
 
 @array_kernel
+def decide(
+    counted: np.ndarray,
+    room: np.ndarray,
+    row: int,
+    designs: np.ndarray,
+    layers: np.ndarray,
+    outlines: np.ndarray,
+    soil_at: Any,
+    controls: np.ndarray,
+    sizes: np.ndarray,
+    limits: VerdictLimits,
+) -> tuple[int, int]:
+    """Simulate one design until it is decided; return the rule that decides it, and by which controls; see `rows`.
+
+    The result goes into `counted`, and `room` has room for two more, of shape (2, len(OUTCOME), n).
+    """
+    count, best, tried, coarser = len(controls), outcomes_from(counted), room[0], room[1]
+    solve_for_error(counted, coarser, row, designs, layers, outlines, soil_at, controls[0])
+    rule, decided_by, control = ruling_of(best, sizes, row, limits).rule, 0, given_control(controls[0])
+    confirmation = Confirmation(AGREEING * is_late(rule, best.t_end[row], control), control.h, False)
+    for k in range(1, count):
+        control = given_control(controls[k])
+        if not is_wanted(confirmation, rule, best.status[row], control):
+            continue
+        solve_for_error(tried, coarser, row, designs, layers, outlines, soil_at, controls[k])
+        finer = outcome_at(tried, row)
+        after = ruling_of(outcomes_from(tried), sizes, row, limits).rule
+        late = is_late(after, finer.t_end, control)
+        alike = agree(outcome_at(counted, row), finer, designs[V_0, row])
+        confirmation, replaces = after_finer(confirmation, rule, after, alike, late, control)
+        if replaces:
+            copy_row(tried, counted, row)
+            rule, decided_by = after, k
+    if confirmation.unconfirmed > 0 and count > 1:
+        best.theta_error[row] = best.x_error[row] = np.inf
+        rule = ruling_of(best, sizes, row, limits).rule
+    return rule, decided_by
+
+
+@array_kernel
 def rows(
     designs_at: Any,
     n: int,
@@ -349,13 +396,14 @@ def rows(
         PIECE_ROOM (m + points - 2), or for N soil elements ELEMENT_ROOM N + MEMORY_ROOM.
     controls_at, count
         Settings, shape (count, len(SETTINGS)): the first, and finer ones in the order of
-        `boulder_sweep.judge.refinement.finer_controls`. With one alone a late row counts as it is.
+        `boulder_sweep.judge.refinement.finer_controls`. With one alone a late row counts as it is, and slower trucks
+        are not asked about.
     sizes_at
         Inputs of the rules and flags, shape (len(SIZES) + len(FLAG_SIZES), n).
     limits_at
         Limits of the criterion, and what the model was tested on, shape (len(LIMITS),).
     outcomes_at, room_at
-        Where the results go, shape (len(OUTCOME), n), and room for twice as many.
+        Where the results go, shape (len(OUTCOME), n), and room for three times as many.
     rulings_at
         Where the rulings go, shape (len(RULINGS) + 2, n); below them the flags, and which settings decided.
     """
@@ -364,29 +412,20 @@ def rows(
     designs, sizes = carray(designs_at, (17, n)), carray(sizes_at, (SIZES_COUNT, n))
     layers, outlines = carray(layers_at, (n, m, 6)), carray(outlines_at, (n, points, 4))
     put_soils(designs, ground_at, below_at, deeper, carray(profile_at, (points, 4)), layers, outlines)
-    both = carray(room_at, (2, 11, n))
-    counted, tried, coarser = carray(outcomes_at, (11, n)), both[0], both[1]
+    room = carray(room_at, (3, 11, n))
+    counted, slower = carray(outcomes_at, (11, n)), room[2]
     best, rulings = outcomes_from(counted), carray(rulings_at, (RULINGS_COUNT + 2, n))
     for row in range(n):
-        solve_for_error(counted, coarser, row, designs, layers, outlines, soil_at, controls[0])
-        rule, decided_by, control = ruling_of(best, sizes, row, limits).rule, 0, given_control(controls[0])
-        confirmation = Confirmation(AGREEING * is_late(rule, best.t_end[row], control), control.h, False)
-        for k in range(1, count):
-            control = given_control(controls[k])
-            if not is_wanted(confirmation, rule, best.status[row], control):
-                continue
-            solve_for_error(tried, coarser, row, designs, layers, outlines, soil_at, controls[k])
-            finer = outcome_at(tried, row)
-            after = ruling_of(outcomes_from(tried), sizes, row, limits).rule
-            late = is_late(after, finer.t_end, control)
-            alike = agree(outcome_at(counted, row), finer, designs[V_0, row])
-            confirmation, replaces = after_finer(confirmation, rule, after, alike, late, control)
-            if replaces:
-                copy_row(tried, counted, row)
-                rule, decided_by = after, k
-        if confirmation.unconfirmed > 0 and count > 1:
-            best.theta_error[row] = best.x_error[row] = np.inf
-        ruling = ruling_of(best, sizes, row, limits)
+        rule, decided_by = decide(counted, room, row, designs, layers, outlines, soil_at, controls, sizes, limits)
+        ratio, v_0 = designs[D, row] / designs[H, row], designs[V_0, row]
+        if count > 1 and is_asked_slower(rule, ratio, best.x_b_max[row]):
+            for share in SLOWER_SPEEDS:
+                designs[V_0, row] = share * v_0
+                by_slower, _ = decide(slower, room, row, designs, layers, outlines, soil_at, controls, sizes, limits)
+                rule = after_slower(rule, by_slower)
+            designs[V_0, row] = v_0
+        _, overlap, penetration, margin = ruling_of(best, sizes, row, limits)
+        ruling = Ruling(rule, overlap, penetration, margin)
         put_ruling(ruling, rulings, row)
         rulings[-2, row] = flags_of(flag_inputs_at(outcome_at(counted, row), ruling.overlap, sizes, row), tested)
         rulings[-1, row] = decided_by

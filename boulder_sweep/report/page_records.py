@@ -22,7 +22,7 @@ from boulder_kernels.soil_laws import ELEMENT_LAWS
 DESIGN = (*Design._fields, *SecondSpring._fields)
 """Inputs of a design, in this order; SI, phi in rad, beta in MN/m^3. A vehicle without a second spring has one like its
 first, from a crush on that it never reaches: its results have the same bits."""
-V_0 = DESIGN.index("v_0")
+V_0, D, H = (DESIGN.index(name) for name in ("v_0", "d", "H"))
 SETTINGS = (*Readings._fields, *Control._fields)
 """Settings of the simulation, in this order; booleans are 0 or 1."""
 SETTINGS_COUNT = len(SETTINGS)
@@ -84,7 +84,7 @@ outcome_at = written_out(
 )
 """The results of one design, numbers in place of columns."""
 flag_inputs_at = written_out(
-    "def take(o, overlap, s, row):\n return FlagInputs(o.status, o.crush_max, o.theta_max, overlap, "
+    "def take(o, overlap, s, row):\n return FlagInputs(o.x_b_max, o.crush_max, o.theta_max, overlap, "
     f"{', '.join(f's[{k}, row]' for k in range(len(SIZES), len(SIZES) + len(FLAG_SIZES)))})",
     FlagInputs=FlagInputs,
 )

@@ -243,7 +243,11 @@ def _general_notes(settings: Mapping[str, Any], control: Control, units: str) ->
         notes.append(f"The density of the rock was not given: {rock} is assumed, and no pass is robust.")
     notes += [f"{words}." for words in derived_words(settings.get("derived", {}), units)]
     if taken := [_taken(name, how, settings["inputs"], units) for name, how in settings.get("taken_at", {}).items()]:
-        notes.append(f"Each uncertain input is taken at one value: {', '.join(taken)}.")
+        judged = (
+            "; every row of the table is judged at the means and at the other ends, too, and has the worst verdict, "
+            "while simulations in this page take the values shown"
+        )
+        notes.append(f"Uncertain inputs are taken at {', '.join(taken)}{judged if 'judged_at' in settings else ''}.")
     for factor in settings.get("partial_factor", {}).values():
         notes.append(f"Friction angles are design values, with a partial factor of {factor:g} on their tangent.")
     if not control.error_estimate:

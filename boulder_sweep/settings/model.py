@@ -46,7 +46,7 @@ UNLOADINGS = ("elastic", "plastic", "plastic_with_gap")
 """How the soil unloads, in the order of `boulder_kernels.soil_laws.ELEMENT_LAWS`; the first is the paper's."""
 PLASTIC_UNLOADINGS = UNLOADINGS[1:3]  # after which boulders come to rest
 PLASTIC_ELEMENTS = 200
-"""Soil elements where the soil is not elastic and no number is given."""
+"""Soil elements where the soil is not elastic and no number is given; a note says what fewer cost."""
 
 
 class Bound(NamedTuple):
@@ -394,6 +394,11 @@ class Model:
     def elements(self) -> int:
         """Number of soil elements that is computed with; 0 for the closed form, which elastic soil has."""
         return self.soil_elements or (0 if self.unloading == UNLOADINGS[0] else PLASTIC_ELEMENTS)
+
+    @property
+    def has_few_elements(self) -> bool:
+        """Whether the file asks for fewer soil elements than it takes to come near their limit."""
+        return 0 < self.soil_elements < PLASTIC_ELEMENTS
 
     @property
     def ground(self) -> Ground:

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from boulder_sweep import investigation as sand
+from boulder_sweep.settings.distributions import FRACTILE_5
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import Bound, Field
 from boulder_sweep.settings.problems import LeafError, Mistakes, wrong
@@ -20,6 +21,7 @@ from boulder_sweep.settings.shown_units import quantity_text
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence, block_of
 from boulder_sweep.settings.values import read_block, read_single
 
+Angles = TypeVar("Angles", float, dict[str, float])
 SOIL_KEYS = ("friction_angle", "density", "subgrade_reaction")
 """What readings stand for, as far as a file does not give it."""
 _BLOWS, _SHARE = Bound(1.0, 200.0, "a blow count"), Bound(0.3, 1.0, "60 % is usual")
@@ -44,18 +46,14 @@ RELATIVE_DENSITY = Field(
     "soil", "relative_density", "relative_density", "1", "relative density of the sand", _LOOSENESS
 )
 METHODS = (*READING_FIELDS, RELATIVE_DENSITY.key)
-SOURCES = {
-    "spt": "Hatanaka and Uchida 1996",
-    "cpt": "Kulhawy and Mayne 1990",
-    RELATIVE_DENSITY.key: "EM 1110-2-2504, Table 3-1",
-}
-_SD_DEG = {"spt": sand.SPT_SD_DEG, "cpt": sand.CPT_SD_DEG, RELATIVE_DENSITY.key: sand.DENSITY_SD_DEG}
+SOURCE_OF_DENSITY = "EM 1110-2-2504, Table 3-1"
+_SCATTER_DEG = {"spt": sand.SPT_SD_DEG, "cpt": sand.CPT_SD_DEG, RELATIVE_DENSITY.key: sand.DENSITY_SD_DEG}
 CORRELATION = 0.99
 """Of friction angle and subgrade reaction where the second follows from the first; 1 is not admitted."""
 
 
-def readings_of(node: Node, method: str, density_kg_m3: float | None) -> list[dict[str, float]]:
-    """Return the readings of a test as plain data, each with the friction angle that follows.
+def readings_of(node: Node, method: str, density_kg_m3: float | None) -> list[dict[str, Any]]:
+    """Return the readings of a test as plain data, each with the friction angles that follow, by their sources.
 
     Parameters
     ----------
@@ -74,7 +72,8 @@ def readings_of(node: Node, method: str, density_kg_m3: float | None) -> list[di
     """
     if method == RELATIVE_DENSITY.key:
         ratio = read_single(node, RELATIVE_DENSITY)
-        return [{method: ratio, "friction_angle_deg": _inside(node, lambda: sand.angle_by_relative_density(ratio))}]
+        angle = _inside(node, lambda: sand.angle_by_relative_density(ratio))
+        return [{method: ratio, **_by_lowest({SOURCE_OF_DENSITY: angle})}]
     items = node.items if isinstance(node, Sequence) and node.unit is None else [node]
     if not items:
         raise wrong(node.position, "the list is empty; give at least one reading")
@@ -86,7 +85,7 @@ def readings_of(node: Node, method: str, density_kg_m3: float | None) -> list[di
     return readings
 
 
-def _reading(node: Node, method: str, density_kg_m3: float | None) -> dict[str, float]:
+def _reading(node: Node, method: str, density_kg_m3: float | None) -> dict[str, Any]:
     """Return one reading of a penetration test."""
     values = read_block(node, READING_FIELDS[method], "a reading")
     if "n60" in values:
@@ -110,13 +109,18 @@ def _reading(node: Node, method: str, density_kg_m3: float | None) -> dict[str, 
             values["rod_factor"] = sand.rod_factor(values["depth_m"])
             values["n1_60"] = sand.normalized_blow_count(values["n"], values["energy_ratio"], values["depth_m"], stress)
     if method == "spt":
-        angle = _inside(node, lambda: sand.angle_by_blow_count(values["n1_60"]))
+        angles = _inside(node, lambda: sand.angles_by_blow_count(values["n1_60"]))
     else:
-        angle = _inside(node, lambda: sand.angle_by_cone(values["q_c_MPa"], values["stress_kPa"]))
-    return {**values, "friction_angle_deg": angle}
+        angles = _inside(node, lambda: sand.angles_by_cone(values["q_c_MPa"], values["stress_kPa"]))
+    return {**values, **_by_lowest(angles)}
 
 
-def _inside(node: Node, of_correlation: Callable[[], float]) -> float:
+def _by_lowest(angles: dict[str, float]) -> dict[str, Any]:
+    """Return the lowest of the angles by several correlations, and all of them, as a reading keeps them."""
+    return {"friction_angle_deg": min(angles.values()), "friction_angles_deg": angles}
+
+
+def _inside(node: Node, of_correlation: Callable[[], Angles]) -> Angles:
     """Return what a correlation gives, or say that it does not hold here."""
     try:
         return of_correlation()
@@ -127,7 +131,8 @@ def _inside(node: Node, of_correlation: Callable[[], float]) -> float:
 def soil_of(node: Node, method: str, lacking: Collection[str], density_kg_m3: float | None) -> dict[str, Any]:
     """Return the soil constants by readings as plain data: the readings, and what is taken of them.
 
-    Of several readings the weakest counts.
+    Of several readings the weakest counts, and of several correlations the lowest. The standard deviation is the
+    scatter about it, or what keeps the highest correlation within the 95 % fractile, if that is more.
 
     Raises
     ------
@@ -135,8 +140,11 @@ def soil_of(node: Node, method: str, lacking: Collection[str], density_kg_m3: fl
         With every mistake.
     """
     readings = readings_of(node, method, density_kg_m3)
-    angle, sd = min(reading["friction_angle_deg"] for reading in readings), _SD_DEG[method]
-    data: dict[str, Any] = {"method": method, "source": SOURCES[method], "readings": readings}
+    angles = _weakest(readings)["friction_angles_deg"]
+    source = min(angles, key=angles.__getitem__)
+    angle, highest = angles[source], max(angles.values())
+    sd = max(_SCATTER_DEG[method], math.ceil(100.0 * (highest - angle) / FRACTILE_5) / 100.0)
+    data: dict[str, Any] = {"method": method, "source": source, "readings": readings}
     if "friction_angle" in lacking:
         data |= {"friction_angle_deg": angle, "friction_angle_sd_deg": sd}
     if "density" in lacking:
@@ -152,16 +160,26 @@ def soil_of(node: Node, method: str, lacking: Collection[str], density_kg_m3: fl
     return data
 
 
+def _weakest(readings: list[dict[str, Any]]) -> dict[str, Any]:
+    return min(readings, key=lambda reading: reading["friction_angle_deg"])
+
+
 def soil_words(data: dict[str, Any], units: str = "si") -> str:
     """Return in one line what is taken of readings, by what `soil_of` returned."""
-    weakest = min(data["readings"], key=lambda reading: reading["friction_angle_deg"])
+    weakest = _weakest(data["readings"])
     count = len(data["readings"])
     of = f", the weakest of {count} readings" if count > 1 else ""
     parts = []
     if "friction_angle_deg" in data:
         angle, sd = data["friction_angle_deg"], data["friction_angle_sd_deg"]
+        others = "".join(
+            f"; by {name} it is {other:.4g} deg"
+            for name, other in weakest.get("friction_angles_deg", {}).items()
+            if name != data["source"]
+        )
+        source = f"{data['source']}{', the lowest' if others else ''}{others}"
         parts.append(
-            f"friction angle {angle:.4g} deg, sd {sd:g} deg, by {_reading_words(weakest, units)}{of} ({data['source']})"
+            f"friction angle {angle:.4g} deg, sd {sd:g} deg, by {_reading_words(weakest, units)}{of} ({source})"
         )
     if "density_low_kg_m3" in data:
         ends = data["density_low_kg_m3"], data["density_high_kg_m3"]
@@ -174,7 +192,7 @@ def soil_words(data: dict[str, Any], units: str = "si") -> str:
     return "; ".join(parts) or "the readings are not used: the file gives every constant"
 
 
-def _reading_words(reading: dict[str, float], units: str) -> str:
+def _reading_words(reading: dict[str, Any], units: str) -> str:
     depth = quantity_text("m", units, reading.get("depth_m", 0.0))
     if "q_c_MPa" in reading:
         return f"q_c {quantity_text('MPa', units, reading['q_c_MPa'])} at {depth}, C_N {reading['stress_factor']:.3g}"

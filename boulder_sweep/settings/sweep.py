@@ -143,6 +143,8 @@ class Sweep:
     taken_at : dict of str to str
         What uncertain inputs were taken at where one value was needed, by column name: ``mean``, or a quantile and the
         side of the distribution, such as ``p5 low``; see `boulder_sweep.at_values`.
+    cases : tuple of Sweep
+        The same designs with other values of the uncertain inputs; a row has the worst of the verdicts.
     partial_factor : float
         Partial factor on tan(friction angle). The friction angles in `constants`, `axes` and `table` are design
         values: the factor has been applied to them.
@@ -170,6 +172,7 @@ class Sweep:
     distributions: dict[str, Distribution | SetDistributions] = field(default_factory=dict)
     correlation: float = 0.0
     taken_at: dict[str, str] = field(default_factory=dict)
+    cases: tuple[Sweep, ...] = ()
     partial_factor: float = 1.0
     notes: tuple[Problem, ...] = ()
     overrides: tuple[str, ...] = ()
@@ -195,7 +198,7 @@ class Sweep:
                     rows |= is_unusual(values, BY_NAME[name])
             if rows.any():
                 given[UNUSUAL] = Source(rows.astype(np.float64), (0,))
-        return DesignPlan(self.lengths, given, labels)
+        return DesignPlan(self.lengths, given, labels, [case.plan for case in self.cases])
 
     def is_held(self, name: str) -> bool:
         """Return whether an input is held to its usual range: a value far outside it is not computed."""
@@ -229,15 +232,7 @@ class Sweep:
         Two files that mean the same designs, written in other units or another layout, give the same.
         Very long axes and tables are represented by a SHA-256 of their values.
         """
-        inputs: dict[str, Any] = {}
-        varying = {name: values for axis in self.axes for name, values in axis.columns.items()}
-        if self.table is not None:
-            varying |= self.table.columns
-        for name in (entry.name for entry in INPUTS):
-            if name in varying:
-                inputs[name] = _listed(varying[name])
-            elif name in self.constants:
-                inputs[name] = self.constants[name]
+        inputs = self._inputs()
         inputs.setdefault("impact_height_m", IMPACT_HEIGHT_RULE)
         accuracy = self.solver.accuracy
         more: dict[str, Any] = {}
@@ -246,6 +241,11 @@ class Sweep:
             more = {"distributions": spreads, "correlation": self.correlation}
         if self.taken_at:
             more = {"taken_at": dict(self.taken_at)}
+        if self.cases:
+            more["judged_at"] = [
+                {"taken_at": dict(case.taken_at), **{name: case._inputs()[name] for name in case.taken_at}}
+                for case in self.cases
+            ]
         if self.plan.labels:
             more["labels"] = {name: _texts_listed(label) for name, label in self.plan.labels.items()}
         if self.partial_factor != 1.0:
@@ -283,6 +283,18 @@ class Sweep:
                 "horizon_s": self.solver.horizon_s,
             },
             **({SECTION: given} if (given := self.heading.given()) else {}),
+        }
+
+    def _inputs(self) -> dict[str, Any]:
+        """Return the values of the inputs by column name, lists where they vary."""
+        varying = {name: values for axis in self.axes for name, values in axis.columns.items()}
+        if self.table is not None:
+            varying |= self.table.columns
+        named = (entry.name for entry in INPUTS)
+        return {
+            name: _listed(varying[name]) if name in varying else self.constants[name]
+            for name in named
+            if name in varying or name in self.constants
         }
 
 

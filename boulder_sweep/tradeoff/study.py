@@ -230,7 +230,7 @@ def measure(
             f"{sweep.name}: none of the designs can be computed, so there is nothing to measure; "
             "the table of a run says why"
         )
-    evaluation = evaluation_of(sweep, Accuracy("", Steps(REFERENCE_STEP_S), error_estimate=False), proved=False)
+    evaluation = evaluation_of(sweep, Accuracy("", Steps(REFERENCE_STEP_S), error_estimate=False))
     limits, control = evaluation.limits, evaluation.control
     evaluation.warm_up()
     presets = {"corrected": corrected(), "as_printed": as_printed()}

@@ -103,6 +103,8 @@ REASON_WORDS = {
     "override": "it hardly reaches the bumper",
     "foot": "a rounded foot is not modelled",
     "shape": "no box stands for its shape",
+    "slower_truck": "a slower truck overturns it",
+    "validity": "the model does not hold for it",
     "error": "too near to a limit for the accuracy",
 }
 

@@ -21,6 +21,7 @@ from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 from boulder_sweep.judge.inputs import Designs, designs_of, sampled_designs
 from boulder_sweep.judge.judged import FAIL, PASS
+from boulder_sweep.judge.validity import VEHICLE
 from boulder_sweep.settings import load
 from boulder_sweep.settings.model import RESISTANCES, SECOND_OPINIONS
 from boulder_sweep.soils import with_law
@@ -37,13 +38,6 @@ RANDOM = 30_000
 """Random designs."""
 FAILS_ASKED = 5000
 """Fails of these that are simulated again."""
-VEHICLE = {
-    "m_v": (5000.0, 9000.0),
-    "v_0": (11.0, 18.0),
-    "k_v": (0.75 * 3103.3e3, 1.25 * 3103.3e3),
-    "c_v": (0.75 * 138.91e3, 1.25 * 138.91e3),
-}
-"""Least and largest value of the vehicle's inputs, SI; those of boulder and soil as of `random_designs`."""
 BUMPER_M, HOOD_M, BED_OFFSET_M = 0.5, 1.4, 2.9
 LITTLE_DEG = 12.0
 """Rotation up to which passes of the grids are looked at apart."""

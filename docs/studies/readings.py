@@ -1,4 +1,4 @@
-"""What each of the five doubtful formulas does: to both crash tests, and to the designs that pass of a whole grid."""
+"""What each of the five doubtful formulas does: to both crash tests, and to the designs of a grid that stand."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.inputs import designs_of
-from boulder_sweep.judge.judged import ERROR, PASS
+from boulder_sweep.judge.judged import HORIZON, PASS
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.model import PRESETS, PRINTED, SWITCHES, ReadingChoice
 
@@ -46,8 +46,8 @@ class ReadingRow:
         When American Black Granite passes 20 deg; NaN where never.
     rwg_rotation_deg, rwg_displacement_m : float
         Largest rotation and x_b of Rockville White Granite.
-    passes : ndarray of bool, shape (n,)
-        Which designs of the grid pass.
+    stands : ndarray of bool, shape (n,)
+        Which designs of the grid stand up to the horizon.
     """
 
     base: str
@@ -57,12 +57,12 @@ class ReadingRow:
     abg_time_to_limit_s: float
     rwg_rotation_deg: float
     rwg_displacement_m: float
-    passes: np.ndarray
+    stands: np.ndarray
 
     @property
     def share(self) -> float:
-        """Share of the grid that passes."""
-        return float(self.passes.mean())
+        """Share of the grid that stands."""
+        return float(self.stands.mean())
 
     @property
     def label(self) -> str:
@@ -98,12 +98,12 @@ class ReadingsStudy:
     @property
     def designs(self) -> int:
         """Number of designs simulated."""
-        return len(self.rows[0].passes)
+        return len(self.rows[0].stands)
 
     def changed(self, row: ReadingRow) -> tuple[int, int]:
-        """How many designs pass under a row but not under its preset, and the other way round."""
-        base = self.row(row.base).passes
-        return int((row.passes & ~base).sum()), int((base & ~row.passes).sum())
+        """How many designs stand under a row but not under its preset, and the other way round."""
+        base = self.row(row.base).stands
+        return int((row.stands & ~base).sum()), int((base & ~row.stands).sum())
 
     def crash_test_table(self) -> Table:
         """What every reading does to the crash tests."""
@@ -131,8 +131,8 @@ class ReadingsStudy:
         return table
 
     def grid_table(self) -> Table:
-        """What every reading does to the designs that pass."""
-        table = Table(("readings", "designs that pass", "pass only with it", "pass only without it"))
+        """What every reading does to the designs that stand."""
+        table = Table(("readings", "designs that stand", "stand only with it", "stand only without it"))
         for row in self.rows:
             moved = [f"{count / self.designs:.1%}" for count in self.changed(row)] if row.switch else ["", ""]
             table.add(row.label, f"{row.share:.1%}", *moved)
@@ -180,14 +180,16 @@ def readings_study(grid: Sweep | str | Path, every: int = 1) -> ReadingsStudy:
                 abg_time_to_limit_s=abg.motion.outcome.t_limit,
                 rwg_rotation_deg=math.degrees(outcome.theta),
                 rwg_displacement_m=outcome.x_b,
-                passes=passing(sweep, choice, every),
+                stands=standing(sweep, choice, every),
             )
         )
     return ReadingsStudy(sweep.name, every, rows)
 
 
-def passing(sweep: Sweep, choice: ReadingChoice, every: int = 1) -> np.ndarray:
-    """Return which designs of a grid pass under some readings, bool, shape (n,).
+def standing(sweep: Sweep, choice: ReadingChoice, every: int = 1) -> np.ndarray:
+    """Return which designs of a grid stand up to the horizon under some readings, bool, shape (n,).
+
+    As printed none of them passes, since nothing is proved of later times.
 
     Parameters
     ----------
@@ -199,16 +201,18 @@ def passing(sweep: Sweep, choice: ReadingChoice, every: int = 1) -> np.ndarray:
         Only every so many-th design, from the first on.
     """
     read_so = dataclasses.replace(sweep, model=dataclasses.replace(sweep.model, readings=choice))
-    evaluation = evaluation_of(read_so, accuracy_of(read_so), proved=False)
-    passes = []
+    whole = evaluation_of(read_so, accuracy_of(read_so))
+    evaluation = dataclasses.replace(whole, control=whole.control._replace(longest_horizon=0.0))
+    stands = []
     for start in range(0, sweep.n_designs, BLOCK):
         block = sweep.block(start, min(start + BLOCK, sweep.n_designs))
         chosen = block.design_id() % every == 0
         computable = chosen & (np.asarray(block.reasons.codes) == 0)
-        verdict = np.full(len(block), ERROR, dtype=np.int8)
-        verdict[computable] = evaluation.judged(designs_of(block, computable)).verdict
-        passes.append(verdict[chosen] == PASS)
-    return np.concatenate(passes)
+        found = evaluation.judged(designs_of(block, computable))
+        here = np.zeros(len(block), dtype=bool)
+        here[computable] = (found.verdict == PASS) | (found.reason == HORIZON)
+        stands.append(here[chosen])
+    return np.concatenate(stands)
 
 
 def _verdict(verdict: str, reason: str) -> str:

@@ -9,7 +9,11 @@ from click.testing import CliRunner
 
 from boulder_sweep import load
 from boulder_sweep.cli.vehicle_commands import speed
+from boulder_sweep.settings.distributions import FRACTILE_5
+from boulder_sweep.settings.problems import Position
+from boulder_sweep.settings.soil_readings import soil_of
 from boulder_sweep.settings.sweep import derived_words
+from boulder_sweep.settings.tree import block_of
 
 STREET = ("--length", "80 m", "--from", "0 mph", "--acceleration", "1.2 m/s^2")
 
@@ -21,6 +25,23 @@ def notes_of_borehole(root: Path) -> str:
     notes = (f"note: {words}" for words in derived_words(load(root / BOREHOLE).derived))
     lines = [line for note in notes for line in textwrap.wrap(note, 80, subsequent_indent="  ")]
     return "\n".join(["```text", *lines, "```"])
+
+
+def angles_of_counts(_: Path) -> str:
+    """Return the friction angles by some blow counts at 1.5 m, and what is taken of them."""
+    lines: list[str] = []
+    for n in (10, 16, 22, 30):
+        node = block_of(Position(""), {"n": f"{n}", "energy_ratio": "60 %", "depth": "1.5 m"})
+        soil = soil_of(node, "spt", ("friction_angle",), None)
+        mean, sd, (reading,) = soil["friction_angle_deg"], soil["friction_angle_sd_deg"], soil["readings"]
+        angles = reading["friction_angles_deg"]
+        if not lines:
+            lines = [f"| N | (N₁)₆₀ | {' | '.join(angles)} | taken | 5 % |", "|---" * (4 + len(angles)) + "|"]
+        shown = " | ".join(f"{angle:.1f}°" for angle in angles.values())
+        lines.append(
+            f"| {n} | {reading['n1_60']:.1f} | {shown} | {mean:.1f} ± {sd:g}° | {mean - FRACTILE_5 * sd:.1f}° |"
+        )
+    return "\n".join(lines)
 
 
 def speed_of_street(_: Path) -> str:

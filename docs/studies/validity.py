@@ -29,11 +29,10 @@ def flags_table() -> Table:
 
 
 def flags_of_grids(grid: Path) -> Table:
-    """Return how many passes of a sample of a grid carry each flag, at two speeds and in both readings."""
+    """Return how many passes of a sample of a grid carry each flag, at two speeds."""
     cases = {
         "30 mph, corrected": (),
         "40 mph, corrected": ("vehicle.speed=40 mph",),
-        "30 mph, as printed": ("model.readings=as_printed",),
     }
     table = Table(("passes of a sample", *(f"`{flag.name}`" for flag in FLAGS), "none"))
     for name, changes in cases.items():

@@ -40,8 +40,8 @@ def readings_words(study: ReadingsStudy) -> str:
     gained, _ = study.changed(study.row("corrected", most))
     return _points(
         f"**`{most}` decides most verdicts.** Read as printed, everything else corrected, it changes "
-        f"{changes / study.designs:.1%} of {study.designs:,} designs between pass and no pass, {gained / changes:.0%} "
-        f"of them to a pass. `{second}` comes next with {second_changes / study.designs:.1%}; `{least}` is the least "
+        f"{changes / study.designs:.1%} of {study.designs:,} designs between standing and not, {gained / changes:.0%} "
+        f"of them to standing. `{second}` comes next with {second_changes / study.designs:.1%}; `{least}` is the least "
         f"with {least_changes / study.designs:.1%}.",
         _arm_words(study),
         _preset_words(printed, corrected, study.designs),
@@ -61,12 +61,12 @@ def _arm_words(study: ReadingsStudy) -> str:
 
 def _preset_words(printed: ReadingRow, corrected: ReadingRow, designs: int) -> str:
     """How far the presets agree."""
-    unsafe = int((printed.passes & ~corrected.passes).sum())
-    lost = int((corrected.passes & ~printed.passes).sum())
+    unsafe = int((printed.stands & ~corrected.stands).sum())
+    lost = int((corrected.stands & ~printed.stands).sum())
     return (
-        f"The presets pass about as many designs, {printed.share:.1%} as printed and {corrected.share:.1%} corrected, "
-        f"because the misprints partly cancel; but they are not the same designs. {unsafe / designs:.1%} of all pass "
-        f"as printed and not corrected, {lost / designs:.1%} corrected and not as printed."
+        f"About as many designs stand by both presets, {printed.share:.1%} as printed and {corrected.share:.1%} "
+        f"corrected, because the misprints partly cancel; but they are not the same designs. {unsafe / designs:.1%} "
+        f"of all stand as printed and not corrected, {lost / designs:.1%} corrected and not as printed."
     )
 
 
@@ -76,8 +76,8 @@ def _strictness_words(study: ReadingsStudy) -> str:
     safe = [f"`{switch}`" for switch, (gained, _) in rows.items() if gained == 0]
     lax = [f"`{switch}`" for switch, (gained, lost) in rows.items() if gained > lost]
     return (
-        f"Seen from `corrected`, the printed reading only takes passes away for {', '.join(safe) or 'none'}; "
-        f"it adds more than it takes for {', '.join(lax) or 'none'}: the unsafe side."
+        f"Seen from `corrected`, with the printed reading only fewer designs stand for {', '.join(safe) or 'none'}; "
+        f"more stand than fall for {', '.join(lax) or 'none'}: the unsafe side."
     )
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import inlined, kernel
-from .control import MOST_STEPS, STEP_RATIO, Control
+from .control import MOST_STEPS, STEP_RATIO, VALID_ROTATION, Control
 from .design import Constants, Readings
 from .dormand_prince import DenseOutput, state_at
 from .dynamics import Acceleration, Modes, State, Switches, signed_arm, switches_of
@@ -93,8 +93,12 @@ def is_growing(y: State, m: Maxima) -> bool:
 
 @kernel
 def horizon_status(y: State, m: Maxima, ending: Ending, c: Constants) -> int:
-    """Status of a design that reached a horizon, if it ends there."""
-    if ending.provable and m.theta < ending.theta_limit and stays_below(ending.theta_limit, y, c):
+    """Status of a design that reached a horizon, if it ends there.
+
+    What the model is valid for is proved, too, unless it is passed already: then only the limit counts.
+    """
+    below = ending.theta_limit if m.theta >= VALID_ROTATION else min(ending.theta_limit, VALID_ROTATION)
+    if ending.provable and m.theta < below and stays_below(below, y, c):
         return Status.BELOW_LIMIT.value
     if is_growing(y, m):
         return Status.OUTWARD.value

@@ -30,6 +30,9 @@ from .plastic import ELASTIC
 from .soil import Kinematics
 from .soil_laws import soil_reaction
 
+VALID_ROTATION = math.radians(20.0)
+"""Rotation up to which the model is valid [rad]: beyond, the boulder climbs out of its bed, as the paper says. What
+turns further is never a pass, whatever the limit of its criterion."""
 STEP_RATIO = 3.0
 """Step of the coarser of the two solutions that an error is estimated from, over that of the finer."""
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ._jit import exact_inlined, exact_kernel
-from .control import Control
+from .control import VALID_ROTATION, Control
 from .outcomes import OutcomeTable, Status
 from .plastic import is_plastic
 
@@ -22,17 +22,19 @@ RULES = (
     ("fail", "no_contact"),
     ("fail", "overturns"),
     ("fail", "penetration"),
+    ("fail", "slower_truck"),  # by `fails_slower`: it takes other simulations
     ("undecided", "foot"),
     ("undecided", "shape"),
     ("undecided", "crush"),
     ("undecided", "override"),
     ("undecided", "horizon"),
     ("undecided", "error"),
+    ("undecided", "validity"),
     ("pass", ""),
 )
 """Verdict and reason of every rule, the worst first."""
-NOT_COMPUTED, NO_CONTACT, OVERTURNS, PENETRATION = range(4)
-FOOT, SHAPE, CRUSH, OVERRIDE, UNPROVED, NUMERICAL_ERROR, PASSES = range(4, len(RULES))
+NOT_COMPUTED, NO_CONTACT, OVERTURNS, PENETRATION, SLOWER_TRUCK = range(5)
+FOOT, SHAPE, CRUSH, OVERRIDE, UNPROVED, NUMERICAL_ERROR, VALIDITY, PASSES = range(5, len(RULES))
 """The rules. A row is standing, computed and not overturned, from PENETRATION on."""
 
 
@@ -43,8 +45,6 @@ class VerdictLimits(NamedTuple):
     """Largest rotation [rad]."""
     penetration: float
     """Largest penetration [m]."""
-    proved: float
-    """1 where a pass must be proved also where the readings allow no proof, else 0."""
     min_overlap_m: float
     """Least overlap of boulder and bumper [m]. It and what follows have the names that they have among the settings."""
 
@@ -66,6 +66,14 @@ OF_CRITERION = VerdictLimits._fields[VerdictLimits._fields.index("min_overlap_m"
 """Limits that are settings of the criterion as they are."""
 RULINGS = Ruling._fields
 """Rows of the array of `write_rulings`."""
+SHALLOW_RATIO, SHALLOW_SLIDE = 0.45, 0.3
+"""A boulder with less depth over height that slides by more [m] may stop a truck and be overturned by a slower one,
+which does not push it aside as far: among the passes of the realistic ranges every such boulder is one of these."""
+SLOWER_SPEEDS = (*(k / 50.0 for k in range(49, 24, -1)), 0.4, 0.3)
+"""Speeds of the slower trucks that such a boulder must stop, as fractions of its own: steps of 2 % down to half."""
+ISLAND_RATIO, ISLAND_SLIDE = 0.35, 0.5
+"""With still less depth over height, and a longer slide [m], the speeds at which it stands can be 1 % wide: finer than
+these steps. Such a boulder is not a pass."""
 SIZES = ("L", "H", "d", "e_bumper", "bed_offset", "flat_foot", "known_shape")
 """Rows of the array of inputs that it takes; the last two are 1 or 0: whether the foot of the boulder is flat, and
 whether what was simulated has its shape."""
@@ -74,7 +82,7 @@ whether what was simulated has its shape."""
 @exact_inlined
 def limits_in(values: np.ndarray) -> VerdictLimits:
     """Return the limits that an array holds, in the order of `VerdictLimits`."""
-    return VerdictLimits(values[0], values[1], values[2], values[3])
+    return VerdictLimits(values[0], values[1], values[2])
 
 
 @exact_inlined
@@ -107,8 +115,9 @@ def ruling_of(o: OutcomeTable, sizes: np.ndarray, row: int, limits: VerdictLimit
         and np.isfinite(crush)
         and np.isfinite(o.t_end[row])
     )
-    unproved = status == Status.HORIZON.value or status == Status.OUTWARD.value
-    unproved = unproved or (limits.proved > 0.0 and status == Status.UNPROVABLE.value)
+    unproved = status == Status.HORIZON.value or status == Status.OUTWARD.value or status == Status.UNPROVABLE.value
+    ratio, slide = sizes[2, row] / sizes[1, row], o.x_b_max[row]
+    outside = theta > VALID_ROTATION or (ratio < ISLAND_RATIO and slide > ISLAND_SLIDE)
     # Where only one of two solutions overturns the error is infinite, and nothing is decided.
     reached = (status == Status.LIMIT.value or theta >= limits.rotation) and not np.isinf(o.theta_error[row])
     unsure = limits.rotation - theta < o.theta_error[row] or min(room, bed_offset - crush) < o.x_error[row]
@@ -132,6 +141,8 @@ def ruling_of(o: OutcomeTable, sizes: np.ndarray, row: int, limits: VerdictLimit
         rule = UNPROVED
     elif unsure:
         rule = NUMERICAL_ERROR
+    elif outside:
+        rule = VALIDITY
     else:
         rule = PASSES
     return Ruling(rule, overlap, penetration, margin)
@@ -165,9 +176,39 @@ def write_rulings(o: OutcomeTable, sizes: np.ndarray, limits: VerdictLimits, out
         put_ruling(ruling_of(o, sizes, row, limits), out, row)
 
 
-FLAGS = ("crush", "rotation", "size", "embedment", "rock_density", "soil_pair", "overlap", "unproved")
+@exact_inlined
+def is_asked_slower(rule: Any, ratio: Any, slide: Any) -> Any:
+    """Whether slower trucks decide a row: one that would pass, shallow, and slides.
+
+    Parameters
+    ----------
+    rule
+        The rule that decides it so far; a number, or an array of shape (n,) as what follows.
+    ratio
+        Embedment depth over height [-].
+    slide
+        Largest displacement [m].
+    """
+    return ((rule == PASSES) | (rule == VALIDITY)) & (ratio < SHALLOW_RATIO) & (slide > SHALLOW_SLIDE)
+
+
+@exact_inlined
+def after_slower(rule: Any, slower: Any) -> Any:
+    """Return the rule that decides a row after one more slower truck, itself decided by the rule `slower`.
+
+    A truck that a slower one would fail against fails; where a slower one is undecided, so is the row, for that reason.
+    """
+    fails = (slower >= NO_CONTACT) & (slower <= SLOWER_TRUCK)
+    unknown = slower == NOT_COMPUTED
+    reason = fails * SLOWER_TRUCK + unknown * NUMERICAL_ERROR + (1 - fails - unknown) * slower
+    return np.minimum(rule, reason)
+
+
+FLAGS = ("crush", "rotation", "size", "embedment", "rock_density", "soil_pair", "overlap", "slides", "vehicle", "soil")
 """Names of the flags of a row, from the lowest bit of `flags_of` on; `boulder_sweep.judge.validity` says what each
-means. They decide nothing."""
+means. They decide no verdict, but a pass with one of `UNSTUDIED` is not graded robust."""
+UNSTUDIED = ("size", "embedment", "rock_density", "soil_pair", "vehicle", "soil")
+"""Flags of designs outside the ranges from which the study of second opinions draws."""
 
 
 class Tested(NamedTuple):
@@ -192,12 +233,34 @@ class Tested(NamedTuple):
     least_rock: float
     most_rock: float
     """Density of rock [kg/m^3]."""
+    least_m_v: float
+    most_m_v: float
+    """Mass of the vehicle [kg]."""
+    least_rate: float
+    most_rate: float
+    """Its angular frequency sqrt(k_v/m_v) [1/s]."""
+    least_damping: float
+    most_damping: float
+    """Its damper over sqrt(k_v m_v) [-]."""
+    least_v_0: float
+    most_v_0: float
+    """Its speed [m/s]."""
+    least_phi_deg: float
+    most_phi_deg: float
+    """Friction angle [deg]."""
+    least_rho_s: float
+    most_rho_s: float
+    """Density of the soil [kg/m^3]."""
+    least_K_epsilon: float
+    most_K_epsilon: float
+    """Strain rate factor [-]."""
 
 
 class FlagInputs(NamedTuple):
     """What the flags of a row depend on; numbers of one row, or arrays."""
 
-    status: Any
+    slide: Any
+    """Largest displacement [m]."""
     crush: Any
     """Largest crush [m]."""
     theta: Any
@@ -216,6 +279,15 @@ class FlagInputs(NamedTuple):
     least_beta: Any
     most_beta: Any
     """Constant of subgrade reaction, and between which the friction angle has it [MN/m^3]."""
+    m_v: Any
+    v_0: Any
+    k_v: Any
+    c_v: Any
+    """Mass, speed, spring and damper of the vehicle, SI."""
+    phi_deg: Any
+    rho_s: Any
+    K_epsilon: Any
+    """Friction angle [deg], density [kg/m^3] and strain rate factor of the soil, as they were given."""
 
 
 @exact_inlined
@@ -224,6 +296,13 @@ def flags_of(r: FlagInputs, t: Tested) -> Any:
     length, width, height, ratio = r.L, r.W, r.H, r.d / r.H
     size = (length < t.least_L) | (length > t.most_L) | (width < t.least_W) | (width > t.most_W)
     size = size | (height < t.least_H) | (height > t.most_H)
+    rate, damping = np.sqrt(r.k_v / r.m_v), r.c_v / np.sqrt(r.k_v * r.m_v)
+    vehicle = (r.m_v < t.least_m_v) | (r.m_v > t.most_m_v) | (r.v_0 < t.least_v_0) | (r.v_0 > t.most_v_0)
+    vehicle = vehicle | (rate < t.least_rate) | (rate > t.most_rate)
+    vehicle = vehicle | (damping < t.least_damping) | (damping > t.most_damping)
+    soil = (r.phi_deg < t.least_phi_deg) | (r.phi_deg > t.most_phi_deg)
+    soil = soil | (r.rho_s < t.least_rho_s) | (r.rho_s > t.most_rho_s)
+    soil = soil | (r.K_epsilon < t.least_K_epsilon) | (r.K_epsilon > t.most_K_epsilon)
     return (
         1 * (r.crush > t.crush)
         + 2 * (r.theta > t.rotation)
@@ -232,7 +311,9 @@ def flags_of(r: FlagInputs, t: Tested) -> Any:
         + 16 * ((r.rock < t.least_rock) | (r.rock > t.most_rock))
         + 32 * ((r.beta < r.least_beta) | (r.beta > r.most_beta))
         + 64 * (r.overlap < t.overlap)
-        + 128 * (r.status == Status.UNPROVABLE.value)
+        + 128 * (r.slide > ISLAND_SLIDE)
+        + 256 * vehicle
+        + 512 * soil
     )
 
 
@@ -260,13 +341,13 @@ class Confirmation(NamedTuple):
 
 @exact_inlined
 def is_late(rule: Any, t_end: Any, control: Control) -> Any:
-    """Whether other solutions must agree with a row before it passes or overturns.
+    """Whether other solutions must agree with a row before it passes, with or without `VALIDITY`, or overturns.
 
     Never where errors are not confirmed, as by ``fast``. Nor in plastic soil, where every motion goes on until it
     rests, and loses its energy to the soil instead of rocking.
     """
     counted = control.error_estimate and not is_plastic(control.unloading)
-    return counted & (t_end > control.horizon) & ((rule == PASSES) | (rule == OVERTURNS))
+    return counted & (t_end > control.horizon) & ((rule == PASSES) | (rule == VALIDITY) | (rule == OVERTURNS))
 
 
 @exact_inlined

@@ -72,4 +72,4 @@ def passes(found: Need, frame: pd.DataFrame, values: pd.Series, column: str) -> 
     listed[column] = values.to_numpy(dtype=float)
     asked = found.sweep
     sweep = Sweep("again", None, (), {}, DesignList("again.csv", listed), model=asked.model, solver=asked.solver)
-    return evaluation_of(sweep, accuracy_of(sweep), proved=False)(sweep.block(0, sweep.n_designs)).verdict == PASS
+    return evaluation_of(sweep, accuracy_of(sweep))(sweep.block(0, sweep.n_designs)).verdict == PASS

@@ -24,7 +24,7 @@ from tests.runner.grids import grid
 def passes(sweep: boulder_sweep.Sweep) -> np.ndarray:
     """Which designs of a small sweep pass, by the fast steps."""
     fast = replace(sweep, solver=replace(sweep.solver, accuracy="fast", step_s=None))
-    evaluation = evaluation_of(fast, accuracy_of(fast), proved=False)
+    evaluation = evaluation_of(fast, accuracy_of(fast))
     control = evaluation.control._replace(longest_horizon=0.0)
     return replace(evaluation, control=control)(fast.block(0, fast.n_designs)).verdict == PASS
 

@@ -20,7 +20,7 @@ from boulder_sweep.judge.refinement import FACTOR
 SHALLOW = Path(__file__).parent / "late_designs.csv"
 """Boulders that rock for seconds. An independent integration by steps of 0.1 ms (`benchmarks.late`) finds: the first
 two overturn at 7.0313 s and 6.769 s, the third stands for 10 s and overturns later, the fourth stands, at most 16.034
-deg."""
+deg. But slower trucks overturn the first, second and fourth."""
 
 
 def sweep_file(folder: Path, accuracy: str = "balanced") -> Path:
@@ -46,7 +46,7 @@ def test_shallow_boulders_end_as_an_independent_integration_says(tmp_path: Path,
         ("fail", "overturns"),
         ("fail", "overturns"),
         ("undecided", "horizon"),
-        ("pass", ""),
+        ("fail", "slower_truck"),
     ]
     assert rows[0]["time_to_limit_s"] == pytest.approx(7.0313, abs=2e-4)
     assert rows[1]["time_to_limit_s"] == pytest.approx(6.769, abs=3e-3)

@@ -17,7 +17,8 @@ from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.judged import PASS, Judged
-from boulder_sweep.judge.robustness import FREE, SENSITIVE, is_free
+from boulder_sweep.judge.robustness import FREE, NUMERICAL_ERROR_DEG, SENSITIVE, is_free
+from boulder_sweep.judge.validity import are_studied
 from boulder_sweep.judge.verdict import Limits, judge
 from boulder_sweep.settings import load
 from boulder_sweep.settings.model import SECOND_OPINIONS
@@ -73,7 +74,9 @@ def test_second_opinions_are_those_of_the_kernels() -> None:
     evaluation, judged = evaluated(sweep, *SECOND_OPINIONS)
     passing = np.flatnonzero(judged.verdict == PASS)
     designs = designs_of(sweep.block(0, sweep.n_designs)).rows(passing)
-    control = HeaveControl(evaluation.limits.rotation, evaluation.control.longest_horizon)
+    control = HeaveControl(
+        evaluation.limits.rotation - math.radians(NUMERICAL_ERROR_DEG), evaluation.control.longest_horizon
+    )
     standing = np.zeros(len(passing), dtype=int)
     for bit, law in enumerate(SECOND_OPINIONS):
         for row in range(len(passing)):
@@ -81,9 +84,51 @@ def test_second_opinions_are_those_of_the_kernels() -> None:
             standing[row] += (one.status[0] == Status.BELOW_LIMIT) << bit
     assert judged["stands_under"][passing].tolist() == standing.tolist()
     words = [GRADES[code] for code in judged["robustness"][passing]]
+    assert are_studied(designs, evaluation.limits).all()
     assert words == ["robust" if bits == 3 else "sensitive" for bits in standing]
     assert set(words) == {"robust", "sensitive"}
     assert set(judged["stands_under"][judged.verdict != PASS].tolist()) <= {-1}
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"m_v": 2300.0, "v_0": 22.35},
+        {"m_v": 300.0, "v_0": 60.0},
+        {"k_v": 1e8, "phi": math.radians(45.0)},
+        {"v_0": 8.0, "c_v": 1e6},
+        {"phi": math.radians(60.0), "d": 1.4},
+        {"K_epsilon": 10.0, "phi": math.radians(34.0), "beta": 40.0, "d": 1.7},
+        {"d": 0.3 * 3.4, "v_0": 11.5},
+    ],
+)
+def test_outside_its_study_nothing_is_robust(changes: dict[str, float]) -> None:
+    """Whatever the second opinions say: a car on the spring of a truck, soils that nobody has seen, hardly buried."""
+    usual = {"L": 1.65, "W": 1.68, "H": 3.4, "rho_b": 2600.0, "d": 2.4, "phi": math.radians(40.0), "beta": 80.0}
+    usual |= {"rho_s": 1860.0, "m_v": 6804.0, "v_0": 13.41, "k_v": 3103.3e3, "c_v": 138.91e3, "e": 0.75}
+    evaluation = evaluation_of(grid(), accuracy_of(grid())).asked()
+    inside = evaluation.judged(plain_designs(**usual)).row(0)
+    assert (inside["verdict"], inside["robustness"]) == ("pass", "robust")
+    outside = evaluation.judged(plain_designs(**usual | changes)).row(0)
+    assert outside["robustness"] != "robust"
+    if outside["verdict"] == "pass" and outside["stands_under"] == STANDINGS[-1]:
+        assert outside["robustness"] == "open"
+        assert robustness.meaning_of(outside) == robustness.UNSTUDIED_IN_WORDS
+
+
+def test_a_pass_within_the_error_of_its_second_opinion_is_sensitive() -> None:
+    """Held to what second opinions reach by the full limit: the rows between are not robust."""
+    sweep = grid()
+    evaluation, judged = evaluated(sweep, *SECOND_OPINIONS)
+    passes = designs_of(sweep.block(0, sweep.n_designs)).rows(judged.verdict == PASS)
+    law = "width_capped"
+    control = HeaveControl(evaluation.limits.rotation, evaluation.longest_s)
+    reached = second_opinions(with_law(passes.table, law), control)
+    by_itself = reached.status == Status.BELOW_LIMIT
+    stands = robustness.stands(passes, law, "kp_squared", evaluation.limits, evaluation.longest_s)
+    assert not np.any(stands & ~by_itself)
+    near = np.degrees(evaluation.limits.rotation - reached.theta_max) < NUMERICAL_ERROR_DEG
+    assert not np.any(stands & near)
 
 
 def test_one_law_alone_makes_nothing_robust() -> None:

@@ -30,8 +30,6 @@ def test_as_printed_nothing_passes_and_what_stands_is_undecided() -> None:
     assert np.all(found.verdict[stands] == UNDECIDED)
     assert np.all(found["end_time_s"][stands] == 10.0)
     assert np.all(np.isnan(found["margin"][stands]))
-    compared = Evaluation(as_printed(), CONTROL._replace(h=0.004), LIMITS._replace(proved=False)).judged(designs)
-    assert np.array_equal(compared.verdict == PASS, stands)
 
 
 def test_a_boulder_that_barely_touches_the_bumper_is_undecided() -> None:

@@ -22,18 +22,23 @@ from boulder_kernels.rules import (
     RULINGS,
     SHAPE,
     SIZES,
+    SLOWER_SPEEDS,
+    SLOWER_TRUCK,
     UNPROVED,
+    VALIDITY,
     Confirmation,
     VerdictLimits,
     after_finer,
+    after_slower,
     agree,
+    is_asked_slower,
     is_late,
     is_simulated,
     is_wanted,
     write_rulings,
 )
 
-LIMITS = VerdictLimits(rotation=0.35, penetration=1.0, proved=1.0, min_overlap_m=0.25)
+LIMITS = VerdictLimits(rotation=0.35, penetration=1.0, min_overlap_m=0.25)
 STANDS = {
     "status": bk.Status.SETTLED,
     "theta_max": 0.1,
@@ -84,10 +89,15 @@ def ruling(**changed):
         ({"status": bk.Status.HORIZON}, UNPROVED),
         ({"status": bk.Status.OUTWARD}, UNPROVED),
         ({"status": bk.Status.UNPROVABLE}, UNPROVED),
-        ({"status": bk.Status.UNPROVABLE, "proved": 0.0}, PASSES),
         ({"theta_error": 0.3}, NUMERICAL_ERROR),
         ({"x_error": 4.0}, NUMERICAL_ERROR),
         ({"theta_error": np.nan, "x_error": np.nan}, PASSES),
+        # The model does not hold beyond 20 degrees, nor for boulders hardly buried that slide.
+        ({"theta_max": 0.3495, "rotation": 0.5}, VALIDITY),
+        ({"theta_max": 0.3490, "rotation": 0.5}, PASSES),
+        ({"d": 1.049, "x_b_max": 0.501}, VALIDITY),
+        ({"d": 1.051, "x_b_max": 0.501}, PASSES),
+        ({"d": 1.049, "x_b_max": 0.499}, PASSES),
         # One of two solutions overturns: nothing is decided.
         ({"status": bk.Status.LIMIT, "theta_error": np.inf, "x_error": np.inf}, NUMERICAL_ERROR),
     ],
@@ -98,9 +108,10 @@ def test_each_rule_alone(changed, rule):
 
 def test_the_worst_rule_decides():
     worse = [
+        {"H": 5.0, "x_b_max": 0.6},
         {"theta_error": 0.3},
         {"status": bk.Status.HORIZON},
-        {"d": 2.3},
+        {"d": 2.3, "H": 3.0},
         {"crush_max": 3.0},
         {"known_shape": 0.0},
         {"flat_foot": 0.0},
@@ -108,12 +119,54 @@ def test_the_worst_rule_decides():
         {"theta_max": 0.4},
         {"t_end": np.inf},
     ]
-    rules = (NUMERICAL_ERROR, UNPROVED, OVERRIDE, CRUSH, SHAPE, FOOT, PENETRATION, OVERTURNS, NOT_COMPUTED)
+    rules = (VALIDITY, NUMERICAL_ERROR, UNPROVED, OVERRIDE, CRUSH, SHAPE, FOOT, PENETRATION, OVERTURNS, NOT_COMPUTED)
     together = {}
     for changed, rule in zip(worse, rules, strict=True):
         together |= changed
         assert ruling(**together)[0] == rule
     assert ruling(**together | {"status": bk.Status.NO_CONTACT})[0] == NO_CONTACT
+
+
+@pytest.mark.parametrize(
+    ("rule", "ratio", "slide", "asked"),
+    [
+        (PASSES, 0.44, 0.31, True),
+        (VALIDITY, 0.34, 0.6, True),
+        (PASSES, 0.46, 0.31, False),
+        (PASSES, 0.44, 0.29, False),
+        (UNPROVED, 0.3, 1.0, False),
+        (OVERTURNS, 0.3, 1.0, False),
+    ],
+)
+def test_slower_trucks_are_asked_about_shallow_boulders_that_slide(rule, ratio, slide, asked):
+    assert plain(is_asked_slower)(rule, ratio, slide) == asked
+    assert plain(is_asked_slower)(np.array([rule]), np.array([ratio]), np.array([slide])).tolist() == [asked]
+
+
+@pytest.mark.parametrize(
+    ("rule", "slower", "after"),
+    [
+        (PASSES, PASSES, PASSES),
+        (VALIDITY, PASSES, VALIDITY),
+        (PASSES, OVERTURNS, SLOWER_TRUCK),
+        (VALIDITY, OVERTURNS, SLOWER_TRUCK),
+        (PASSES, PENETRATION, SLOWER_TRUCK),
+        (SLOWER_TRUCK, PASSES, SLOWER_TRUCK),
+        (SLOWER_TRUCK, UNPROVED, SLOWER_TRUCK),
+        (PASSES, UNPROVED, UNPROVED),
+        (UNPROVED, OVERTURNS, SLOWER_TRUCK),
+        (PASSES, NOT_COMPUTED, NUMERICAL_ERROR),
+        (PASSES, VALIDITY, VALIDITY),
+    ],
+)
+def test_the_worst_of_the_slower_trucks_decides(rule, slower, after):
+    assert plain(after_slower)(rule, slower) == after
+
+
+def test_slower_trucks_go_down_by_two_percent_to_half_the_speed():
+    assert np.allclose(np.diff(SLOWER_SPEEDS[:25]), -0.02)
+    assert SLOWER_SPEEDS[0] == 0.98
+    assert SLOWER_SPEEDS[24:] == (0.5, 0.4, 0.3)
 
 
 def test_overlap_penetration_and_margin():

@@ -39,7 +39,7 @@ function judge(results, row, inputs, rules) {
   if (verdict === "error") reason = rules.why[ended] ?? rules.not_finite;
   const valid = verdict !== "error" && reason !== "no_contact";
   const overturned = reason === "overturns";
-  const rated = valid && !overturned && (verdict !== "undecided" || reason === "error");
+  const rated = valid && !overturned && reason !== "slower_truck" && (verdict !== "undecided" || reason === "error");
   const rating = rules.ratings.find(([, most]) => penetration <= most)?.[0] ?? null;
   const flags = Object.keys(rules.flags).filter((_, bit) => (of("flags") >> bit) & 1);
   /** @param {number} value @param {boolean} known */
