@@ -109,16 +109,18 @@ def ruling_of(o: OutcomeTable, sizes: np.ndarray, row: int, limits: VerdictLimit
     )
     unproved = status == Status.HORIZON.value or status == Status.OUTWARD.value
     unproved = unproved or (limits.proved > 0.0 and status == Status.UNPROVABLE.value)
-    # Where only one of two solutions overturns the error is infinite, and nothing is decided.
-    reached = (status == Status.LIMIT.value or theta >= limits.rotation) and not np.isinf(o.theta_error[row])
+    # Where only one of two solutions overturns, or no others confirm a late row, the error is infinite, and nothing is
+    # decided.
+    known = not np.isinf(o.theta_error[row])
+    reached = status == Status.LIMIT.value or theta >= limits.rotation
     unsure = limits.rotation - theta < o.theta_error[row] or min(room, bed_offset - crush) < o.x_error[row]
     if status == Status.NO_CONTACT.value:
         rule = NO_CONTACT
     elif not (is_simulated(status) and finite):
         rule = NOT_COMPUTED
-    elif reached:
+    elif reached and known:
         rule = OVERTURNS
-    elif penetration > limits.penetration:
+    elif penetration > limits.penetration and known:
         rule = PENETRATION
     elif sizes[5, row] == 0.0:
         rule = FOOT
@@ -260,13 +262,13 @@ class Confirmation(NamedTuple):
 
 @exact_inlined
 def is_late(rule: Any, t_end: Any, control: Control) -> Any:
-    """Whether other solutions must agree with a row before it passes or overturns.
+    """Whether other solutions must agree with a row before it passes or fails.
 
     Never where errors are not confirmed, as by ``fast``. Nor in plastic soil, where every motion goes on until it
     rests, and loses its energy to the soil instead of rocking.
     """
     counted = control.error_estimate and not is_plastic(control.unloading)
-    return counted & (t_end > control.horizon) & ((rule == PASSES) | (rule == OVERTURNS))
+    return counted & (t_end > control.horizon) & ((rule == PASSES) | (rule == OVERTURNS) | (rule == PENETRATION))
 
 
 @exact_inlined
@@ -297,11 +299,14 @@ def agree(coarse: OutcomeTable, fine: OutcomeTable, v_0: Any) -> Any:
         Speed of impact [m/s]: an error of the displacement is one of the time, too, see
         `boulder_kernels.error_estimates.estimate_errors`.
     """
+    way = np.maximum(coarse.x_error, SAME_WAY)
     limit = coarse.status == Status.LIMIT.value
     alike = limit == (fine.status == Status.LIMIT.value)
-    in_time = v_0 * np.abs(coarse.t_limit - fine.t_limit) <= np.maximum(coarse.x_error, SAME_WAY)
+    in_time = v_0 * np.abs(coarse.t_limit - fine.t_limit) <= way
     in_angle = np.abs(coarse.theta_max - fine.theta_max) <= np.maximum(coarse.theta_error, SAME_ANGLE)
-    return alike & np.isfinite(fine.x_error) & ((limit & in_time) | (np.logical_not(limit) & in_angle))
+    in_place = (np.abs(coarse.x_b_max - fine.x_b_max) <= way) & (np.abs(coarse.x_v_max - fine.x_v_max) <= way)
+    stands_alike = np.logical_not(limit) & in_angle & in_place
+    return alike & np.isfinite(fine.x_error) & ((limit & in_time) | stands_alike)
 
 
 @exact_inlined

@@ -88,8 +88,9 @@ def ruling(**changed):
         ({"theta_error": 0.3}, NUMERICAL_ERROR),
         ({"x_error": 4.0}, NUMERICAL_ERROR),
         ({"theta_error": np.nan, "x_error": np.nan}, PASSES),
-        # One of two solutions overturns: nothing is decided.
+        # One of two solutions overturns, or none confirms a late row: nothing is decided.
         ({"status": bk.Status.LIMIT, "theta_error": np.inf, "x_error": np.inf}, NUMERICAL_ERROR),
+        ({"x_v_max": 5.5, "theta_error": np.inf, "x_error": np.inf}, NUMERICAL_ERROR),
     ],
 )
 def test_each_rule_alone(changed, rule):
@@ -164,13 +165,14 @@ def test_what_is_asked_of_one_row_in_the_page_is_asked_of_many_in_a_table(contro
         (PASSES, 1.5, CONTROL, True),
         (OVERTURNS, 1.5, CONTROL, True),
         (PASSES, 1.0, CONTROL, False),
-        (PENETRATION, 1.5, CONTROL, False),
+        (PENETRATION, 1.5, CONTROL, True),
+        (CRUSH, 1.5, CONTROL, False),
         (UNPROVED, 10.0, CONTROL, False),
         (PASSES, 1.5, CONTROLS[1], False),
         (PASSES, 1.5, CONTROL._replace(unloading=bk.PLASTIC, elements=50), False),
     ],
 )
-def test_a_row_is_late_that_passes_or_overturns_past_the_horizon(rule, t_end, control, expected):
+def test_a_row_is_late_that_passes_or_fails_past_the_horizon(rule, t_end, control, expected):
     assert plain(is_late)(rule, t_end, control) == expected
 
 
@@ -185,6 +187,10 @@ def solution(**changed):
         ({}, {"theta_max": 0.1 + 0.9e-5}, True),
         ({}, {"theta_max": 0.1 + 1.1e-5}, False),
         ({"theta_error": 0.0}, {"theta_max": 0.1 + 0.9e-6}, True),
+        ({}, {"x_b_max": 0.1 + 0.9e-4, "x_v_max": 2.0 + 0.9e-4}, True),
+        ({}, {"x_b_max": 0.1 + 1.1e-4}, False),
+        ({}, {"x_v_max": 2.0 + 1.1e-4}, False),
+        ({"x_error": 1e-3}, {"x_v_max": 2.0 + 0.9e-3}, True),
         ({}, {"x_error": np.inf}, False),
         ({}, {"status": bk.Status.LIMIT, "t_limit": 1.2}, False),
         ({"status": bk.Status.LIMIT, "t_limit": 1.2}, {"status": bk.Status.LIMIT, "t_limit": 1.2 + 0.9e-5}, True),
