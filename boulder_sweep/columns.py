@@ -211,7 +211,7 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "rotation_error_deg",
         "float64",
         "deg",
-        "estimated numerical error of max_rotation_deg; null where that is the limit itself, or where the error is not known",
+        "estimated numerical error of max_rotation_deg; null where that is the limit itself, or where it is not known",
         lambda facts: np.degrees(_known(facts.outcomes.theta_error)),
         rows="free",
     ),

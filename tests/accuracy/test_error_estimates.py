@@ -34,6 +34,44 @@ def test_named_accuracies_keep_their_promises_on_the_grid() -> None:
             assert found.largest_deg <= 1e-5
 
 
+def test_estimates_cover_families_far_from_usual_designs() -> None:
+    """A small edition of the table of `docs.studies.wild`: at most one in a thousand of all is missed."""
+    missed, compared = np.zeros(2), np.zeros(2)
+    for table in wild_families(250, 41).values():
+        found = simulate_table(table, PRESETS["corrected"], how(0.012, estimate=True))
+        known = simulate_table(table, PRESETS["corrected"], how(1e-4)._replace(locate_yield=True))
+        alike = (found.status == Status.LIMIT) == (known.status == Status.LIMIT)
+        standing = alike & (known.status != Status.LIMIT)
+        moved = np.maximum(np.abs(found.x_b_max - known.x_b_max), np.abs(found.x_v_max - known.x_v_max))
+        wrong = np.abs(found.theta_max - known.theta_max) > found.theta_error + ROUNDING_RAD
+        missed += np.sum(wrong & standing), np.sum((moved > found.x_error + ROUNDING_M) & alike)
+        compared += standing.sum(), alike.sum()
+    assert (compared > 1000).all()
+    assert (missed <= 1e-3 * compared).all()
+
+
+def test_few_usual_designs_have_a_second_solution() -> None:
+    for table in (random_table(4000, 42), grid_table(GRID, 4000)):
+        found = simulate_table(table, PRESETS["corrected"], how(0.012, estimate=True))
+        assert np.mean(found.step < 0.004) < 0.05
+
+
+def test_no_error_in_a_table_is_infinite() -> None:
+    """Of designs from the whole admitted box some have an error that is not known: null, and nothing is decided."""
+    table = rows(box_table(400, UNKNOWN_SEED), slice(None))
+    designs = Designs(table, np.full(table.L.size, 2.9))
+    sweep = load(GRID)
+    evaluation = evaluation_of(sweep, accuracy_of(sweep))
+    judged = evaluation.judged(designs)
+    errors = [spec.name for spec in OUTCOMES if "_error_" in spec.name]
+    assert len(errors) == 3
+    assert not any(np.isinf(judged[name]).any() for name in errors)
+    computed = np.isfinite(judged["max_rotation_deg"])
+    unknown = computed & np.isnan(judged["displacement_error_m"])
+    assert unknown.any()
+    assert (judged.verdict[unknown] == UNDECIDED).all()
+
+
 def outcomes(status: list[int], theta: list[float]) -> OutcomeTable:
     n = len(status)
     out = OutcomeTable(np.array(status, np.int8), *(np.full(n, np.nan) for _ in OutcomeTable._fields[1:]))
