@@ -67,6 +67,9 @@ SAFETY_CONFIRMED = 4.0
 """The same where a doubtful design is solved again by half the step."""
 LEAST_CONFIRMED_RAD, LEAST_CONFIRMED_M = 1e-8, 2e-7
 """Least error of a design that has a second solution."""
+LEAST_LATE_M = 1e-4
+"""Least error of the displacements of a boulder that stands after more than `LONG`. Two solutions that slide for
+seconds can come as near to each other by chance."""
 
 
 @kernel
@@ -150,8 +153,9 @@ def estimate_error(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable,
         fine.theta_error[row] = 0.0
     else:
         fine.theta_error[row] = safety * max(turn, min(x / arm, max(fine.theta_max[row], LEAST_ROTATION)))
+    least = LEAST_LATE_M if fine.t_end[row] > LONG and fine.status[row] != limit else 0.0
     x = max(x, abs(coarse.crush_max[row] - fine.crush_max[row]))
-    fine.x_error[row] = safety * x
+    fine.x_error[row] = max(safety * x, least)
 
 
 @kernel

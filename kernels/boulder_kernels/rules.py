@@ -14,6 +14,7 @@ import numpy as np
 
 from ._jit import exact_inlined, exact_kernel
 from .control import Control
+from .error_estimates import LEAST_LATE_M
 from .outcomes import OutcomeTable, Status
 from .plastic import is_plastic
 
@@ -244,7 +245,7 @@ AGREEING = 2
 """Finer solutions that confirm a late row. Among 30,000 shallow boulders one was enough for all but two
 (`benchmarks.late`): one step missed that a moment for an instant exceeds what holds the boulder, and one estimate was
 so large that everything agreed with it."""
-SAME_ANGLE, SAME_WAY = 1e-6, 1e-4
+SAME_ANGLE, SAME_WAY = 1e-6, LEAST_LATE_M
 """Solutions of a late row agree if what they reach differs by no more than the error estimated for the coarser, or by
 less than this [rad], [m]: with the shortest steps the estimate falls below the rounding that late motion amplifies."""
 

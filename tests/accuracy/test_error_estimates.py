@@ -9,8 +9,12 @@ import pytest
 
 from boulder_kernels import OutcomeTable, Status, simulate_table
 from boulder_kernels.error_estimates import estimate_errors
+from boulder_sweep.columns import OUTCOMES
+from boulder_sweep.judge.inputs import Designs
+from boulder_sweep.judge.judged import UNDECIDED
 from boulder_sweep.judge.verdict import Limits, judge
-from docs.studies.coverage import coverages, grid_table, random_table
+from docs.studies.coverage import ROUNDING_M, ROUNDING_RAD, coverages, grid_table, random_table
+from docs.studies.wild import wild_families
 from tests.accuracy.box import LIMIT, PRESETS, box_table, how, rows
 from tests.judge.plain import plain_designs
 
@@ -56,18 +60,16 @@ def test_few_usual_designs_have_a_second_solution() -> None:
         assert np.mean(found.step < 0.004) < 0.05
 
 
-def test_no_error_in_a_table_is_infinite() -> None:
-    """Of designs from the whole admitted box some have an error that is not known: null, and nothing is decided."""
-    table = rows(box_table(400, UNKNOWN_SEED), slice(None))
-    designs = Designs(table, np.full(table.L.size, 2.9))
-    sweep = load(GRID)
-    evaluation = evaluation_of(sweep, accuracy_of(sweep))
-    judged = evaluation.judged(designs)
+@pytest.mark.parametrize("preset", PRESETS)
+def test_no_error_in_a_table_is_infinite(preset: str) -> None:
+    """Of extreme designs some have an error that is not known: null in every column, and the row is undecided."""
+    table = box_table(10_000, 2025)
+    out = simulate_table(table, PRESETS[preset], how(0.012, estimate=True)._replace(paired=True))
+    judged = judge(out, Designs(table, np.full(table.L.size, 2.9)), Limits(LIMIT, "P1"))
     errors = [spec.name for spec in OUTCOMES if "_error_" in spec.name]
     assert len(errors) == 3
     assert not any(np.isinf(judged[name]).any() for name in errors)
-    computed = np.isfinite(judged["max_rotation_deg"])
-    unknown = computed & np.isnan(judged["displacement_error_m"])
+    unknown = np.isinf(out.theta_error)
     assert unknown.any()
     assert (judged.verdict[unknown] == UNDECIDED).all()
 
