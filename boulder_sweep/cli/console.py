@@ -140,7 +140,8 @@ def accuracy_lines(accuracy: Mapping[str, Any]) -> list[str]:
         return [line]
     sample = counted(accuracy["pilot_designs"], "design")
     error = accuracy["estimated_error_p99_9_deg"]
-    reached = f"{'unknown' if error is None else f'at most {error:g} deg'} in 99.9 % of a pilot of {sample}"
+    of_pilot = f"of a pilot of {sample}"
+    reached = f"unknown for more than 0.1 % {of_pilot}" if error is None else f"at most {error:g} deg in 99.9 % {of_pilot}"
     return [line, f"       estimated error {reached}{'' if accuracy['met'] else ': no step does better'}"]
 
 

@@ -41,7 +41,7 @@ def test_named_accuracies_keep_their_promises_on_the_grid() -> None:
 def test_estimates_cover_families_far_from_usual_designs() -> None:
     """A small edition of the table of `docs.studies.wild`: at most one in a thousand of all is missed."""
     missed, compared = np.zeros(2), np.zeros(2)
-    for table in wild_families(250, 41).values():
+    for table in wild_families(400, 41).values():
         found = simulate_table(table, PRESETS["corrected"], how(0.012, estimate=True))
         known = simulate_table(table, PRESETS["corrected"], how(1e-4)._replace(locate_yield=True))
         alike = (found.status == Status.LIMIT) == (known.status == Status.LIMIT)
