@@ -4,7 +4,7 @@ Designs whose estimated error may be wrong have a second solution already, see `
 
 A row is *late* if its motion goes on past the horizon. A shallow boulder may rock for seconds, and rocking amplifies
 every error: both solutions from which the error is estimated can follow the same wrong branch, where the estimate does
-not see it. So a late row passes or overturns only if `AGREEING` others agree with it, each with steps at most half as
+not see it. So a late row passes or fails only if `AGREEING` others agree with it, each with steps at most half as
 long as those before over the whole motion; until they do it is simulated again by finer steps, and is undecided
 where even the finest differ.
 
