@@ -141,7 +141,9 @@ def accuracy_lines(accuracy: Mapping[str, Any]) -> list[str]:
     sample = counted(accuracy["pilot_designs"], "design")
     error = accuracy["estimated_error_p99_9_deg"]
     of_pilot = f"of a pilot of {sample}"
-    reached = f"unknown for more than 0.1 % {of_pilot}" if error is None else f"at most {error:g} deg in 99.9 % {of_pilot}"
+    reached = (
+        f"unknown for more than 0.1 % {of_pilot}" if error is None else f"at most {error:g} deg in 99.9 % {of_pilot}"
+    )
     return [line, f"       estimated error {reached}{'' if accuracy['met'] else ': no step does better'}"]
 
 

@@ -262,14 +262,16 @@ class Confirmation(NamedTuple):
 
 
 @exact_inlined
-def is_late(rule: Any, t_end: Any, control: Control) -> Any:
-    """Whether other solutions must agree with a row before it passes or fails.
+def confirmations(rule: Any, t_end: Any, control: Control) -> Any:
+    """Return how many other solutions must agree with a late row before it passes or fails; 0 of other rows.
 
+    One is enough for how far the truck gets: nothing amplifies its error. `AGREEING` must for what rocking decides.
     Never where errors are not confirmed, as by ``fast``. Nor in plastic soil, where every motion goes on until it
     rests, and loses its energy to the soil instead of rocking.
     """
     counted = control.error_estimate and not is_plastic(control.unloading)
-    return counted & (t_end > control.horizon) & ((rule == PASSES) | (rule == OVERTURNS) | (rule == PENETRATION))
+    late = counted & (t_end > control.horizon)
+    return late * (AGREEING * ((rule == PASSES) | (rule == OVERTURNS)) + (rule == PENETRATION))
 
 
 @exact_inlined
@@ -312,7 +314,7 @@ def agree(coarse: OutcomeTable, fine: OutcomeTable, v_0: Any) -> Any:
 
 @exact_inlined
 def after_finer(
-    row: Confirmation, before: Any, after: Any, alike: Any, late: Any, control: Control
+    row: Confirmation, before: Any, after: Any, alike: Any, needed: Any, control: Control
 ) -> tuple[Confirmation, Any]:
     """Return how far a row is decided after one more solution, and whether that takes the place of what counts so far.
 
@@ -325,13 +327,13 @@ def after_finer(
         nothing, but the last resort is not tried again.
     alike
         Whether the two agree, see `agree`.
-    late, control
-        Whether the new solution is late, see `is_late`, and how it was simulated.
+    needed, control
+        How many others must agree with the new solution, see `confirmations`, and how it was simulated.
     """
     failed = after == NOT_COMPUTED
     same = ((before == PASSES) == (after == PASSES)) & ((before <= PENETRATION) == (after <= PENETRATION))
     confirmed = same & alike & (row.unconfirmed > 0)
     replaces = np.logical_not(failed | confirmed)
-    unconfirmed = (row.unconfirmed - confirmed) * np.logical_not(replaces) + AGREEING * (late & replaces)
+    unconfirmed = (row.unconfirmed - confirmed) * np.logical_not(replaces) + needed * replaces
     compared_s = failed * row.compared_s + np.logical_not(failed) * control.h
     return Confirmation(unconfirmed, compared_s, control.last_resort & failed), replaces

@@ -27,7 +27,7 @@ from boulder_kernels.rules import (
     VerdictLimits,
     after_finer,
     agree,
-    is_late,
+    confirmations,
     is_simulated,
     is_wanted,
     write_rulings,
@@ -149,9 +149,9 @@ def test_what_is_asked_of_one_row_in_the_page_is_asked_of_many_in_a_table(contro
 
     def answers(before, after, status, t_end, unconfirmed, flag):
         row = Confirmation(unconfirmed, 0.006 + 0.004 * flag, flag)
-        late = plain(is_late)(after, t_end, control)
-        known, replaces = plain(after_finer)(row, before, after, np.logical_not(flag), late, control)
-        return (late, plain(is_wanted)(row, before, status, control), replaces, *known)
+        needed = plain(confirmations)(after, t_end, control)
+        known, replaces = plain(after_finer)(row, before, after, np.logical_not(flag), needed, control)
+        return (needed, plain(is_wanted)(row, before, status, control), replaces, *known)
 
     together = answers(*columns)
     alone = [answers(*combination) for combination in COMBINATIONS]
@@ -162,18 +162,18 @@ def test_what_is_asked_of_one_row_in_the_page_is_asked_of_many_in_a_table(contro
 @pytest.mark.parametrize(
     ("rule", "t_end", "control", "expected"),
     [
-        (PASSES, 1.5, CONTROL, True),
-        (OVERTURNS, 1.5, CONTROL, True),
-        (PASSES, 1.0, CONTROL, False),
-        (PENETRATION, 1.5, CONTROL, True),
-        (CRUSH, 1.5, CONTROL, False),
-        (UNPROVED, 10.0, CONTROL, False),
-        (PASSES, 1.5, CONTROLS[1], False),
-        (PASSES, 1.5, CONTROL._replace(unloading=bk.PLASTIC, elements=50), False),
+        (PASSES, 1.5, CONTROL, AGREEING),
+        (OVERTURNS, 1.5, CONTROL, AGREEING),
+        (PASSES, 1.0, CONTROL, 0),
+        (PENETRATION, 1.5, CONTROL, 1),
+        (CRUSH, 1.5, CONTROL, 0),
+        (UNPROVED, 10.0, CONTROL, 0),
+        (PASSES, 1.5, CONTROLS[1], 0),
+        (PASSES, 1.5, CONTROL._replace(unloading=bk.PLASTIC, elements=50), 0),
     ],
 )
-def test_a_row_is_late_that_passes_or_fails_past_the_horizon(rule, t_end, control, expected):
-    assert plain(is_late)(rule, t_end, control) == expected
+def test_a_row_that_passes_or_fails_past_the_horizon_needs_others_that_agree(rule, t_end, control, expected):
+    assert plain(confirmations)(rule, t_end, control) == expected
 
 
 def solution(**changed):
