@@ -4,10 +4,9 @@ Designs whose estimated error may be wrong have a second solution already, see `
 
 A row is *late* if its motion goes on past the horizon. A shallow boulder may rock for seconds, and rocking amplifies
 every error: both solutions from which the error is estimated can follow the same wrong branch, where the estimate does
-not see it. So a late row passes or overturns only if `AGREEING` others agree with it, and fails by how far the truck gets
-only if one does, each with steps at most half as
-long as those before over the whole motion; until they do it is simulated again by finer steps, and is undecided
-where even the finest differ.
+not see it. So a late row passes or overturns only if `AGREEING` others agree with it, and fails by how far the truck
+gets only if one does, each with steps at most half as long as those before over the whole motion; until they do it is
+simulated again by finer steps, and is undecided where even the finest differ.
 
 What is still refused by the finest steps is simulated by `boulder_kernels.impact.simulate_last_resort`, whose late rows
 need finer solutions of the same kind.
