@@ -118,6 +118,12 @@ OPTIONAL_INPUTS: tuple[ColumnSpec, ...] = (
 )
 """Inputs that a file may leave out without a default: their columns are in its tables only where it gives them."""
 
+
+def _known(errors: np.ndarray) -> np.ndarray:
+    """Return estimated errors, NaN where they are infinite: of two solutions only one overturned, or none agree."""
+    return np.where(np.isfinite(errors), errors, np.nan)
+
+
 OUTCOMES: tuple[OutcomeColumn, ...] = (
     OutcomeColumn(
         "verdict",
@@ -213,23 +219,25 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "rotation_error_deg",
         "float64",
         "deg",
-        "estimated numerical error of max_rotation_deg; null where that is the limit itself",
-        lambda facts: np.degrees(facts.outcomes.theta_error),
+        "estimated numerical error of max_rotation_deg; null where that is the limit itself, or where it is not known",
+        lambda facts: np.degrees(_known(facts.outcomes.theta_error)),
         rows="free",
     ),
     OutcomeColumn(
         "displacement_error_m",
         "float64",
         "m",
-        "estimated numerical error of the displacements",
-        lambda facts: facts.outcomes.x_error,
+        "estimated numerical error of the displacements; null where it is not known",
+        lambda facts: _known(facts.outcomes.x_error),
     ),
     OutcomeColumn(
         "time_to_limit_error_s",
         "float64",
         "s",
         "estimated numerical error of time_to_limit_s: that of the displacements over the speed of impact",
-        lambda facts: facts.outcomes.x_error / np.where(facts.rows["overturned"], facts.designs.table.v_0, np.nan),
+        lambda facts: (
+            _known(facts.outcomes.x_error) / np.where(facts.rows["overturned"], facts.designs.table.v_0, np.nan)
+        ),
         rows="overturned",
     ),
     OutcomeColumn(
@@ -316,7 +324,7 @@ AT_REST: tuple[OutcomeColumn, ...] = (
         "float64",
         "deg",
         "by how much permanent_tilt_deg may be wrong: numerical error, and what the motion that is left may still turn",
-        lambda facts: np.degrees(facts.outcomes.rest_error),
+        lambda facts: np.degrees(_known(facts.outcomes.rest_error)),
     ),
 )
 """Outcomes in plastic soil only; behind the others in a table.

@@ -143,8 +143,12 @@ def accuracy_lines(accuracy: Mapping[str, Any]) -> list[str]:
     if "pilot_designs" not in accuracy:
         return [line]
     sample = counted(accuracy["pilot_designs"], "design")
-    reached = f"{accuracy['estimated_error_p99_9_deg']:g} deg in 99.9 % of a pilot of {sample}"
-    return [line, f"       estimated error at most {reached}{'' if accuracy['met'] else ': no step does better'}"]
+    error = accuracy["estimated_error_p99_9_deg"]
+    of_pilot = f"of a pilot of {sample}"
+    reached = (
+        f"unknown for more than 0.1 % {of_pilot}" if error is None else f"at most {error:g} deg in 99.9 % {of_pilot}"
+    )
+    return [line, f"       estimated error {reached}{'' if accuracy['met'] else ': no step does better'}"]
 
 
 def dry_run_lines(sweep: Sweep, out: Location, effort: Estimate) -> list[str]:

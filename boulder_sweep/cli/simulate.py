@@ -254,8 +254,9 @@ def impact_lines(row: Mapping[str, Any], history: Trajectory, units: str = "si")
         when = f"reached {1e3 * reached[0]:.0f} ms after contact" if len(reached) else "not reached"
         lines.append(f"  front: its second spring acts from a crush of {metres(second.s_2)} on, {when}")
     lines.append(build_line(history, units))
-    if row["rotation_error_deg"] is not None:
-        lines.append(f"  numerical error of the rotation: {row['rotation_error_deg']:.1g} deg")
+    if row["time_to_limit_s"] is None:
+        error = row["rotation_error_deg"]
+        lines.append(f"  numerical error of the rotation: {'unknown' if error is None else f'{error:.1g} deg'}")
     return lines
 
 

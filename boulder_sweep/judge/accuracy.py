@@ -75,7 +75,7 @@ class Accuracy:
         steps; without, the error of a row is that of the steps of one solution, and such rows stay undecided.
     achieved_deg
         Quantile `QUANTILE` of the estimated error of the rotation over the designs of a pilot run [deg]; None unless
-        the requested accuracy is a number.
+        the requested accuracy is a number; infinite where the error of more designs is not known.
     pilot_designs
         Designs of the pilot run; 0 without one.
     met
@@ -106,7 +106,7 @@ class Accuracy:
         }
         if self.achieved_deg is not None:
             data["pilot_designs"] = self.pilot_designs
-            data["estimated_error_p99_9_deg"] = self.achieved_deg
+            data["estimated_error_p99_9_deg"] = self.achieved_deg if math.isfinite(self.achieved_deg) else None
             data["met"] = self.met
         return data
 

@@ -4,9 +4,9 @@ Designs whose estimated error may be wrong have a second solution already, see `
 
 A row is *late* if its motion goes on past the horizon. A shallow boulder may rock for seconds, and rocking amplifies
 every error: both solutions from which the error is estimated can follow the same wrong branch, where the estimate does
-not see it. So a late row passes or overturns only if `AGREEING` others agree with it, each with steps at most half as
-long as those before over the whole motion; until they do it is simulated again by finer steps, and is undecided
-where even the finest differ.
+not see it. So a late row passes or overturns only if `AGREEING` others agree with it, and fails by how far the truck
+gets only if one does, each with steps at most half as long as those before over the whole motion; until they do it is
+simulated again by finer steps, and is undecided where even the finest differ.
 
 What is still refused by the finest steps is simulated by `boulder_kernels.impact.simulate_last_resort`, whose late rows
 need finer solutions of the same kind.
@@ -26,7 +26,7 @@ from boulder_kernels.rules import (
     Confirmation,
     after_finer,
     agree,
-    is_late,
+    confirmations,
     is_wanted,
 )
 from boulder_kernels.table import finer_step, some_rows
@@ -97,8 +97,8 @@ class RowStates:
         n = designs.size
         self._v_0 = designs.table.v_0
         self.judged, self.outcomes, self.rule = once
-        late = plain(is_late)(self.rule, self.outcomes.t_end, control)
-        self._confirmation = Confirmation(AGREEING * late, np.full(n, control.h), np.zeros(n, dtype=bool))
+        needed = plain(confirmations)(self.rule, self.outcomes.t_end, control)
+        self._confirmation = Confirmation(needed, np.full(n, control.h), np.zeros(n, dtype=bool))
 
     @property
     def unconfirmed(self) -> np.ndarray:
@@ -121,9 +121,9 @@ class RowStates:
         """
         judged, outcomes, rule = once
         alike = plain(agree)(some_rows(self.outcomes, rows), outcomes, self._v_0[rows])
-        late = plain(is_late)(rule, outcomes.t_end, control)
+        needed = plain(confirmations)(rule, outcomes.t_end, control)
         confirmation = some_rows(self._confirmation, rows)
-        confirmation, replaces = plain(after_finer)(confirmation, self.rule[rows], rule, alike, late, control)
+        confirmation, replaces = plain(after_finer)(confirmation, self.rule[rows], rule, alike, needed, control)
         replaced = rows[replaces]
         for values, new in zip(self._confirmation, confirmation, strict=True):
             values[rows] = new

@@ -37,7 +37,6 @@ from boulder_kernels.impact import failed, simulate_last_resort
 from boulder_kernels.outcomes import COARSER, FINER, NONE_NEEDED, SECOND, STEP, THETA_MAX, Status, write_outcome
 from boulder_kernels.plastic import memory_of
 from boulder_kernels.rules import (
-    AGREEING,
     SLOWER_SPEEDS,
     Confirmation,
     Ruling,
@@ -45,9 +44,9 @@ from boulder_kernels.rules import (
     after_finer,
     after_slower,
     agree,
+    confirmations,
     flags_of,
     is_asked_slower,
-    is_late,
     is_wanted,
     limits_in,
     put_ruling,
@@ -333,7 +332,7 @@ def decide(
     count, best, tried, coarser = len(controls), outcomes_from(counted), room[0], room[1]
     solve_for_error(counted, coarser, row, designs, layers, outlines, soil_at, controls[0])
     rule, decided_by, control = ruling_of(best, sizes, row, limits).rule, 0, given_control(controls[0])
-    confirmation = Confirmation(AGREEING * is_late(rule, best.t_end[row], control), control.h, False)
+    confirmation = Confirmation(confirmations(rule, best.t_end[row], control), control.h, False)
     for k in range(1, count):
         control = given_control(controls[k])
         if not is_wanted(confirmation, rule, best.status[row], control):
@@ -341,9 +340,9 @@ def decide(
         solve_for_error(tried, coarser, row, designs, layers, outlines, soil_at, controls[k])
         finer = outcome_at(tried, row)
         after = ruling_of(outcomes_from(tried), sizes, row, limits).rule
-        late = is_late(after, finer.t_end, control)
+        needed = confirmations(after, finer.t_end, control)
         alike = agree(outcome_at(counted, row), finer, designs[V_0, row])
-        confirmation, replaces = after_finer(confirmation, rule, after, alike, late, control)
+        confirmation, replaces = after_finer(confirmation, rule, after, alike, needed, control)
         if replaces:
             copy_row(tried, counted, row)
             rule, decided_by = after, k

@@ -95,7 +95,7 @@ class Point:
         Designs that the finer solution has and this one has not.
     estimated_p99_9_deg
         99.9 % quantile of the estimated errors of the rotation [deg], over the designs that were not stopped at the
-        limit: what to ask for to get these steps. NaN without an estimate.
+        limit: what to ask for to get these steps. NaN without an estimate, and where the error of more is not known.
     covered
         Share of the designs that neither solution stopped at the limit whose estimated error is no smaller than their
         error. NaN without an estimate.
@@ -119,6 +119,11 @@ class Point:
     estimated_p99_9_deg: float
     covered: float
     pareto: bool = False
+
+    @property
+    def can_be_asked_for(self) -> bool:
+        """Whether settings can ask for these steps with errors: by a name, or by the error that most designs keep."""
+        return self.method.error_estimate and (bool(self.accuracy) or math.isfinite(self.estimated_p99_9_deg))
 
     def to_dict(self) -> dict[str, object]:
         """Return one row of the table of results; None where there is no value."""
@@ -232,7 +237,8 @@ def _estimates(method: Method, out: OutcomeTable, errors: np.ndarray, standing: 
     if not estimated.size:
         return 0.0, 1.0
     covers = estimated + ROUNDING_DEG >= errors
-    return float(np.quantile(estimated, 0.999, method="higher")), float(np.mean(covers))
+    largest = float(np.quantile(estimated, 0.999, method="higher"))
+    return largest if math.isfinite(largest) else math.nan, float(np.mean(covers))
 
 
 def mark_front(points: Iterable[Point]) -> None:

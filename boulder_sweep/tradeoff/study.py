@@ -90,7 +90,7 @@ class Tradeoff:
         fit = [
             point
             for point in self._points_of_sweep()
-            if (point.method.error_estimate if error_estimate else point.method.is_plain)
+            if (point.can_be_asked_for if error_estimate else point.method.is_plain)
             and point.rotation_max_deg <= wanted_deg
             and not point.flips
         ]

@@ -30,12 +30,16 @@ YIELD_LOCATED = 0.08
 AT_LIMIT, AT_LIMIT_AFTER_CHANGES = 2.0, 40.0
 """Factor on the error of a motion stopped at the limit of rotation, and the factor where the mode of rotation had
 changed before."""
+LASTING = 0.5
+"""Simulated time from which the factor of a long motion counts [s]."""
 LONG_MOTION = 5.0
-"""Factor on the error of a long motion."""
-LONG, LONG_IF_SHALLOW = 1.0, 0.5
-"""Simulated time from which a motion is long [s]."""
+"""That factor on the error."""
+LONG = 1.0
+"""Simulated time from which the motion of a shallow or wide boulder is doubtful [s]."""
 SHALLOW, VERY_SHALLOW = 0.42, 0.3
 """Ratio of depth to height below which a boulder may rock for long."""
+WIDE = 0.7
+"""Ratio of length to height above which a boulder is wide: it may slide for long, and set down while it slides."""
 SLOW, VERY_SLOW = 256.0, 81.0
 """Ratio k_v/m_v below which a truck pushes for long [1/s^2]."""
 ROCKING, CHATTERING = 8, 16
@@ -63,6 +67,9 @@ SAFETY_CONFIRMED = 4.0
 """The same where a doubtful design is solved again by half the step."""
 LEAST_CONFIRMED_RAD, LEAST_CONFIRMED_M = 1e-8, 2e-7
 """Least error of a design that has a second solution."""
+LEAST_LATE_M = 1e-4
+"""Least error of the displacements of a boulder that stands after more than `LONG`. Two solutions that slide for
+seconds can come as near to each other by chance."""
 
 
 @kernel
@@ -86,11 +93,12 @@ def step_errors(o: Outcome, design: Design, theta_limit: float, horizon: float) 
     """
     m, t_end = o.maxima, o.t_end
     depth, pushing = design.d / design.H, design.k_v / design.m_v
+    loose = depth < SHALLOW or design.L / design.H > WIDE
     stopped, changed = o.status == Status.LIMIT.value, o.rotation_changes > 0.0
     long = (t_end >= LONG) and not stopped
     if stopped:
         factor = AT_LIMIT_AFTER_CHANGES if changed else AT_LIMIT
-    elif long or (t_end >= LONG_IF_SHALLOW and depth < SHALLOW) or (pushing < SLOW and changed):
+    elif t_end >= LASTING or (pushing < SLOW and changed):
         factor = LONG_MOTION
     else:
         factor = 1.0
@@ -108,7 +116,8 @@ def step_errors(o: Outcome, design: Design, theta_limit: float, horizon: float) 
         else:
             theta = max(theta, CHATTERING_THETA * m.theta)
     doubtful = o.rotation_changes > ROCKING
-    doubtful = doubtful or ((stopped or long) and depth < VERY_SHALLOW) or (long and depth < SHALLOW)
+    doubtful = doubtful or (long and loose) or (stopped and depth < VERY_SHALLOW)
+    doubtful = doubtful or (changed and not stopped and (loose or pushing < SLOW))
     doubtful = doubtful or (pushing < VERY_SLOW and (changed or not stopped))
     if doubtful and not stopped:
         theta = max(theta, LEAST_IF_DOUBTFUL)
@@ -144,8 +153,9 @@ def estimate_error(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable,
         fine.theta_error[row] = 0.0
     else:
         fine.theta_error[row] = safety * max(turn, min(x / arm, max(fine.theta_max[row], LEAST_ROTATION)))
+    least = LEAST_LATE_M if fine.t_end[row] > LONG and fine.status[row] != limit else 0.0
     x = max(x, abs(coarse.crush_max[row] - fine.crush_max[row]))
-    fine.x_error[row] = safety * x
+    fine.x_error[row] = max(safety * x, least)
 
 
 @kernel

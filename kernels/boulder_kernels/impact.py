@@ -53,7 +53,7 @@ from .dormand_prince import dense_output, step
 from .dynamics import rate_of
 from .error_estimates import error_time
 from .events import NONE, SHORTEN, locate_limit
-from .modes import change_mode, changes_counted, initial_modes
+from .modes import change_mode, changes_counted, initial_modes, length_after
 from .outcomes import Outcome, Status, compression_at, no_maxima, undefined_maxima
 from .plastic import memory_of
 from .second_spring import (
@@ -252,7 +252,8 @@ def simulate_by_steps(
                 modes, readings, theta_stop, control.locate_yield, control.event_tolerance, c
             )
             k1, start = rate_of(y, switches, c), compression_at(y, switches, c)
-            h_next = h_full = h_touching if modes.touching else h_apart
+            h_full = h_touching if modes.touching else h_apart
+            h_next = length_after(kept.event, h_full, y.omega_b, k1.alpha_b)
     return failed(Status.STEP_BUDGET.value)
 
 

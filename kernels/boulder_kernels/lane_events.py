@@ -27,7 +27,7 @@ from .events import (
     turns_beyond,
     weights_of,
 )
-from .modes import LIMIT, change_mode, changes_counted, gaps_at
+from .modes import LIMIT, change_mode, changes_counted, gaps_at, length_after
 from .numerics import ITERATIONS, field, put
 from .outcomes import Status, compression_at
 from .workspace import (
@@ -220,7 +220,7 @@ def conclude(ws: Any, lane: int, readings: Readings, ending: Ending, locate_yiel
 
 @kernel
 def start_steps(ws: Any) -> None:
-    """Work out what every next step starts with: its acceleration, anew after an event, and its compression."""
+    """Work out what every next step starts with: its acceleration, anew after an event, its compression and length."""
     align_stack()
     for lane in range(LANES):
         c, s = load(ws, CONSTANTS, lane), load(ws, SWITCHES, lane)
@@ -229,7 +229,9 @@ def start_steps(ws: Any) -> None:
         event = field(ws, EVENT, lane)
         k = fresh if event > NONE else k_end
         start = compression_at(y, s, c)
+        h = length_after(event, field(ws, STEP, lane), y.omega_b, fresh.alpha_b)
         if event != SHORTEN:
+            put(ws, STEP, lane, h)
             store(ws, START, lane, k)
             store(ws, COMPRESSION, lane, start)
 

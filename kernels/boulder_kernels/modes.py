@@ -350,6 +350,33 @@ def change_mode(event: int, y: State, M: float, modes: Modes, c: Constants) -> t
     return State(y.x_b, y.v_b, theta_b, omega_b, y.x_v, y.v_v), Modes(turning, touching, corner, arm, top, base)
 
 
+RETURNS_WITHIN = 1.5
+"""The step after a boulder has passed its base is at most so many times as long as it takes to return to it."""
+
+
+@inlined
+def length_after(event: float, h: float, omega_b: float, alpha_b: float) -> float:
+    """Length of the step that follows an event [s].
+
+    Parameters
+    ----------
+    event
+        The event.
+    h
+        Length of the steps [s].
+    omega_b, alpha_b
+        Angular velocity [rad/s] and acceleration [rad/s^2] in the modes that follow.
+
+    Notes
+    -----
+    A boulder that has passed its base returns to it after 2 |omega/alpha|. Where the net moment nearly balances the
+    weight on one side, the swing to the other side lasts less than a hundredth of a step. As a part of a whole step it
+    would be smaller than the precision of the search for its end, and the energy of the boulder would be lost there.
+    """
+    returns = (event == ROTATION) & (omega_b * alpha_b < 0.0)
+    return min(h, -2.0 * RETURNS_WITHIN * omega_b / alpha_b) if returns else h
+
+
 @inlined
 def needs_moment(g: GapFactors) -> bool:
     """Whether the gap of the event ROTATION depends on the net moment."""

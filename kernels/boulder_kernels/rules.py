@@ -14,6 +14,7 @@ import numpy as np
 
 from ._jit import exact_inlined, exact_kernel
 from .control import VALID_ROTATION, Control
+from .error_estimates import LEAST_LATE_M
 from .outcomes import OutcomeTable, Status
 from .plastic import is_plastic
 
@@ -118,16 +119,18 @@ def ruling_of(o: OutcomeTable, sizes: np.ndarray, row: int, limits: VerdictLimit
     unproved = status == Status.HORIZON.value or status == Status.OUTWARD.value or status == Status.UNPROVABLE.value
     ratio, slide = sizes[2, row] / sizes[1, row], o.x_b_max[row]
     outside = theta > VALID_ROTATION or (ratio < ISLAND_RATIO and slide > ISLAND_SLIDE)
-    # Where only one of two solutions overturns the error is infinite, and nothing is decided.
-    reached = (status == Status.LIMIT.value or theta >= limits.rotation) and not np.isinf(o.theta_error[row])
+    # Where only one of two solutions overturns, or no others confirm a late row, the error is infinite, and nothing is
+    # decided.
+    known = not np.isinf(o.theta_error[row])
+    reached = status == Status.LIMIT.value or theta >= limits.rotation
     unsure = limits.rotation - theta < o.theta_error[row] or min(room, bed_offset - crush) < o.x_error[row]
     if status == Status.NO_CONTACT.value:
         rule = NO_CONTACT
     elif not (is_simulated(status) and finite):
         rule = NOT_COMPUTED
-    elif reached:
+    elif reached and known:
         rule = OVERTURNS
-    elif penetration > limits.penetration:
+    elif penetration > limits.penetration and known:
         rule = PENETRATION
     elif sizes[5, row] == 0.0:
         rule = FOOT
@@ -323,7 +326,7 @@ AGREEING = 2
 """Finer solutions that confirm a late row. Among 30,000 shallow boulders one was enough for all but two
 (`benchmarks.late`): one step missed that a moment for an instant exceeds what holds the boulder, and one estimate was
 so large that everything agreed with it."""
-SAME_ANGLE, SAME_WAY = 1e-6, 1e-4
+SAME_ANGLE, SAME_WAY = 1e-6, LEAST_LATE_M
 """Solutions of a late row agree if what they reach differs by no more than the error estimated for the coarser, or by
 less than this [rad], [m]: with the shortest steps the estimate falls below the rounding that late motion amplifies."""
 
@@ -340,14 +343,17 @@ class Confirmation(NamedTuple):
 
 
 @exact_inlined
-def is_late(rule: Any, t_end: Any, control: Control) -> Any:
-    """Whether other solutions must agree with a row before it passes, with or without `VALIDITY`, or overturns.
+def confirmations(rule: Any, t_end: Any, control: Control) -> Any:
+    """Return how many others must agree with a late row before it passes, with or without `VALIDITY`, or fails.
 
+    One is enough for how far the truck gets: nothing amplifies its error. `AGREEING` must for what rocking decides.
     Never where errors are not confirmed, as by ``fast``. Nor in plastic soil, where every motion goes on until it
     rests, and loses its energy to the soil instead of rocking.
     """
     counted = control.error_estimate and not is_plastic(control.unloading)
-    return counted & (t_end > control.horizon) & ((rule == PASSES) | (rule == VALIDITY) | (rule == OVERTURNS))
+    late = counted & (t_end > control.horizon)
+    rocking = (rule == PASSES) | (rule == VALIDITY) | (rule == OVERTURNS)
+    return late * (AGREEING * rocking + (rule == PENETRATION))
 
 
 @exact_inlined
@@ -378,16 +384,19 @@ def agree(coarse: OutcomeTable, fine: OutcomeTable, v_0: Any) -> Any:
         Speed of impact [m/s]: an error of the displacement is one of the time, too, see
         `boulder_kernels.error_estimates.estimate_errors`.
     """
+    way = np.maximum(coarse.x_error, SAME_WAY)
     limit = coarse.status == Status.LIMIT.value
     alike = limit == (fine.status == Status.LIMIT.value)
-    in_time = v_0 * np.abs(coarse.t_limit - fine.t_limit) <= np.maximum(coarse.x_error, SAME_WAY)
+    in_time = v_0 * np.abs(coarse.t_limit - fine.t_limit) <= way
     in_angle = np.abs(coarse.theta_max - fine.theta_max) <= np.maximum(coarse.theta_error, SAME_ANGLE)
-    return alike & np.isfinite(fine.x_error) & ((limit & in_time) | (np.logical_not(limit) & in_angle))
+    in_place = (np.abs(coarse.x_b_max - fine.x_b_max) <= way) & (np.abs(coarse.x_v_max - fine.x_v_max) <= way)
+    stands_alike = np.logical_not(limit) & in_angle & in_place
+    return alike & np.isfinite(fine.x_error) & ((limit & in_time) | stands_alike)
 
 
 @exact_inlined
 def after_finer(
-    row: Confirmation, before: Any, after: Any, alike: Any, late: Any, control: Control
+    row: Confirmation, before: Any, after: Any, alike: Any, needed: Any, control: Control
 ) -> tuple[Confirmation, Any]:
     """Return how far a row is decided after one more solution, and whether that takes the place of what counts so far.
 
@@ -400,13 +409,13 @@ def after_finer(
         nothing, but the last resort is not tried again.
     alike
         Whether the two agree, see `agree`.
-    late, control
-        Whether the new solution is late, see `is_late`, and how it was simulated.
+    needed, control
+        How many others must agree with the new solution, see `confirmations`, and how it was simulated.
     """
     failed = after == NOT_COMPUTED
     same = ((before == PASSES) == (after == PASSES)) & ((before <= PENETRATION) == (after <= PENETRATION))
     confirmed = same & alike & (row.unconfirmed > 0)
     replaces = np.logical_not(failed | confirmed)
-    unconfirmed = (row.unconfirmed - confirmed) * np.logical_not(replaces) + AGREEING * (late & replaces)
+    unconfirmed = (row.unconfirmed - confirmed) * np.logical_not(replaces) + needed * replaces
     compared_s = failed * row.compared_s + np.logical_not(failed) * control.h
     return Confirmation(unconfirmed, compared_s, control.last_resort & failed), replaces

@@ -9,8 +9,12 @@ import pytest
 
 from boulder_kernels import OutcomeTable, Status, simulate_table
 from boulder_kernels.error_estimates import estimate_errors
+from boulder_sweep.columns import OUTCOMES
+from boulder_sweep.judge.inputs import Designs
+from boulder_sweep.judge.judged import UNDECIDED
 from boulder_sweep.judge.verdict import Limits, judge
-from docs.studies.coverage import coverages, grid_table, random_table
+from docs.studies.coverage import ROUNDING_M, ROUNDING_RAD, coverages, grid_table, random_table
+from docs.studies.wild import wild_families
 from tests.accuracy.box import LIMIT, PRESETS, box_table, how, rows
 from tests.judge.plain import plain_designs
 
@@ -32,6 +36,42 @@ def test_named_accuracies_keep_their_promises_on_the_grid() -> None:
             assert found.largest_m <= 1e-4
         if found.readings == "corrected" and found.accuracy == "fine":
             assert found.largest_deg <= 1e-5
+
+
+def test_estimates_cover_families_far_from_usual_designs() -> None:
+    """A small edition of the table of `docs.studies.wild`: at most one in a thousand of all is missed."""
+    missed, compared = np.zeros(2), np.zeros(2)
+    for table in wild_families(400, 41).values():
+        found = simulate_table(table, PRESETS["corrected"], how(0.012, estimate=True))
+        known = simulate_table(table, PRESETS["corrected"], how(1e-4)._replace(locate_yield=True))
+        alike = (found.status == Status.LIMIT) == (known.status == Status.LIMIT)
+        standing = alike & (known.status != Status.LIMIT)
+        moved = np.maximum(np.abs(found.x_b_max - known.x_b_max), np.abs(found.x_v_max - known.x_v_max))
+        wrong = np.abs(found.theta_max - known.theta_max) > found.theta_error + ROUNDING_RAD
+        missed += np.sum(wrong & standing), np.sum((moved > found.x_error + ROUNDING_M) & alike)
+        compared += standing.sum(), alike.sum()
+    assert (compared > 1000).all()
+    assert (missed <= 1e-3 * compared).all()
+
+
+def test_few_usual_designs_have_a_second_solution() -> None:
+    for table in (random_table(4000, 42), grid_table(GRID, 4000)):
+        found = simulate_table(table, PRESETS["corrected"], how(0.012, estimate=True))
+        assert np.mean(found.step < 0.004) < 0.05
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_no_error_in_a_table_is_infinite(preset: str) -> None:
+    """Of extreme designs some have an error that is not known: null in every column, and the row is undecided."""
+    table = box_table(10_000, 2025)
+    out = simulate_table(table, PRESETS[preset], how(0.012, estimate=True)._replace(paired=True))
+    judged = judge(out, Designs(table, np.full(table.L.size, 2.9)), Limits(LIMIT, "P1"))
+    errors = [spec.name for spec in OUTCOMES if "_error_" in spec.name]
+    assert len(errors) == 3
+    assert not any(np.isinf(judged[name]).any() for name in errors)
+    unknown = np.isinf(out.theta_error)
+    assert unknown.any()
+    assert (judged.verdict[unknown] == UNDECIDED).all()
 
 
 def outcomes(status: list[int], theta: list[float]) -> OutcomeTable:

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from boulder_kernels.table import finer_step
-from boulder_sweep.judge.accuracy import LADDER, STEPS, STEPS_PRINTED, accuracy_of, control_of, pilot, pilot_size
+from boulder_sweep.cli.console import accuracy_lines
+from boulder_sweep.judge.accuracy import (
+    LADDER,
+    STEPS,
+    STEPS_PRINTED,
+    Accuracy,
+    accuracy_of,
+    control_of,
+    pilot,
+    pilot_size,
+)
 from boulder_sweep.judge.inputs import sampled_rows
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.settings import Sweep, load_text
@@ -52,6 +63,14 @@ def test_what_cannot_be_met_is_said() -> None:
     found = accuracy_of(asked("1e-9 deg", subgrade="[25, 95] MN/m^3", friction="40 deg"))
     assert found.met == (found.achieved_deg is not None and found.achieved_deg <= 1e-9)
     assert found.to_dict()["met"] == found.met
+
+
+def test_an_error_that_a_pilot_does_not_know_is_null_and_unknown_in_words() -> None:
+    """The error of more than one design in a thousand is infinite."""
+    told = Accuracy("0.01 deg", STEPS["balanced"], True, math.inf, 4096, met=False, paired=True).to_dict()
+    assert told["estimated_error_p99_9_deg"] is None
+    expected = "estimated error unknown for more than 0.1 % of a pilot of 4,096 designs: no step does better"
+    assert accuracy_lines(told)[1].strip() == expected
 
 
 def test_a_pilot_repeats_itself_to_the_bit() -> None:

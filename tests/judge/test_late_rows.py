@@ -1,4 +1,4 @@
-"""Rows whose motion goes on past the horizon pass or overturn only where finer steps agree."""
+"""Rows whose motion goes on past the horizon pass or fail only where finer steps agree."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import pytest
 import boulder_sweep
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, Status
 from boulder_kernels.rules import AGREEING, FIRST_FACTOR
+from boulder_sweep.columns import REASONS
 from boulder_sweep.judge.accuracy import accuracy_of, control_of
 from boulder_sweep.judge.evaluation import by_kernels, evaluation_of
 from boulder_sweep.judge.inputs import Designs, designs_of
@@ -64,8 +65,11 @@ def test_an_overturned_row_has_an_error_of_its_time_and_none_of_its_rotation(tmp
     assert 0.0 < standing["rotation_error_deg"] < 0.1
 
 
-def stand_in(ends: dict[int, tuple[Status, float]], asked: list[float]):
-    """Kernels whose solutions at each refinement (0, 1, ...) end after 5 s in some way, at some rotation [rad]."""
+def stand_in(ends: dict[int, tuple[Status, float]], asked: list[float], ways: dict[int, float] | None = None):
+    """Kernels whose solutions at each refinement (0, 1, ...) end after 5 s in some way, at some rotation [rad].
+
+    The way of the truck is 1 m, unless `ways` says otherwise [m].
+    """
 
     def simulate(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
         asked.append(control.h)
@@ -77,6 +81,7 @@ def stand_in(ends: dict[int, tuple[Status, float]], asked: list[float]):
         return out._replace(
             status=np.full(n, status, np.int8),
             theta_max=np.full(n, theta),
+            x_v_max=np.full(n, (ways or {}).get(level, 1.0)),
             t_limit=np.full(n, 5.0 if at_limit else np.nan),
             t_end=np.full(n, 5.0),
             theta_error=np.full(n, 0.0 if at_limit else 1e-4),
@@ -86,9 +91,14 @@ def stand_in(ends: dict[int, tuple[Status, float]], asked: list[float]):
     return simulate
 
 
-def judged_by(folder: Path, ends: dict[int, tuple[Status, float]], asked: list[float]):
+def judged_by(
+    folder: Path,
+    ends: dict[int, tuple[Status, float]],
+    asked: list[float],
+    ways: dict[int, float] | None = None,
+):
     sweep = sweep_of(folder)
-    evaluation = replace(evaluation_of(sweep, accuracy_of(sweep)), simulate=stand_in(ends, asked))
+    evaluation = replace(evaluation_of(sweep, accuracy_of(sweep)), simulate=stand_in(ends, asked, ways))
     return evaluation.judged(designs_in(sweep).rows(slice(3, 4)))
 
 
@@ -122,6 +132,37 @@ def test_a_late_row_whose_peak_moves_by_more_than_its_error_is_refined_further(t
     found = judged_by(tmp_path, {0: (Status.SETTLED, 0.1), 1: (Status.SETTLED, 0.1 + 2e-4)}, asked)
     assert found.verdict[0] == PASS
     assert len(asked) == 2 + AGREEING
+
+
+FAR_M = 9.0
+"""Way of a truck whose cargo bed passes the boulder by more than P1 allows [m]."""
+
+
+def test_a_late_row_that_the_truck_penetrates_needs_a_finer_solution_that_agrees(tmp_path: Path) -> None:
+    asked: list[float] = []
+    found = judged_by(tmp_path, {0: (Status.SETTLED, 0.1)}, asked, dict.fromkeys(range(40), FAR_M))
+    assert (found.verdict[0], found.reason[0]) == (FAIL, REASONS.index("penetration"))
+    assert len(asked) == 2
+
+
+@pytest.mark.parametrize(("moved_m", "solutions"), [(0.9e-3, 2), (1.1e-3, 3)])
+def test_late_solutions_must_agree_on_the_way_of_the_truck(tmp_path: Path, moved_m: float, solutions: int) -> None:
+    """Each says that it is wrong by no more than a millimetre."""
+    asked: list[float] = []
+    ways = {0: FAR_M} | dict.fromkeys(range(1, 40), FAR_M + moved_m)
+    found = judged_by(tmp_path, {0: (Status.SETTLED, 0.1)}, asked, ways)
+    assert found.verdict[0] == FAIL
+    assert len(asked) == solutions
+
+
+def test_where_finer_solutions_do_not_agree_how_far_the_truck_gets_nothing_is_decided(tmp_path: Path) -> None:
+    asked: list[float] = []
+    ways = {level: FAR_M + 0.01 * level for level in range(40)}
+    found = judged_by(tmp_path, {0: (Status.SETTLED, 0.1)}, asked, ways)
+    assert (found.verdict[0], found.reason[0]) == (UNDECIDED, NUMERICAL_ERROR)
+    row = found.row(0)
+    assert row["rotation_error_deg"] is None
+    assert row["displacement_error_m"] is None
 
 
 REFUSED = (Status.WEAK_DAMPER, 0.0)

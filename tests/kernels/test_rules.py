@@ -31,8 +31,8 @@ from boulder_kernels.rules import (
     after_finer,
     after_slower,
     agree,
+    confirmations,
     is_asked_slower,
-    is_late,
     is_simulated,
     is_wanted,
     write_rulings,
@@ -98,8 +98,9 @@ def ruling(**changed):
         ({"d": 1.049, "x_b_max": 0.501}, VALIDITY),
         ({"d": 1.051, "x_b_max": 0.501}, PASSES),
         ({"d": 1.049, "x_b_max": 0.499}, PASSES),
-        # One of two solutions overturns: nothing is decided.
+        # One of two solutions overturns, or none confirms a late row: nothing is decided.
         ({"status": bk.Status.LIMIT, "theta_error": np.inf, "x_error": np.inf}, NUMERICAL_ERROR),
+        ({"x_v_max": 5.5, "theta_error": np.inf, "x_error": np.inf}, NUMERICAL_ERROR),
     ],
 )
 def test_each_rule_alone(changed, rule):
@@ -201,9 +202,9 @@ def test_what_is_asked_of_one_row_in_the_page_is_asked_of_many_in_a_table(contro
 
     def answers(before, after, status, t_end, unconfirmed, flag):
         row = Confirmation(unconfirmed, 0.006 + 0.004 * flag, flag)
-        late = plain(is_late)(after, t_end, control)
-        known, replaces = plain(after_finer)(row, before, after, np.logical_not(flag), late, control)
-        return (late, plain(is_wanted)(row, before, status, control), replaces, *known)
+        needed = plain(confirmations)(after, t_end, control)
+        known, replaces = plain(after_finer)(row, before, after, np.logical_not(flag), needed, control)
+        return (needed, plain(is_wanted)(row, before, status, control), replaces, *known)
 
     together = answers(*columns)
     alone = [answers(*combination) for combination in COMBINATIONS]
@@ -214,17 +215,18 @@ def test_what_is_asked_of_one_row_in_the_page_is_asked_of_many_in_a_table(contro
 @pytest.mark.parametrize(
     ("rule", "t_end", "control", "expected"),
     [
-        (PASSES, 1.5, CONTROL, True),
-        (OVERTURNS, 1.5, CONTROL, True),
-        (PASSES, 1.0, CONTROL, False),
-        (PENETRATION, 1.5, CONTROL, False),
-        (UNPROVED, 10.0, CONTROL, False),
-        (PASSES, 1.5, CONTROLS[1], False),
-        (PASSES, 1.5, CONTROL._replace(unloading=bk.PLASTIC, elements=50), False),
+        (PASSES, 1.5, CONTROL, AGREEING),
+        (OVERTURNS, 1.5, CONTROL, AGREEING),
+        (PASSES, 1.0, CONTROL, 0),
+        (PENETRATION, 1.5, CONTROL, 1),
+        (CRUSH, 1.5, CONTROL, 0),
+        (UNPROVED, 10.0, CONTROL, 0),
+        (PASSES, 1.5, CONTROLS[1], 0),
+        (PASSES, 1.5, CONTROL._replace(unloading=bk.PLASTIC, elements=50), 0),
     ],
 )
-def test_a_row_is_late_that_passes_or_overturns_past_the_horizon(rule, t_end, control, expected):
-    assert plain(is_late)(rule, t_end, control) == expected
+def test_a_row_that_passes_or_fails_past_the_horizon_needs_others_that_agree(rule, t_end, control, expected):
+    assert plain(confirmations)(rule, t_end, control) == expected
 
 
 def solution(**changed):
@@ -238,6 +240,10 @@ def solution(**changed):
         ({}, {"theta_max": 0.1 + 0.9e-5}, True),
         ({}, {"theta_max": 0.1 + 1.1e-5}, False),
         ({"theta_error": 0.0}, {"theta_max": 0.1 + 0.9e-6}, True),
+        ({}, {"x_b_max": 0.2 + 0.9e-4, "x_v_max": 2.0 + 0.9e-4}, True),
+        ({}, {"x_b_max": 0.2 + 1.1e-4}, False),
+        ({}, {"x_v_max": 2.0 + 1.1e-4}, False),
+        ({"x_error": 1e-3}, {"x_v_max": 2.0 + 0.9e-3}, True),
         ({}, {"x_error": np.inf}, False),
         ({}, {"status": bk.Status.LIMIT, "t_limit": 1.2}, False),
         ({"status": bk.Status.LIMIT, "t_limit": 1.2}, {"status": bk.Status.LIMIT, "t_limit": 1.2 + 0.9e-5}, True),

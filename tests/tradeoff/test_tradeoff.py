@@ -96,6 +96,14 @@ def test_the_best_way_keeps_to_what_is_wanted(found: Tradeoff) -> None:
     assert found.best(0.0, error_estimate=True) is None
 
 
+def test_steps_whose_error_is_not_known_cannot_be_asked_for_by_a_number() -> None:
+    """By a name they can."""
+    unknown, named = made(guarded(6.0), 1.0, 1e-4), made(guarded(12.0), 6.0, 4e-4, accuracy="balanced")
+    found = Tradeoff(grid(), (unknown, named), {}, ())
+    assert found.best(1e-2, error_estimate=True) == named
+    assert found.best(2e-4, error_estimate=True) is None
+
+
 MADE = [
     made(plain(8.0), 2.0, 5e-3),
     made(plain(2.0), 8.0, 5e-5),

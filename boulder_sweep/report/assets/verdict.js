@@ -43,7 +43,7 @@ function judge(results, row, inputs, rules) {
   const rating = rules.ratings.find(([, most]) => penetration <= most)?.[0] ?? null;
   const flags = Object.keys(rules.flags).filter((_, bit) => (of("flags") >> bit) & 1);
   /** @param {number} value @param {boolean} known */
-  const kept = (value, known = valid) => (known && !Number.isNaN(value) ? value : null);
+  const kept = (value, known = valid) => (known && Number.isFinite(value) ? value : null);
   return {
     verdict,
     reason,
