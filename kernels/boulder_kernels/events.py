@@ -44,8 +44,6 @@ EDGE_TOLERANCE = 1e-5
 may graze one of them."""
 NEWTON_TOLERANCE = 1e-6
 """Last correction of a root by Newton's method, as a fraction of the step: its square is what is left."""
-RETURN_STEPS = 4
-"""Steps of Newton's method to the end of a swing that has begun on the base."""
 JUST_AFTER = 1e-3
 """Fraction of the step, and then its square, at which a search begins whose gap is not positive at the start."""
 AT_ONCE = 1e-5
@@ -195,23 +193,6 @@ def newton(
 
 
 @inlined
-def return_to_base(q: Track) -> float:
-    """Fraction of a step at which a rotation that starts at zero is zero again.
-
-    That is where the rotation over the fraction is zero, which begins with the angular velocity and hardly bends. The
-    rotation itself would lead back to the start: where the net moment nearly balances the weight on one side, the swing
-    to the other side takes less than a hundredth of a step.
-    """
-    end = displacement_at(q, 1.0)
-    tau = q.x1 / (q.x1 - end) if q.x1 != end else 1.0
-    for _ in range(RETURN_STEPS):
-        value = q.x1 + tau * (q.x2 + tau * (q.x3 + tau * (q.x4 + tau * q.x5)))
-        slope = q.x2 + tau * (2.0 * q.x3 + tau * (3.0 * q.x4 + tau * (4.0 * q.x5)))
-        tau = min(max(tau - (value / slope if slope != 0.0 else 0.0), 0.0), 1.0)
-    return tau
-
-
-@inlined
 def refined(event: float, tau: float, b: Bracket, g: GapFactors, dense: DenseOutput) -> float:
     """Fraction of a step at which the forces jump, or the limit is reached, by Newton's method on the rotation.
 
@@ -231,10 +212,8 @@ def refined(event: float, tau: float, b: Bracket, g: GapFactors, dense: DenseOut
     exact = newton(tau, b.low, b.high, a_0, a_theta, a_omega, dense)
     exact = newton(exact, b.low, b.high, a_0, a_theta, a_omega, dense)
     exact = newton(exact, b.low, b.high, a_0, a_theta, a_omega, dense)
-    # A search that has closed on its start stays there, but where the boulder has just passed its base.
-    exact = exact if (corner | limit | rotation) & (b.f_low > 0.0) else tau
-    passed = (event == ROTATION) & (dense.rotation.x0 == 0.0) & (g.rotation_theta * dense.rotation.x1 > 0.0)
-    return return_to_base(dense.rotation) if passed else exact
+    # A search that has closed on its start stays there.
+    return exact if (corner | limit | rotation) & (b.f_low > 0.0) else tau
 
 
 @inlined
