@@ -49,8 +49,6 @@ class Motion:
     record: Record
     outcome: Outcome
     """Of the whole motion that was recorded, beyond the limit."""
-    decided: Outcome
-    """Up to where the row of the design ends, at the limit or with a proof."""
     second: SecondSpring | None = None
 
     @property

@@ -10,13 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from boulder_kernels import Control, Outcome, Readings, Record, no_record
+from boulder_kernels import SIMULATED, Control, Outcome, Readings, Record, Status, no_record
+from boulder_kernels.impact import simulate_last_resort
 from boulder_kernels.table import halved, is_layered, is_paired, problem_at, simulate_impact, step_of_solution
 from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS, SECOND_SPRING_COLUMNS
 from boulder_sweep.impact.history import Motion
 from boulder_sweep.impact.trajectory import Trajectory
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
+from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import Judged
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.judge.refinement import finer_controls, reported_step_s
@@ -125,16 +127,16 @@ def history_of(
     block = sweep.block(design_id, design_id + 1)
     inputs = {name: float(column.to_numpy()[0]) for name, column in block.columns.items()}
     designs = evaluation.designs(block)
-    row, how, springs = judged.row(0), evaluation.readings, designs.springs
-    decided = _deciding(evaluation.control, how, row["step_s"], layered=is_layered(designs.table))
-    drawn = decided._replace(stop_at_limit=False, horizon=_drawn_s(row, decided.horizon))
+    row, how = judged.row(0), evaluation.readings
+    deciding = _deciding(evaluation.control, how, row["step_s"], layered=is_layered(designs.table))
+    drawn = deciding._replace(stop_at_limit=False, horizon=_drawn_s(row, deciding.horizon))
     times = _sample_times(drawn.horizon, sample_s)
     record = _empty_record(times)
-    problem = problem_at(designs.table, 0, drawn, springs, len(record.times))
+    problem = problem_at(designs.table, 0, drawn, designs.springs, len(record.times))
     outcome, c, *_ = simulate_impact(problem, how, drawn, record)
-    until = simulate_impact(problem_at(designs.table, 0, decided, springs), how, decided, no_record()).outcome
-    motion = Motion(problem.design, how, c, drawn, _kept(record, times, outcome), outcome, until, problem.second)
-    return Trajectory.of(sweep.name, design_id, inputs, sweep.resolved(), motion, judged)
+    motion = Motion(problem.design, how, c, drawn, _kept(record, times, outcome), outcome, problem.second)
+    decided = _decided(designs, how, deciding)
+    return Trajectory.of(sweep.name, design_id, inputs, sweep.resolved(), motion, judged, decided)
 
 
 def _as_sweep(design: Sweep | str | Path | Mapping[str, Any]) -> Sweep:
@@ -199,6 +201,15 @@ def _deciding(control: Control, how: Readings, step_s: float | None, *, layered:
     control = control._replace(refined=control.error_estimate)
     checked = control.error_estimate and not is_paired(how, control, layered=layered)
     return halved(control) if checked and step_s not in (None, step_of_solution(control)) else control
+
+
+def _decided(designs: Designs, how: Readings, control: Control) -> Outcome:
+    """Return the impact up to where its row ends."""
+    problem = problem_at(designs.table, 0, control, designs.springs)
+    outcome = simulate_impact(problem, how, control, no_record()).outcome
+    if control.last_resort and problem.profile is None and outcome.status not in (*SIMULATED, Status.NO_CONTACT):
+        outcome = simulate_last_resort(problem, how, control, no_record())
+    return outcome
 
 
 def _drawn_s(row: Mapping[str, Any], horizon: float) -> float:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from boulder_kernels import Outcome
 from boulder_sweep.columns import ColumnSpec
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import HistoryFileError
@@ -126,8 +127,10 @@ class Trajectory:
         Modes of the motion in words, see `boulder_sweep.impact.history.MODE_NAMES`; ``touching`` or ``coasting``.
     judged : Judged
         The outcome columns of its row of a table; `row` as plain data.
+    decided : Outcome
+        The impact up to where that row ends, at the limit or with a proof: when its maxima are reached.
     motion : Motion
-        What the kernels were given and what they returned.
+        What the kernels were given and what they returned, for the whole time.
     """
 
     name: str
@@ -151,6 +154,7 @@ class Trajectory:
     rotation_mode: np.ndarray
     in_contact: np.ndarray
     judged: Judged
+    decided: Outcome
     motion: Motion
 
     @classmethod
@@ -162,6 +166,7 @@ class Trajectory:
         settings: dict[str, Any],
         motion: Motion,
         judged: Judged,
+        decided: Outcome,
     ) -> Trajectory:
         """Work out the whole time history from what the kernels recorded."""
         record, c = motion.record, motion.constants
@@ -185,6 +190,7 @@ class Trajectory:
             rotation_mode=np.array([MODE_NAMES[int(mode)] for mode in record.turning], dtype=object),
             in_contact=np.where(record.touching, "touching", "coasting").astype(object),
             judged=judged,
+            decided=decided,
             motion=motion,
         )
 
@@ -231,7 +237,7 @@ class Trajectory:
             result[name] = value
             if name in _PEAK_TIMES:
                 key, field = _PEAK_TIMES[name]
-                result[key] = _plain(getattr(self.motion.decided.maxima, field))
+                result[key] = _plain(getattr(self.decided.maxima, field))
         model = self.settings["model"]
         result["energy_residual"] = _plain(self.energy().largest_residual)
         return result | {"preset": model["preset"], "readings": model["readings"], "soil": model["soil"]}

@@ -90,7 +90,7 @@ def unreliable_from(trajectory: Trajectory) -> tuple[float, str]:
     str
         What makes the time after it unreliable.
     """
-    maxima, reached = trajectory.motion.decided.maxima, trajectory.row["time_to_limit_s"]
+    maxima, reached = trajectory.decided.maxima, trajectory.row["time_to_limit_s"]
     if reached is not None:
         limit = math.degrees(trajectory.motion.control.theta_limit)
         return reached, f"shaded: beyond {limit:g}° the model no longer holds"
@@ -177,7 +177,7 @@ def _legend_above(axes: Axes) -> None:
 
 
 def _peaks(rotation: Axes, force: Axes, boulder: Axes, vehicle: Axes, trajectory: Trajectory, units: str) -> None:
-    m, row = trajectory.motion.decided.maxima, trajectory.row
+    m, row = trajectory.decided.maxima, trajectory.row
     # The largest |rotation| may be a backward one.
     at = np.interp(m.t_theta, trajectory.time_s, trajectory.rotation_rad)
     theta, force_N = row["max_rotation_deg"], 1e3 * row["peak_force_kN"]
