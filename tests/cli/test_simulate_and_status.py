@@ -41,7 +41,7 @@ def test_sentence_json_and_film_state_the_row_that_run_writes(sweep, tmp_path):
     sentence = "late: PASS, 15.6° of 20° allowed, simulated for 2 s"
     film = tmp_path / "late.html"
     assert sweep("simulate", tmp_path / "late.yaml", "--animate", film, "-q")[1].splitlines()[0] == sentence
-    assert sentence in film.read_text(encoding="utf-8")
+    assert json.dumps(sentence) in film.read_text(encoding="utf-8")
     found = json.loads(sweep("simulate", tmp_path / "late.yaml", "--json", "-q")[1])
     for name in ("verdict", "max_rotation_deg", "max_displacement_m", "margin", "end_time_s", "step_s"):
         assert found[name] == row[name], name

@@ -220,7 +220,7 @@ def test_a_late_overturn_is_seen() -> None:
     assert reached == found.row["end_time_s"] == pytest.approx(3.5564, abs=2e-4)
     assert found.time_s[-1] > reached + 0.2
     assert np.degrees(np.interp(reached, found.time_s, found.rotation_rad)) == pytest.approx(20.0, abs=0.05)
-    assert np.degrees(found.rotation_rad.max()) > 40.0
+    assert np.degrees(found.rotation_rad.max()) > 20.5
     assert unreliable_from(found) == (reached, "shaded: beyond 20° the model no longer holds")
     short = simulate(late, horizon_s=0.1)
     assert short.time_s[-1] >= short.row["end_time_s"] > 0.1
