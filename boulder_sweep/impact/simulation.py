@@ -213,7 +213,7 @@ def _decided(designs: Designs, how: Readings, control: Control) -> Outcome:
 
 
 def _drawn_s(row: Mapping[str, Any], horizon: float) -> float:
-    """Return how long a time history is [s]: to the horizon, or as long as its row was simulated, and past the limit."""
+    """Return how long a time history is [s]: to the horizon, as long as its row was simulated, and past the limit."""
     end = row["end_time_s"] or 0.0
     return max(horizon, end if row["time_to_limit_s"] is None else end + SEEN_AFTER * horizon)
 
