@@ -237,7 +237,7 @@ def impact_lines(row: Mapping[str, Any], history: Trajectory, units: str = "si")
         lines = [
             f"  rotation: {row['max_rotation_deg']:.4g} deg of {limit:g} deg allowed, "
             f"{1 - row['max_rotation_deg'] / limit:.1%} below, "
-            f"{1e3 * history.motion.outcome.maxima.t_theta:.0f} ms after contact",
+            f"{1e3 * history.decided.maxima.t_theta:.0f} ms after contact",
             f"  penetration: {metres(row['penetration_m'])}, {rating} allows "
             f"{metres(PENETRATION_LIMITS_M[rating], digits='.3g')} beyond the far face",
             f"  displacement: boulder {metres(row['max_displacement_m'], digits='.3g')}, "

@@ -48,6 +48,7 @@ class Motion:
     control: Control
     record: Record
     outcome: Outcome
+    """Of the whole motion that was recorded, beyond the limit."""
     second: SecondSpring | None = None
 
     @property

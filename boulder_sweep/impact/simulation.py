@@ -10,34 +10,21 @@ from typing import Any
 
 import numpy as np
 
-from boulder_kernels import (
-    Control,
-    Design,
-    DesignTable,
-    Outcome,
-    OutcomeTable,
-    Readings,
-    Record,
-    no_record,
-)
-from boulder_kernels.design import design_at
-from boulder_kernels.error_estimates import SAFETY, SAFETY_PRINTED, estimate_errors, step_errors
-from boulder_kernels.outcomes import empty_outcomes, outcome_table, write_outcome
+from boulder_kernels import SIMULATED, Control, Outcome, Readings, Record, Status, no_record
+from boulder_kernels.impact import simulate_last_resort
 from boulder_kernels.table import halved, is_layered, is_paired, problem_at, simulate_impact, step_of_solution
-from boulder_sweep.columns import AT_REST, BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS, SECOND_SPRING_COLUMNS
+from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS, SECOND_SPRING_COLUMNS
 from boulder_sweep.impact.history import Motion
 from boulder_sweep.impact.trajectory import Trajectory
-from boulder_sweep.judge.accuracy import accuracy_of, readings_of
-from boulder_sweep.judge.evaluation import evaluation_of
-from boulder_sweep.judge.inputs import designs_of
-from boulder_sweep.judge.judged import ERROR, OVERTURNS, Judged
+from boulder_sweep.judge.accuracy import accuracy_of
+from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
+from boulder_sweep.judge.inputs import Designs
+from boulder_sweep.judge.judged import Judged
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.judge.refinement import finer_controls, reported_step_s
-from boulder_sweep.judge.verdict import judge
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.fields import FIELDS
 from boulder_sweep.settings.model import Model, ReadingChoice, SolverSettings
-from boulder_sweep.soils import plain
 from boulder_sweep.stones.rock import ROCK_KG_M3
 
 __all__ = ["Trajectory", "simulate"]
@@ -45,12 +32,8 @@ __all__ = ["Trajectory", "simulate"]
 SAMPLE_S = 0.0005
 """Time between two samples of a trajectory [s]."""
 MOST_SAMPLES = 1_000_000
-_DECIDED = (
-    *("verdict", "reason", "margin", "rating", "time_to_limit_s", "overlap_m", "validity", "step_s"),
-    *("robustness", "stands_under"),
-)
-"""Columns that are those of a row of ``sweep run``, which stops at the limit."""
-_ERRORS = ("rotation_error_deg", "displacement_error_m")
+SEEN_AFTER = 0.5
+"""A boulder that overturns is shown for at least this share of the horizon beyond its limit."""
 BEFORE_THE_END = 1.0 - 1e-14
 """The last sample is taken this close to the end, so that rounding cannot place it after the end."""
 
@@ -68,7 +51,7 @@ def simulate(
     horizon_s: float | None = None,
     sample_s: float = SAMPLE_S,
 ) -> Trajectory:
-    """Simulate one design with its time history, beyond the rotation limit: to the horizon or half a turn.
+    """Simulate one design: its row of ``sweep run``, and its time history, beyond the rotation limit.
 
     Parameters
     ----------
@@ -106,41 +89,54 @@ def simulate(
 
     Notes
     -----
-    A row of ``sweep run`` stops where the rotation reaches its limit, and as soon as it is proved that nothing
-    reported can still grow. This simulation does neither, so for a boulder that overturns the maxima are those
-    of the whole time and not those up to the limit. Verdict, reason and time to the limit follow the same
-    rules and agree. (Not where a design is so stiff, thousands of times what is met in practice, that it needs more
-    steps than are allowed beyond the limit and not before it: it is refused here.) Beyond the limit the model no
-    longer holds: what is shown there is how it goes wrong.
+    What is said of the design is its row of ``sweep run``, from the same function: verdict, reason, margin, maxima up
+    to ``end_time_s``, where the rotation has reached its limit or nothing can grow any more. The arrays go on: to the
+    horizon, past the limit up to half a turn, and at least as long as the row was simulated. Beyond the limit the model
+    no longer holds: what is shown there is how it goes wrong. A design so stiff, thousands of times what is met in
+    practice, that its row was simulated as a last resort has no samples.
     """
     sweep = _as_sweep(design)
     sweep = at_values(sweep)
     sweep = _changed(sweep, readings, soil_elements, step_s, horizon_s)
     block = sweep.block(design_id, design_id + 1)
-    inputs = {name: float(column.to_numpy()[0]) for name, column in block.columns.items()}
     if block.reasons[0]:
         raise ValueError(f"design {design_id} cannot be computed: {block.reasons[0]}")
-    designs = designs_of(block, None, sweep.model)
-    one, how = design_at(designs.table, 0), readings_of(sweep)
     evaluation = evaluation_of(sweep, accuracy_of(sweep)).asked()
-    decided = evaluation.judged(designs)
-    layered = is_layered(designs.table)
-    control = _control(evaluation.control, how, float(decided["step_s"][0]), layered=layered)
-    times = _sample_times(control.horizon, sample_s)
+    return history_of(sweep, design_id, evaluation, evaluation(block), sample_s)
+
+
+def history_of(
+    sweep: Sweep, design_id: int, evaluation: Evaluation, judged: Judged, sample_s: float = SAMPLE_S
+) -> Trajectory:
+    """Return the time history of a design whose row is known.
+
+    Parameters
+    ----------
+    sweep, design_id
+        The design, one that can be computed.
+    evaluation, judged
+        How its row was simulated, and the row.
+    sample_s
+        Time between two samples [s].
+
+    Raises
+    ------
+    ValueError
+        There would be too many samples, or `sample_s` is not positive.
+    """
+    block = sweep.block(design_id, design_id + 1)
+    inputs = {name: float(column.to_numpy()[0]) for name, column in block.columns.items()}
+    designs = evaluation.designs(block)
+    row, how = judged.row(0), evaluation.readings
+    deciding = _deciding(evaluation.control, how, row["step_s"], layered=is_layered(designs.table))
+    drawn = deciding._replace(stop_at_limit=False, horizon=_drawn_s(row, deciding.horizon))
+    times = _sample_times(drawn.horizon, sample_s)
     record = _empty_record(times)
-    problem = problem_at(designs.table, 0, control, designs.springs, len(record.times))
-    outcome, c, *_ = simulate_impact(problem, how, control, record)
-    row = _outcome_row(outcome, one, control)
-    if control.error_estimate and is_paired(how, control, layered=layered):
-        coarser = control._replace(refined=False)
-        alike = problem_at(designs.table, 0, coarser, designs.springs)
-        other = simulate_impact(alike, how, coarser, no_record()).outcome
-        _estimate(row, _outcome_row(other, one, coarser), plain(designs.table), how)
-    judged = judge(row, designs, evaluation.limits)
-    if judged.verdict[0] != ERROR:
-        judged = _as_decided(judged, decided)
-    motion = Motion(one, how, c, control, _kept(record, times, outcome), outcome, problem.second)
-    return Trajectory.of(sweep.name, design_id, inputs, sweep.resolved(), motion, judged)
+    problem = problem_at(designs.table, 0, drawn, designs.springs, len(record.times))
+    outcome, c, *_ = simulate_impact(problem, how, drawn, record)
+    motion = Motion(problem.design, how, c, drawn, _kept(record, times, outcome), outcome, problem.second)
+    decided = _decided(designs, how, deciding)
+    return Trajectory.of(sweep.name, design_id, inputs, sweep.resolved(), motion, judged, decided)
 
 
 def _as_sweep(design: Sweep | str | Path | Mapping[str, Any]) -> Sweep:
@@ -197,25 +193,29 @@ def _changed(
     return dataclasses.replace(sweep, model=model, solver=solver)
 
 
-def _control(control: Control, how: Readings, step_s: float, *, layered: bool) -> Control:
-    """How the time history is integrated: by the step that decided the row [s], and beyond the limit."""
+def _deciding(control: Control, how: Readings, step_s: float | None, *, layered: bool) -> Control:
+    """Return how the solution was computed that decided a row, by its step [s]; None where nothing was integrated."""
     for finer in finer_controls(control):
         if reported_step_s(finer) == step_s:
             control = finer
-    control = control._replace(stop_at_limit=False, refined=control.error_estimate)
+    control = control._replace(refined=control.error_estimate)
     checked = control.error_estimate and not is_paired(how, control, layered=layered)
-    return halved(control) if checked and step_of_solution(control) != step_s else control
+    return halved(control) if checked and step_s not in (None, step_of_solution(control)) else control
 
 
-def _as_decided(judged: Judged, decided: Judged) -> Judged:
-    """Return the maxima of the whole time history with the verdict of a row of ``sweep run``.
+def _decided(designs: Designs, how: Readings, control: Control) -> Outcome:
+    """Return the impact up to where its row ends."""
+    problem = problem_at(designs.table, 0, control, designs.springs)
+    outcome = simulate_impact(problem, how, control, no_record()).outcome
+    if control.last_resort and problem.profile is None and outcome.status not in (*SIMULATED, Status.NO_CONTACT):
+        outcome = simulate_last_resort(problem, how, control, no_record())
+    return outcome
 
-    Unless the boulder overturns the maxima are the same, and so are their errors.
-    """
-    errors = () if decided.reason[0] == OVERTURNS else _ERRORS
-    names = (*_DECIDED, *errors, *(spec.name for spec in AT_REST if spec.name in decided.columns))
-    columns = judged.columns | {name: decided[name] for name in names}
-    return Judged(columns, judged.words | {name: decided.words[name] for name in _DECIDED if name in decided.words})
+
+def _drawn_s(row: Mapping[str, Any], horizon: float) -> float:
+    """Return how long a time history is [s]: to the horizon, as long as its row was simulated, and past the limit."""
+    end = row["end_time_s"] or 0.0
+    return max(horizon, end if row["time_to_limit_s"] is None else end + SEEN_AFTER * horizon)
 
 
 def _sample_times(horizon: float, sample_s: float) -> np.ndarray:
@@ -234,21 +234,6 @@ def _empty_record(times: np.ndarray) -> Record:
     asked = np.minimum(times, times[-1] * BEFORE_THE_END)
     states, exchanged = np.full((n, 6), np.nan), np.full((n, 4), np.nan)
     return Record(asked, states, np.zeros(n, np.int8), np.zeros(n, np.bool_), exchanged, np.zeros(n))
-
-
-def _outcome_row(outcome: Outcome, design: Design, control: Control) -> OutcomeTable:
-    """Return one outcome as a table of one row, with the error of its steps."""
-    row = empty_outcomes(1)
-    write_outcome(row, 0, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
-    return outcome_table(row, step_of_solution(control))
-
-
-def _estimate(row: OutcomeTable, coarser: OutcomeTable, table: DesignTable, how: Readings) -> None:
-    """Write the numerical errors of a row, by the same rule as for the rows of a sweep."""
-    estimate_errors(coarser, row, table, SAFETY if how.restoring_gravity else SAFETY_PRINTED)
-    if math.isnan(coarser.t_limit[0]) != math.isnan(row.t_limit[0]):
-        # That rule tells by the status which solution reached the limit; here they go on beyond it.
-        row.theta_error[0] = row.x_error[0] = math.inf
 
 
 def _kept(record: Record, times: np.ndarray, outcome: Outcome) -> Record:

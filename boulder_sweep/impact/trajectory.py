@@ -1,4 +1,4 @@
-"""The time history of one impact: arrays in SI units, the register of its columns, summary, drawings and files."""
+"""One impact: its row of a table, its time history as arrays in SI units, their register, drawings and files."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from boulder_kernels import Outcome
 from boulder_sweep.columns import ColumnSpec
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import HistoryFileError
@@ -89,7 +90,7 @@ _BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in (*HISTORY, *ENERG
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """One impact over time. Made by `boulder_sweep.simulate`.
+    """One impact: its row of a table, and how it goes over time. Made by `boulder_sweep.simulate`.
 
     Arrays have the shape (n,), one value per sample, in SI units and radians; n is 0 where nothing moved because
     the truck passes over the boulder, or where the design could not be computed.
@@ -125,9 +126,11 @@ class Trajectory:
     rotation_mode, in_contact : ndarray of str
         Modes of the motion in words, see `boulder_sweep.impact.history.MODE_NAMES`; ``touching`` or ``coasting``.
     judged : Judged
-        The outcome columns of this one row.
+        The outcome columns of its row of a table; `row` as plain data.
+    decided : Outcome
+        The impact up to where that row ends, at the limit or with a proof: when its maxima are reached.
     motion : Motion
-        What the kernels were given and what they returned.
+        What the kernels were given and what they returned, for the whole time.
     """
 
     name: str
@@ -151,6 +154,7 @@ class Trajectory:
     rotation_mode: np.ndarray
     in_contact: np.ndarray
     judged: Judged
+    decided: Outcome
     motion: Motion
 
     @classmethod
@@ -162,6 +166,7 @@ class Trajectory:
         settings: dict[str, Any],
         motion: Motion,
         judged: Judged,
+        decided: Outcome,
     ) -> Trajectory:
         """Work out the whole time history from what the kernels recorded."""
         record, c = motion.record, motion.constants
@@ -185,6 +190,7 @@ class Trajectory:
             rotation_mode=np.array([MODE_NAMES[int(mode)] for mode in record.turning], dtype=object),
             in_contact=np.where(record.touching, "touching", "coasting").astype(object),
             judged=judged,
+            decided=decided,
             motion=motion,
         )
 
@@ -198,21 +204,26 @@ class Trajectory:
         return f"<Trajectory {printable(self.name)} design {self.design_id}: {len(self)} samples, {words}>"
 
     @property
+    def row(self) -> dict[str, Any]:
+        """The outcome columns of its row of a table, as plain data; None for no value."""
+        return self.judged.row(0)
+
+    @property
     def verdict(self) -> str:
         """``pass``, ``fail``, ``undecided`` or ``error``."""
-        return str(self.judged.row(0)["verdict"])
+        return str(self.row["verdict"])
 
     @property
     def reason(self) -> str:
         """Why; empty for a pass."""
-        return str(self.judged.row(0)["reason"])
+        return str(self.row["reason"])
 
     def energy(self) -> EnergyLedger:
         """Return where the vehicle's energy is at every sample."""
         return ledger_of(self.motion)
 
     def summary(self) -> dict[str, Any]:
-        """Return the outcome in the names and units of the table, with the times of the maxima.
+        """Return the row of the table in its names and units, with the times of the maxima.
 
         Returns
         -------
@@ -222,11 +233,11 @@ class Trajectory:
             the representation of the soil close it.
         """
         result: dict[str, Any] = {"name": self.name, "design_id": self.design_id}
-        for name, value in self.judged.row(0).items():
+        for name, value in self.row.items():
             result[name] = value
             if name in _PEAK_TIMES:
                 key, field = _PEAK_TIMES[name]
-                result[key] = _plain(getattr(self.motion.outcome.maxima, field))
+                result[key] = _plain(getattr(self.decided.maxima, field))
         model = self.settings["model"]
         result["energy_residual"] = _plain(self.energy().largest_residual)
         return result | {"preset": model["preset"], "readings": model["readings"], "soil": model["soil"]}

@@ -49,7 +49,7 @@ def draw_still(trajectory: Trajectory, path: str | Path, *, time_s: float | None
         There is nothing to draw, or the picture cannot be written.
     """
     require_samples(trajectory)
-    when = trajectory.motion.outcome.maxima.t_F_v if time_s is None else time_s
+    when = trajectory.decided.maxima.t_F_v if time_s is None else time_s
     sample = int(np.argmin(np.abs(trajectory.time_s - when)))
     view = SideView(trajectory)
     with pictures.figure(path, WIDTH_IN, height_of(view)) as fig:

@@ -74,6 +74,8 @@ def require_samples(trajectory: Trajectory) -> None:
     """Refuse a trajectory without samples, with the reason."""
     if len(trajectory) == 0:
         why = "the truck passes over the boulder" if trajectory.reason == "no_contact" else trajectory.reason
+        if trajectory.row["max_rotation_deg"] is not None:
+            why = "the design needs more steps than are allowed beyond the limit"
         raise PictureError(f"there is no motion to draw: {why}")
 
 
@@ -88,13 +90,13 @@ def unreliable_from(trajectory: Trajectory) -> tuple[float, str]:
     str
         What makes the time after it unreliable.
     """
-    outcome = trajectory.motion.outcome
-    if math.isfinite(outcome.t_limit):
+    maxima, reached = trajectory.decided.maxima, trajectory.row["time_to_limit_s"]
+    if reached is not None:
         limit = math.degrees(trajectory.motion.control.theta_limit)
-        return outcome.t_limit, f"shaded: beyond {limit:g}° the model no longer holds"
+        return reached, f"shaded: beyond {limit:g}° the model no longer holds"
     if trajectory.settings["model"].get("unloading") in PLASTIC_UNLOADINGS:
         return math.inf, ""
-    peak = max(outcome.maxima.t_theta, outcome.maxima.t_x_b)
+    peak = max(maxima.t_theta, maxima.t_x_b)
     return peak, "shaded: rebound (the soil of the model has no memory)"
 
 
@@ -102,7 +104,7 @@ def shade_unreliable(axes: Axes, trajectory: Trajectory) -> None:
     """Shade the time from the rotation limit, or from the peak, to the end."""
     start, end = unreliable_from(trajectory)[0], float(trajectory.time_s[-1])
     if start < end:
-        colour = BEYOND_LIMIT if math.isfinite(trajectory.motion.outcome.t_limit) else AFTER_PEAK
+        colour = AFTER_PEAK if trajectory.row["time_to_limit_s"] is None else BEYOND_LIMIT
         axes.axvspan(start, end, color=colour, zorder=-2, linewidth=0)
 
 
@@ -175,15 +177,16 @@ def _legend_above(axes: Axes) -> None:
 
 
 def _peaks(rotation: Axes, force: Axes, boulder: Axes, vehicle: Axes, trajectory: Trajectory, units: str) -> None:
-    m = trajectory.motion.outcome.maxima
+    m, row = trajectory.decided.maxima, trajectory.row
     # The largest |rotation| may be a backward one.
     at = np.interp(m.t_theta, trajectory.time_s, trajectory.rotation_rad)
-    theta = math.copysign(math.degrees(m.theta), float(at))
-    pictures.mark_peak(rotation, m.t_theta, theta, f"{abs(theta):.2f}°", BLUE)
+    theta, force_N = row["max_rotation_deg"], 1e3 * row["peak_force_kN"]
+    pictures.mark_peak(rotation, m.t_theta, math.copysign(theta, float(at)), f"{theta:.2f}°", BLUE)
     (force_unit, force_size), (unit, size) = sized("N", units), sized("m", units)
-    pictures.mark_peak(force, m.t_F_v, m.F_v / force_size, f"{m.F_v / force_size:.0f} {force_unit}", ORANGE)
-    pictures.mark_peak(boulder, m.t_x_b, m.x_b / size, f"{m.x_b / size:.3f} {unit}", BLUE, below=True)
-    pictures.mark_peak(vehicle, m.t_x_v, m.x_v / size, f"{m.x_v / size:.3f} {unit}", ORANGE)
+    pictures.mark_peak(force, m.t_F_v, force_N / force_size, f"{force_N / force_size:.0f} {force_unit}", ORANGE)
+    x_b, x_v = row["max_displacement_m"] / size, row["max_vehicle_displacement_m"] / size
+    pictures.mark_peak(boulder, m.t_x_b, x_b, f"{x_b:.3f} {unit}", BLUE, below=True)
+    pictures.mark_peak(vehicle, m.t_x_v, x_v, f"{x_v:.3f} {unit}", ORANGE)
 
 
 LAYERS = (
@@ -270,8 +273,8 @@ def draw_energy(trajectory: Trajectory, path: str | Path, *, units: str = "si") 
 
 def _mark_limit(axes: Axes, trajectory: Trajectory) -> None:
     """Mark the time of the rotation limit."""
-    when = trajectory.motion.outcome.t_limit
-    if math.isfinite(when):
+    when = trajectory.row["time_to_limit_s"]
+    if when is not None:
         axes.axvline(when, color=BLACK, linestyle=":", linewidth=1.2)
         limit = math.degrees(trajectory.motion.control.theta_limit)
         words = f" {limit:g}°: beyond, the model no longer holds"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.columns import BY_NAME
@@ -117,16 +116,18 @@ NOT_A_TEST = "Simulation, not a rating by test"
 
 
 def verdict_line(trajectory: Trajectory) -> str:
-    """Name, verdict, and what decides it: ``rwg: PASS, 13.8° of 20° allowed``."""
-    limit = math.degrees(trajectory.motion.control.theta_limit)
-    theta = math.degrees(trajectory.motion.outcome.maxima.theta)
-    name = trajectory.name if trajectory.settings["n_designs"] == 1 else f"{trajectory.name} #{trajectory.design_id}"
-    reason = trajectory.reason
-    if reason == "overturns":
-        detail = f"past {limit:g}° after {trajectory.motion.outcome.t_limit:.3f} s"
+    """Name, verdict, and what decides it, by the row of the table: ``rwg: PASS, 13.8° of 20° allowed``."""
+    row, settings = trajectory.row, trajectory.settings
+    limit = settings["criterion"]["max_rotation_deg"]
+    name = trajectory.name if settings["n_designs"] == 1 else f"{trajectory.name} #{trajectory.design_id}"
+    if row["time_to_limit_s"] is not None:
+        details = [f"past {limit:g}° after {row['time_to_limit_s']:.3f} s"]
     else:
-        detail = "" if math.isnan(theta) else f"{theta:.1f}° of {limit:g}° allowed"
-    words = (trajectory.verdict.upper(), REASON_WORDS.get(reason, reason), detail)
+        theta, end = row["max_rotation_deg"], row["end_time_s"]
+        details = [] if theta is None else [f"{theta:.1f}° of {limit:g}° allowed"]
+        if end is not None and end > settings["solver"]["horizon_s"]:
+            details.append(f"simulated for {end:.4g} s")
+    words = (trajectory.verdict.upper(), REASON_WORDS.get(trajectory.reason, trajectory.reason), *details)
     return f"{name}: {', '.join(word for word in words if word)}"
 
 
@@ -172,7 +173,7 @@ def design_line(trajectory: Trajectory, units: str = "si") -> str:
             model_words(trajectory.settings, units),
         )
     )
-    flags = str(trajectory.judged.row(0)["validity"] or "")
+    flags = str(trajectory.row["validity"] or "")
     outside = f" · Outside what the model was tested on: {flags_text(flags)}" if flags else ""
     return f"{words}\n{NOT_A_TEST}{outside}"
 

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+import boulder_sweep
+
 CONFIGS = Path(__file__).parents[2] / "configs"
 
 
@@ -16,8 +18,8 @@ CONFIGS = Path(__file__).parents[2] / "configs"
     [
         ("rwg", "corrected", "pass", 13.7612, 0.2820),
         ("rwg", "as_printed", "undecided", 7.6940, 0.1505),
-        ("abg", "corrected", "fail", 157.742, 1.4096),
-        ("abg", "as_printed", "fail", 114.258, 1.6555),
+        ("abg", "corrected", "fail", 20.0, 0.1924),
+        ("abg", "as_printed", "fail", 20.0, 0.2206),
     ],
 )
 def test_the_crash_tests(sweep, case, preset, verdict, rotation, displacement):
@@ -28,6 +30,22 @@ def test_the_crash_tests(sweep, case, preset, verdict, rotation, displacement):
     assert found["preset"] == preset
     assert found["max_rotation_deg"] == pytest.approx(rotation, abs=0.02)
     assert found["max_displacement_m"] == pytest.approx(displacement, abs=5e-4)
+
+
+def test_sentence_json_and_film_state_the_row_that_run_writes(sweep, tmp_path):
+    """A boulder that the horizon of one second finds at 11 deg; it comes to rest in the second after."""
+    late = Path(__file__).parents[1] / "judge" / "settles_late.csv"
+    (tmp_path / "late.yaml").write_text(f"name: late\ntable: {late}\n")
+    assert sweep("run", tmp_path / "late.yaml", "-o", tmp_path / "late.sweep", "-q")[0] == 0
+    row = boulder_sweep.read(tmp_path / "late.sweep").iloc[0]
+    sentence = "late: PASS, 15.6° of 20° allowed, simulated for 2 s"
+    film = tmp_path / "late.html"
+    assert sweep("simulate", tmp_path / "late.yaml", "--animate", film, "-q")[1].splitlines()[0] == sentence
+    assert json.dumps(sentence) in film.read_text(encoding="utf-8")
+    found = json.loads(sweep("simulate", tmp_path / "late.yaml", "--json", "-q")[1])
+    for name in ("verdict", "max_rotation_deg", "max_displacement_m", "margin", "end_time_s", "step_s"):
+        assert found[name] == row[name], name
+    assert found["max_rotation_deg"] == pytest.approx(15.562, abs=1e-3)
 
 
 def test_the_ground_is_named_unless_quiet_is_asked_for(sweep):

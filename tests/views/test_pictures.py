@@ -67,11 +67,11 @@ def test_time_after_the_limit_is_shaded(held: Trajectory, overturned: Trajectory
 def test_the_rebound_is_shaded(held: Trajectory, overturned: Trajectory, tmp_path: Path) -> None:
     """The springs of the soil have no memory: what they do after the peak is not to be relied on."""
     start, words = unreliable_from(held)
-    assert start == max(held.motion.outcome.maxima.t_theta, held.motion.outcome.maxima.t_x_b)
+    assert start == max(held.decided.maxima.t_theta, held.decided.maxima.t_x_b)
     assert "rebound" in words
     held.plot(tmp_path / "held.png")
     assert has_colour(picture(tmp_path / "held.png"), AFTER_PEAK, least=20_000)
-    assert unreliable_from(overturned)[0] == overturned.motion.outcome.t_limit
+    assert unreliable_from(overturned)[0] == overturned.row["time_to_limit_s"]
     assert "20°" in unreliable_from(overturned)[1]
 
 
@@ -88,6 +88,18 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
     figures: list[Figure] = []
     monkeypatch.setattr("boulder_sweep.views.pictures.save", lambda fig, target: figures.append(fig))
     return figures
+
+
+def test_pictures_state_the_row_of_the_table(overturned: Trajectory, tmp_path: Path, drawn: list[Figure]) -> None:
+    """The peaks are those up to the limit, though the curves go on to a turn of 158 deg."""
+    overturned.plot(tmp_path / "overturned.png")
+    (fig,) = drawn
+    labels = [text.get_text() for axes in fig.axes for text in axes.texts]
+    row = overturned.row
+    assert "20.00°" in labels
+    assert f"{row['max_displacement_m']:.3f} m" in labels
+    assert f"{row['peak_force_kN']:.0f} kN" in labels
+    assert max(math.degrees(angle) for angle in overturned.rotation_rad) > 150.0
 
 
 def test_legends_cover_nothing(
