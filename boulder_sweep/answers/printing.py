@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from boulder_sweep.answers.keys import key_of
+from boulder_sweep.answers.search import ALWAYS, BLOCKED, NEVER, NOT_MONOTONE, UNKNOWN, WORDS
 from boulder_sweep.columns import BY_NAME as COLUMNS
 from boulder_sweep.columns import GRADES, WAY_OUT
 from boulder_sweep.judge.quantities import BACKFILLED, EXCAVATED
@@ -20,7 +21,8 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from boulder_sweep.answers.doubts import Doubt
-    from boulder_sweep.answers.reserves import Reserve, Reserves
+    from boulder_sweep.answers.keys import Key
+    from boulder_sweep.answers.reserves import Reserves
     from boulder_sweep.answers.result import Result
     from boulder_sweep.answers.uncertainty import Uncertainty
     from boulder_sweep.settings import Sweep
@@ -57,6 +59,15 @@ NOT_FAILING = {
     "no_progress": "no_progress: small steps lead no nearer to the rare designs; see P(pass)",
     "contradicts": "contradicts: P(fail) would contradict P(pass), which is counted; see P(pass)",
 }
+WITHSTOOD = {
+    WORDS[ALWAYS]: "≥, ≤: passes throughout, up to the worst value tried",
+    WORDS[NOT_MONOTONE]: "*: up to here everything passes; it passes again beyond values that fail, which counts for "
+    "nothing (columns ..._passes_within, -o). never*: fails already at the mildest value tried",
+    WORDS[NEVER]: "never: passes at no value tried",
+    WORDS[BLOCKED]: "blocked: the truck would pass or ride over the boulder",
+    WORDS[UNKNOWN]: "undecided: passes at no value tried; see the reason below",
+}
+"""What the kinds of answers mean to a design that withstands something."""
 Row = Mapping[str, Any]
 Cell = Callable[[Row], str]
 Column = tuple[tuple[str, str], Cell]
@@ -203,32 +214,43 @@ def reserve_lines(result: Reserves, units: str = "si") -> list[str]:
     from boulder_sweep.answers.reserves import RESERVES
 
     columns: list[Column] = [(("verdict", ""), lambda row: str(row["verdict"])), GRADE]
-    for reserve, decimals in zip(RESERVES, (2, 0, 2), strict=True):
-        field = key_of(reserve.input).field
-        size = 1.0 if units == "si" else shown_unit(field.unit, units).size
-        columns.append((head_of(field.name, units), _format_withstood(reserve, field.name, decimals, size)))
+    for key, column, word, _ in RESERVES:
+        columns.append((head_of(key.name, units), _format_withstood(key, column, f"{word}_found", units)))
     columns.append((("class,", "simulated"), lambda row: row["simulated_class"] or row["simulated_iso_speed"] or "-"))
     lines, rows = _rows_lines(result, [*columns, *volume_columns(units)], units)
     lines += volume_lines(lines[0])
-    if any(sign in line for line in lines for sign in "≥≤"):
-        lines.append("≥, ≤: passes at the worst value tried")
-    return [*lines, *grade_lines(rows), *foot_lines(result.sweep.model, units=units)]
+    kinds = {row[f"{reserve.word}_found"] for row in rows for reserve in RESERVES}
+    lines += wrapped(words for kind, words in WITHSTOOD.items() if kind in kinds)
+    return [
+        *lines,
+        *grade_lines(rows),
+        *foot_lines(result.sweep.model, result.arrow["reason"].unique().to_pylist(), units),
+    ]
 
 
-def _format_withstood(reserve: Reserve, name: str, decimals: int, size: float) -> Cell:
-    """Return a formatter for a value that is withstood and its distance from that of the design.
-
-    A design that passes at the worst value tried may withstand more.
-    """
-    sense, sign = (1.0, "≥") if reserve.worst > reserve.best else (-1.0, "≤")
-    end = (sense - 1e-9) * reserve.worst / size
+def _format_withstood(key: Key, column: str, found: str, units: str) -> Cell:
+    """Return a formatter for a value that is withstood and its distance from that of the design."""
+    answer = answer_cell(key, column, found, units)
 
     def cell(row: Row) -> str:
-        value = row[reserve.column]
-        if value is None:
-            return "-"
-        before = sign if row["verdict"] == "pass" and sense * value >= end else ""
-        return f"{before}{value:.{decimals}f} ({value / row[name] - 1.0:+.0%})"
+        away = "" if row[column] is None else f" ({row[column] / row[key.name] - 1.0:+.0%})" if row[key.name] else ""
+        return f"{answer(row)}{away}"
+
+    return cell
+
+
+def answer_cell(key: Key, column: str, found: str, units: str) -> Cell:
+    """Return a formatter for an answer to a question, from the columns of its value and of what was found."""
+    size = 1.0 if units == "si" else shown_unit(key.field.unit, units).size
+    decimals = max(0, -math.floor(math.log10(key.tolerance / size) + 1e-9))
+
+    def cell(row: Row) -> str:
+        kind = row[found]
+        star = "*" if kind == WORDS[NOT_MONOTONE] else ""
+        if row[column] is None:
+            return "blocked" if kind == WORDS[BLOCKED] else f"{'never' if star else kind}{star}"
+        before = {WORDS[ALWAYS]: "≥" if key.most else "≤"}.get(kind, "")
+        return f"{before}{row[column]:.{decimals}f}{star}"
 
     return cell
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from boulder_sweep.answers.chance import SCRAMBLINGS, Points, Sampled, chance
 from boulder_sweep.answers.draws import Draws
-from boulder_sweep.answers.keys import Ends, Key
+from boulder_sweep.answers.keys import Ends, Key, range_of
 from boulder_sweep.answers.lightest import DEPTH, RATIO, SIDES, Boulders, LightestQuestion, Sides
 from boulder_sweep.answers.questions import CHECKED_AT_ONCE, Answers, Question, Trial
 from boulder_sweep.answers.search import BEYOND, FAILS, HOLDS, Search
@@ -138,7 +138,8 @@ class ProbabilityQuestion(Question):
 
     def values_to_try(self) -> int:
         """Return how many values are tried in all, if every row changes once from failing to passing."""
-        pieces = [self.lattice(self.open.rows(*ends)) for ends in ranges(self.count, CHECKED_AT_ONCE)]
+        rows = (self.open.rows(*ends) for ends in ranges(self.count, CHECKED_AT_ONCE))
+        pieces = [self.lattice(*range_of(self.sweep, self.key, some, self.between)) for some in rows]
         widest = np.concatenate([np.abs(last - first) for first, last in pieces]) / self.cells
         return int(np.sum(self.cells + 1 + np.ceil(np.log2(np.maximum(widest, 1.0)))))
 
