@@ -44,8 +44,8 @@ FAST_OVERTURN_S = 0.3
 """No passing value is searched between two at which the design reaches the limit before this time. Where one exists,
 one of its neighbours reaches the limit after 0.5 s or later (see tests/answers/test_scan.py)."""
 SHALLOW, SLIDES_M = 0.45, 0.1
-"""Embedment over height below which a boulder that passes by sliding so far [m] may overturn for values between two that
-pass, in stretches of 1 % of the value and less,"""
+"""Embedment over height below which a boulder that passes by sliding so far [m] may overturn for values between two
+that pass, in stretches of 1 % of the value and less,"""
 FINE_CELLS = 400
 """and pieces into which its range is then cut."""
 

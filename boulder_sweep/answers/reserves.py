@@ -63,12 +63,7 @@ class Reserve(NamedTuple):
 RESERVES = (
     Reserve(key_of("speed", most=True), "withstands_speed_m_s", "speed", "largest impact speed"),
     Reserve(key_of("vehicle.mass", most=True), "withstands_mass_kg", "mass", "largest mass of the vehicle"),
-    Reserve(
-        key_of("friction_angle"),
-        "withstands_friction_angle_deg",
-        "friction_angle",
-        "smallest friction angle of the soil",
-    ),
+    Reserve(key_of("friction_angle"), "withstands_friction_angle_deg", "soil", "smallest friction angle of the soil"),
 )
 
 
@@ -106,8 +101,8 @@ def reserves(sweep: Sweep, *, jobs: int | None = None, progress: ProgressCallbac
     Returns
     -------
     Reserves
-        One row a design, with the answer to each question and its bracket as of `boulder_sweep.need`: from zero, or from
-        49 degrees, to the end of the usual range or to the design's own value where that lies beyond.
+        One row a design, with the answer to each question and its bracket, as `boulder_sweep.need` gives them: from
+        zero, or from 49 degrees, to the end of the usual range or to the design's own value where that lies beyond.
 
     Raises
     ------
