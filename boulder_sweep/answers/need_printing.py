@@ -23,9 +23,12 @@ from boulder_sweep.answers.printing import (
     head_of,
     leading,
     number_of,
+    reasons_in,
     rows_of,
     table_lines,
     table_texts,
+    undecided_columns,
+    undecided_lines,
     varies,
     volume_columns,
     volume_lines,
@@ -54,7 +57,7 @@ NOTES = {
     "never": "never: passes nowhere in the searched range",
     "not_monotone": "*: {}; column passes_within (-o) lists all passing ranges",
     "blocked_by_overlap": "blocked: does not pass up to where the truck would pass or ride over the boulder",
-    "undecided": "undecided: no value passes, and the last one tried is undecided, for the reason below",
+    "undecided": "undecided: no value is known to pass, and the one tried last would if it were decided",
 }
 SHORT = {"as_printed": "printed", "corrected": "corrected"}
 """Heads of the columns of other readings."""
@@ -95,7 +98,9 @@ def need_lines(need: Need, units: str = "si", file: str = "GRID.yaml") -> list[s
     if by_soil and need.others:
         lines.append("(by the readings of the file; -o writes those by the others as well)")
     remarks = [*volume_lines(tables[0][0]), *_legend(need, file), *_grades(need), *_outside(need)]
-    remarks += foot_lines(need.sweep.model, need.arrow["reason"].unique().to_pylist(), units)
+    if need.probability is not None:
+        remarks += undecided_lines(need.arrow)
+    remarks += foot_lines(need.sweep.model, reasons_in(need.arrow), units)
     if need.key.name == BOULDER_MASS.name:
         remarks += _edges(need, units, file)
     return [*lines, *wrapped(remarks)]
@@ -104,7 +109,7 @@ def need_lines(need: Need, units: str = "si", file: str = "GRID.yaml") -> list[s
 def _shown_part(need: Need) -> pa.Table:
     """Return the columns that lines are made of: rows of all would take longer to make than to search."""
     needed = {*HEADS, *need.sweep.plan.labels, "design_id", "boulder_mass_kg", "passes_at", "robustness"}
-    needed |= {"margin", "p_pass", EXCAVATED.name, BACKFILLED.name}
+    needed |= {"margin", "p_pass", "p_undecided", "p_undecided_reason", EXCAVATED.name, BACKFILLED.name}
     answers = (need.key.answer, "found")
     return need.arrow.select([n for n in need.arrow.column_names if n in needed or n.startswith(answers)])
 
@@ -234,10 +239,11 @@ def _need_columns(need: Need, units: str) -> list[Column]:
             columns.append((("above", unit), _where_it_passes(lambda row: f"{row[HEIGHT] - row[DEPTH]:.2f}")))
         columns.append(_mass(units))
     if "p_pass" in need.arrow.column_names:
-        columns.append((("P(pass)", ""), _where_it_passes(lambda row: f"{row['p_pass']:.3f}")))
+        columns.append((("P(pass)", ""), lambda row: f"{row['p_pass']:.3f}"))
+        columns += undecided_columns(need.arrow)
     else:
         columns.append((("margin", ""), _where_it_passes(_margin)))
-    columns.append((GRADE[0], lambda row: (row["passes_at"] and row["robustness"]) or "-"))
+        columns.append((GRADE[0], lambda row: (row["passes_at"] and row["robustness"]) or "-"))
     columns += [
         ((SHORT[name], unit), answer_cell(key, f"{key.answer}_{name}", f"found_{name}", units)) for name in need.others
     ]

@@ -110,6 +110,26 @@ def foot_lines(model: Model, reasons: Iterable[str | None] = (), units: str = "s
     return wrapped(words)
 
 
+def reasons_in(table: pa.Table) -> set[str | None]:
+    """Return the reasons of rows, and of the designs drawn for their probabilities."""
+    columns = [name for name in ("reason", "p_undecided_reason") if name in table.column_names]
+    return {reason for name in columns for reason in table[name].unique().to_pylist()}
+
+
+def undecided_columns(table: pa.Table) -> list[Column]:
+    """Return the column of the share of the designs drawn that is undecided, where some are."""
+    if not any(table["p_undecided"].to_pylist()):
+        return []
+    return [(("not", "decided"), lambda row: f"{row['p_undecided']:.4f}")]
+
+
+def undecided_lines(table: pa.Table) -> list[str]:
+    """Return why designs that were drawn are undecided, and what that does to the probability of passing."""
+    reasons = sorted({reason for reason in table["p_undecided_reason"].unique().to_pylist() if reason})
+    words = f"not decided: undecided ({', '.join(reasons)}); if all of these passed, P(pass) would be larger by as much"
+    return wrapped([words] if reasons else [])
+
+
 def wrapped(texts: Iterable[str]) -> list[str]:
     """Return texts as lines of at most `WIDTH`."""
     return [line for text in texts for line in textwrap.wrap(text, WIDTH, subsequent_indent="  ")]
@@ -149,10 +169,10 @@ def uncertainty_lines(result: Uncertainty, units: str = "si") -> list[str]:
     """
     columns: list[Column] = [
         (("at the", "means"), lambda row: str(row["verdict"])),
-        *([GRADE] if result.sweep.model.second_opinion else []),
         (("P(pass)", ""), lambda row: f"{row['p_pass']:.4f}"),
         (("from", ""), lambda row: f"{row['p_pass_low']:.4f}"),
         (("to", ""), lambda row: f"{row['p_pass_high']:.4f}"),
+        *undecided_columns(result.arrow),
         *([(("P(fail)", ""), _failing)] if "p_fail" in result.arrow.column_names else []),
         (("decided", "by"), lambda row: row["p_pass_driver"] or "-"),
         (("designs", "drawn"), lambda row: f"{row['p_pass_designs']:,}"),
@@ -160,9 +180,7 @@ def uncertainty_lines(result: Uncertainty, units: str = "si") -> list[str]:
     lines, rows = _rows_lines(result, columns, units)
     occurring = {row.get("p_fail_by") for row in rows}
     lines += [note for word, note in NOT_FAILING.items() if word in occurring]
-    if result.sweep.model.second_opinion:
-        lines += grade_lines(rows)
-    lines += foot_lines(result.sweep.model, units=units)
+    lines += [*undecided_lines(result.arrow), *foot_lines(result.sweep.model, reasons_in(result.arrow), units)]
     return [*lines, "", *_index_lines(result)] if len(result) == 1 else lines
 
 
@@ -221,11 +239,7 @@ def reserve_lines(result: Reserves, units: str = "si") -> list[str]:
     lines += volume_lines(lines[0])
     kinds = {row[f"{reserve.word}_found"] for row in rows for reserve in RESERVES}
     lines += wrapped(words for kind, words in WITHSTOOD.items() if kind in kinds)
-    return [
-        *lines,
-        *grade_lines(rows),
-        *foot_lines(result.sweep.model, result.arrow["reason"].unique().to_pylist(), units),
-    ]
+    return [*lines, *grade_lines(rows), *foot_lines(result.sweep.model, reasons_in(result.arrow), units)]
 
 
 def _format_withstood(key: Key, column: str, found: str, units: str) -> Cell:

@@ -19,12 +19,23 @@ from boulder_sweep.answers.lightest import DEPTH, RATIO, SIDES, Boulders, Lighte
 from boulder_sweep.answers.questions import CHECKED_AT_ONCE, Answers, Question, Trial
 from boulder_sweep.answers.search import BEYOND, FAILS, HOLDS, Search
 from boulder_sweep.answers.spread import Spread
-from boulder_sweep.answers.trials import InputRows, Judges, Remembered, beyond_reach, ranges, rows_at, uncertain_rows
+from boulder_sweep.answers.trials import (
+    InputRows,
+    Judges,
+    Remembered,
+    beyond_reach,
+    ranges,
+    rows_at,
+    uncertain_rows,
+    ungraded,
+)
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.runner.pool import Pool
 from boulder_sweep.settings.fields import BY_NAME
 
 if TYPE_CHECKING:
+    from boulder_sweep.designs import DesignBlock
+    from boulder_sweep.judge.judged import Judged
     from boulder_sweep.settings import Sweep
 
 DRAWN = 4096
@@ -94,7 +105,7 @@ class Sampling:
         """Return the probabilities of passing of all rows with inputs set, from the points and more where needed."""
 
         def event(index: np.ndarray, z: np.ndarray) -> np.ndarray:
-            return draws.passes(index, z, **rows_at(inputs, index))
+            return draws.drawn(index, z, **rows_at(inputs, index))[1]
 
         count, points = len(next(iter(inputs.values()))), Points(draws.dimensions, self.seed)
         return chance(event, count, points, half_width=HALF_WIDTH, first=DRAWN // SCRAMBLINGS)
@@ -135,6 +146,15 @@ class ProbabilityQuestion(Question):
     def trial(self, rows: InputRows) -> Trial:
         """Return the object that tries values in some rows."""
         return ProbabilityTrial(self, rows)
+
+    def graded(self, judged: Judged, block: DesignBlock) -> Judged:
+        """Return the outcomes at the means, without a grade."""
+        return ungraded(judged)
+
+    def undecided(self, judged: Judged, chances: Sampled | None) -> np.ndarray:
+        """Return where enough designs would pass if those that are undecided did, bool, shape (n,)."""
+        assert chances is not None
+        return (chances.unknown > 0.0) & (chances.estimate + chances.unknown >= self.sampling.probability)
 
     def values_to_try(self) -> int:
         """Return how many values are tried in all, if every row changes once from failing to passing."""
@@ -214,7 +234,8 @@ class LikelyLightestQuestion(LightestQuestion):
         answers = super().answered(start, stop)
         sizes = {name: answers.block.columns[name].to_numpy() for name in (*SIDES, DEPTH)}
         chances = self.sampling.chances(self.sampling.draws(self.given(start, stop)), sizes)
-        return replace(answers, chances=chances, simulated=answers.simulated + int(chances.points.sum()))
+        simulated = answers.simulated + int(chances.points.sum())
+        return replace(answers, judged=ungraded(answers.judged), chances=chances, simulated=simulated)
 
 
 class LikelyBoulders(Boulders):

@@ -157,8 +157,8 @@ class ValueSearch:
         """Return the outcomes at the answers with their grades."""
         return self.judges.final.graded(judged, block)
 
-    def enough(self, judged: Judged, chances: Sampled | None) -> np.ndarray:
-        """Return where designs could be answers if all that is undecided passed, bool, shape (n,)."""
+    def undecided(self, judged: Judged, chances: Sampled | None) -> np.ndarray:
+        """Return where designs that are no answers would be if what is undecided passed, bool, shape (n,)."""
         return judged.verdict == UNDECIDED
 
     def _again(
@@ -182,7 +182,7 @@ class ValueSearch:
         if len(none):
             last = block_at(rows, none, **{self.key.name: end[none]})
             kind[none] = np.where(too_low(last, self.sweep.criterion.min_overlap_m), BLOCKED, NEVER)
-            kind[none[self.enough(judged, chances)[none]]] = UNKNOWN
+            kind[none[self.undecided(judged, chances)[none]]] = UNKNOWN
         return kind
 
 

@@ -213,6 +213,12 @@ def uncertain_rows(sweep: Sweep, given: InputRows, start: int, stop: int) -> Inp
     return given | {section: np.asarray(labels[section].codes, dtype=float) for section in sets}
 
 
+def ungraded(judged: Judged) -> Judged:
+    """Return outcomes at the means of uncertain inputs without a grade, which would be that of the mean soil alone."""
+    none = np.full(len(judged), -1, dtype=np.int32)
+    return dataclasses.replace(judged, columns=judged.columns | dict.fromkeys(GRADED, none))
+
+
 def beyond_reach(block: DesignBlock, judged: Judged) -> np.ndarray:
     """Return whether the truck goes over the boulder or the row is not a valid design, bool, shape (n,)."""
     words = [code for code, word in enumerate(judged.reasons) if word in OUT_OF_REACH]

@@ -21,7 +21,6 @@ from boulder_sweep.cli.options import (
     refuse_missing,
     refuse_units_of_json,
     refuse_unwritable,
-    second_opinion_option,
     set_option,
     take_values,
     units_option,
@@ -139,7 +138,6 @@ Examples:
 @click.option("--confidence", default="95 %", metavar="SHARE", help="Confidence level of the interval [95 %].")
 @margin_option
 @click.option("--rare", is_flag=True, help="Also small probabilities, by subset simulation.")
-@second_opinion_option
 @click.option(
     "--doubts", is_flag=True, help="Divide a design's uncertainty among inputs, readings and numerical error."
 )
@@ -158,7 +156,6 @@ Examples:
 @json_option
 def uncertainty(
     grid: str | None,
-    second_opinion: bool,
     doubts: bool,
     out: str | None,
     picture: str | None,
@@ -183,7 +180,7 @@ def uncertainty(
     from boulder_sweep.answers.uncertainty import uncertainty as estimate
 
     refuse_units_of_json(units, as_json)
-    sweep = load_sweep(grid, overrides, quiet, units, second_opinion=second_opinion)
+    sweep = load_sweep(grid, overrides, quiet, units)
     refuse_missing(sweep, grid, design)
     refuse_unwritable(out, picture)
     with working(quiet) as progress:
