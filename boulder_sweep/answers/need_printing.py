@@ -239,7 +239,7 @@ def _need_columns(need: Need, units: str) -> list[Column]:
             columns.append((("above", unit), _where_it_passes(lambda row: f"{row[HEIGHT] - row[DEPTH]:.2f}")))
         columns.append(_mass(units))
     if "p_pass" in need.arrow.column_names:
-        columns.append((("P(pass)", ""), lambda row: f"{row['p_pass']:.3f}"))
+        columns.append((("P(pass)", ""), _chance))
         columns += undecided_columns(need.arrow)
     else:
         columns.append((("margin", ""), _where_it_passes(_margin)))
@@ -258,6 +258,10 @@ def _where_it_passes(cell: Cell) -> Cell:
 def _length(name: str) -> Cell:
     """Return a formatter for a side of the boulder or its depth."""
     return lambda row: f"{row[name]:.3f}"
+
+
+def _chance(row: Row) -> str:
+    return "" if row["passes_at"] is None and not row["p_undecided"] else f"{row['p_pass']:.3f}"
 
 
 def _margin(row: Row) -> str:
