@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -18,6 +17,7 @@ from boulder_sweep.answers.printing import (
     Column,
     Row,
     answer_cell,
+    flag_lines,
     foot_lines,
     grade_lines,
     head_of,
@@ -37,7 +37,6 @@ from boulder_sweep.answers.printing import (
 )
 from boulder_sweep.columns import GRADES
 from boulder_sweep.judge.quantities import BACKFILLED, EXCAVATED
-from boulder_sweep.judge.validity import NOT_A_RATING, flag_counts
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.shown_units import shown_unit
 from boulder_sweep.text import counted
@@ -187,14 +186,7 @@ def _grades(need: Need) -> list[str]:
 
 def _outside(need: Need) -> list[str]:
     """Return what a pass is, and how many answers lie outside what the model was tested on."""
-    passing = need.arrow.filter(need.arrow["passes_at"].is_valid())
-    if not len(passing):
-        return []
-    count = len(passing)
-    flags = flag_counts(Counter(passing["validity"].to_pylist()).items())
-    named = ", ".join(f"{name} {flagged:,}" for name, flagged in flags.items() if name)
-    inside = f"flags: {flags.get('', 0):,} of {counted(count, 'answer')} inside what the model was tested on"
-    return [f"an answer is {NOT_A_RATING}", f"{inside}{f'; {named}' if named else ''} (docs/validity.md)"]
+    return flag_lines(need.arrow.filter(need.arrow["passes_at"].is_valid())["validity"].to_pylist())
 
 
 def _edges(need: Need, units: str, file: str) -> list[str]:

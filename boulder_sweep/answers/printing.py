@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -12,10 +13,12 @@ from boulder_sweep.answers.search import ALWAYS, BLOCKED, NEVER, NOT_MONOTONE, U
 from boulder_sweep.columns import BY_NAME as COLUMNS
 from boulder_sweep.columns import GRADES, WAY_OUT
 from boulder_sweep.judge.quantities import BACKFILLED, EXCAVATED
+from boulder_sweep.judge.validity import NOT_A_RATING, flag_counts
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import FOOT_WORDS
 from boulder_sweep.settings.shown_units import number_text, quantity_text, shown_unit
 from boulder_sweep.stones.rock import ROCK_KG_M3
+from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -98,6 +101,16 @@ def grade_lines(rows: Iterable[Row]) -> list[str]:
     occurring = {(row["robustness"], meaning_of(row)) for row in rows if row["robustness"]}
     ranked = sorted(occurring, key=lambda pair: (GRADES.index(pair[0]), pair[1]))
     return wrapped(f"{word}: {meaning}" for word, meaning in ranked)
+
+
+def flag_lines(answers: Sequence[str]) -> list[str]:
+    """Return what an answer is, and how many lie outside what the model was tested on, from their flags."""
+    if not answers:
+        return []
+    flags = flag_counts(Counter(answers).items())
+    named = ", ".join(f"{name} {flagged:,}" for name, flagged in flags.items() if name)
+    inside = f"flags: {flags.get('', 0):,} of {counted(len(answers), 'answer')} inside what the model was tested on"
+    return wrapped([f"an answer is {NOT_A_RATING}", f"{inside}{f'; {named}' if named else ''} (docs/validity.md)"])
 
 
 def foot_lines(model: Model, reasons: Iterable[str | None] = (), units: str = "si") -> list[str]:
