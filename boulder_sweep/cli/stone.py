@@ -197,9 +197,9 @@ KINDS = {
 }
 """What the signs beside depths mean."""
 NOTHING = {
-    WORDS[NEVER]: "fails at every depth",
-    WORDS[BLOCKED]: "fails down to where the truck would pass or ride over it",
-    WORDS[NOT_MONOTONE]: "passes at some depths, and fails at greater ones",
+    WORDS[NEVER]: "it fails at every depth",
+    WORDS[BLOCKED]: "it fails down to where the truck would pass or ride over it",
+    WORDS[NOT_MONOTONE]: "it passes at some depths, and fails at greater ones",
 }
 """Why there is no depth."""
 
@@ -207,10 +207,8 @@ NOTHING = {
 def _why_not(way: Way) -> str:
     """Return why a way to stand has no depth."""
     if way.row["found"] == WORDS[UNKNOWN]:
-        return f"undecided ({way.row['reason']})"
-    return NOTHING.get(
-        way.row["found"], "no depth suits all vehicles: one would ride over it where another asks for more"
-    )
+        return f"it is undecided ({way.row['reason']})"
+    return NOTHING.get(way.row["found"], "one vehicle would ride over it at the depth that another asks for")
 
 
 def _beside(rock: str, site: str) -> str:
