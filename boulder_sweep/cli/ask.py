@@ -90,8 +90,10 @@ def need(
 
     If KEY is an axis of the grid, the axis is the search range; otherwise the usual range, for depths from 0.35 of the
     height to where the truck would go over the boulder. Every answer has a bracket: the value that passes and the next
-    one, which does not, both judged as in `sweep run`. A row of which nothing passes is `blocked_by_overlap` if the
-    truck goes over the boulder at the end of the range (overlap below criterion.min_overlap), and `never` if not.
+    one, which does not, both judged as in `sweep run`. A largest speed or vehicle mass is the end of the interval from
+    zero in which everything passes; from a least friction angle or embedment on everything passes. A row of which
+    nothing passes is `blocked_by_overlap` if the truck goes over the boulder at the end of the range (overlap below
+    criterion.min_overlap), `undecided` if the last value tried is, and `never` if neither.
     """
     from boulder_sweep.answers.need import need as find
     from boulder_sweep.answers.need_printing import need_lines
@@ -246,7 +248,7 @@ def capacity(
     overrides: tuple[str, ...],
     as_json: bool,
 ) -> int:
-    """Find how far speed, mass of the truck and friction angle may change before each verdict does.
+    """Find up to which speed and mass of the truck, and down to which friction angle, every design passes throughout.
 
     Also names the highest ASTM F2656 class whose nominal speed (30, 40, 50 mph) is withstood. The class is
     simulated; the standard rates by test.

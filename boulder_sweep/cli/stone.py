@@ -80,8 +80,8 @@ def stone(
     and distances of the near and the far face over the height. The ends a, b and c are those of the long, the middle
     and the short axis of the stone, a the slimmer end and -a the other; x, y and z are the axes of the scan.
 
-    With SITE, a settings file, the stone takes the place of its boulder, and for each of the 24 ways to stand the least
-    depth is found at which it passes in all soils and before all vehicles of the file.
+    With SITE, a settings file, the stone takes the place of its boulder, and for each of the 24 ways to stand the depth
+    is found from which on it passes in all soils and before all vehicles of the file.
     """
     if (up is None) != (facing is None):
         raise click.UsageError("--up and --facing belong together; give both")
