@@ -189,8 +189,8 @@ def chance(
         open_ = open_[width > 2.0 * half_width]
         target = min(2 * target, max(most // SCRAMBLINGS, first))
     low, high = interval(happened, count, sure)[0], interval(possible, count, sure)[1]
-    points = SCRAMBLINGS * count
-    return Sampled(happened.sum(axis=1) / points, low, high, points, causes.sum(axis=1) / points, causes.argmax(axis=1))
+    drawn = SCRAMBLINGS * count
+    return Sampled(happened.sum(axis=1) / drawn, low, high, drawn, causes.sum(axis=1) / drawn, causes.argmax(axis=1))
 
 
 def interval(happened: np.ndarray, count: np.ndarray | int, confidence: float) -> tuple[np.ndarray, np.ndarray]:

@@ -145,11 +145,11 @@ def _uncertain(rows: ResultRows) -> list[tuple[Sentence, Named | None]]:
         driver = row["p_pass_driver"]
         most = f", decided most by {driver.replace('.', ' ').replace('_', ' ')}" if driver else ""
         interval = f"{row['p_pass_low']:.1%} to {row['p_pass_high']:.1%}"
-        sentence = f"The probability of passing is {row['p_pass']:.1%} ({interval}){most}."
+        chance = f"The probability of passing is {row['p_pass']:.1%} ({interval}){most}."
         if row["p_undecided"]:
             why = REASON_WORDS[row["p_undecided_reason"]]
-            sentence += f" {row['p_undecided']:.1%} of the designs drawn are undecided ({why})."
-        return [((sentence,), Named("The design", 0))]
+            chance += f" {row['p_undecided']:.1%} of the designs drawn are undecided ({why})."
+        return [((chance,), Named("The design", 0))]
     safe = chances >= SAFE
     n = int(safe.sum())
     first = f"{n:,} of {len(chances):,} designs {verb(n, 'pass', 'passes')} with a probability of {SAFE:.0%} or more"
