@@ -12,12 +12,25 @@ from typing import Any, ClassVar
 
 from boulder_sweep.answers.keys import Key, key_of
 from boulder_sweep.answers.need import Need, need
+from boulder_sweep.answers.search import ALWAYS, BLOCKED, NEVER, NOT_MONOTONE, UNKNOWN, WORDS
 from boulder_sweep.answers.trials import ROUNDING_M
 from boulder_sweep.drawing import draw
 from boulder_sweep.settings import Sweep
 from boulder_sweep.stones.standing import Standing
 from boulder_sweep.stones.weighing import ScannedStone
 from boulder_sweep.text import ProgressCallback
+
+SIGNS = {
+    WORDS[ALWAYS]: "≤: passes from the least depth tried on; a lesser one may do",
+    WORDS[NOT_MONOTONE]: "*: passes less deep as well, but fails in between: no depth to build",
+}
+"""What the signs beside depths mean."""
+NOTHING = {
+    WORDS[NEVER]: "it fails at every depth",
+    WORDS[BLOCKED]: "it fails down to where the truck would pass or ride over it",
+    WORDS[NOT_MONOTONE]: "it passes at some depths, and fails at greater ones",
+}
+"""Why there is no depth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +50,13 @@ class Way:
     standing: Standing
     row: dict[str, Any]
     depth_m: float | None
+
+    @property
+    def why_not(self) -> str:
+        """Why there is no depth, where there is none."""
+        if self.row["found"] == WORDS[UNKNOWN]:
+            return f"it is undecided ({self.row['reason']})"
+        return NOTHING.get(self.row["found"], "one vehicle would ride over it at the depth that another asks for")
 
 
 @dataclass(frozen=True, eq=False)

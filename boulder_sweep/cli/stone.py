@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, TypeVar
 
 import click
 
-from boulder_sweep.answers.search import ALWAYS, BLOCKED, NEVER, NOT_MONOTONE, UNKNOWN, WORDS
 from boulder_sweep.cli.options import (
     OUTPUT,
     at_option,
@@ -142,11 +141,12 @@ def _find_placing(
 
 def placing_lines(result: Placing, rock: str, unit: str, site: str) -> list[str]:
     """Return the ways to stand at a site, the one of least depth first, and a block of settings for that one."""
+    from boulder_sweep.answers.placing import SIGNS
     from boulder_sweep.answers.printing import answer_cell, flag_lines, grade_lines
 
     passing = result.passing
     cases = "" if result.cases == 1 else f", in the worst of {result.cases} combinations of soil and vehicle"
-    nothing = Counter(_why_not(way) for way in result.ways if way.depth_m is None)
+    nothing = Counter(way.why_not for way in result.ways if way.depth_m is None)
     rest = [f"{counted(count, 'way')} to stand: {why}" for why, count in nothing.items()]
     if result.rounded:
         rest.append(f"{counted(result.rounded, 'way')} without a flat foot, not computed")
@@ -177,7 +177,7 @@ def placing_lines(result: Placing, rock: str, unit: str, site: str) -> list[str]
         *_table(columns, passing),
         "up, facing: the end of the stone that is up, and the one that faces the vehicle",
         "above: height over the ground; mass: of what is left after the cut",
-        *(words for kind, words in KINDS.items() if kind in kinds),
+        *(words for kind, words in SIGNS.items() if kind in kinds),
         *rest,
         *grade_lines(way.row for way in passing),
         *flag_lines([way.row["validity"] for way in passing]),
@@ -189,26 +189,6 @@ def placing_lines(result: Placing, rock: str, unit: str, site: str) -> list[str]
         "site:",
         f"  embedment_depth: {depth(best):.3f} m",
     ]
-
-
-KINDS = {
-    WORDS[ALWAYS]: "≤: passes from the least depth tried on; a lesser one may do",
-    WORDS[NOT_MONOTONE]: "*: passes less deep as well, but fails in between: no depth to build",
-}
-"""What the signs beside depths mean."""
-NOTHING = {
-    WORDS[NEVER]: "it fails at every depth",
-    WORDS[BLOCKED]: "it fails down to where the truck would pass or ride over it",
-    WORDS[NOT_MONOTONE]: "it passes at some depths, and fails at greater ones",
-}
-"""Why there is no depth."""
-
-
-def _why_not(way: Way) -> str:
-    """Return why a way to stand has no depth."""
-    if way.row["found"] == WORDS[UNKNOWN]:
-        return f"it is undecided ({way.row['reason']})"
-    return NOTHING.get(way.row["found"], "one vehicle would ride over it at the depth that another asks for")
 
 
 def _beside(rock: str, site: str) -> str:
