@@ -43,7 +43,10 @@ MANY = 4096
 """New points of each scrambling from which on several threads generate them."""
 
 Event = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""Maps row numbers, shape (m,), and standard normals, shape (m, d), to whether the event occurs, bool, shape (m,)."""
+"""Maps row numbers, shape (m,), and standard normals, shape (m, d), to whether the event occurs, shape (m,): 1 or True,
+0 or False, or where that is not known less the number of the cause."""
+MOST_CAUSES = 16
+"""Numbers of causes are less than this."""
 POPULATIONS = 16
 """Independent estimates of a rare event."""
 POINTS = 1000
@@ -116,9 +119,16 @@ class Sampled(Chance):
         As of `Chance`.
     points : ndarray of int64, shape (n,)
         Points used.
+    unknown : ndarray, shape (n,)
+        Share of the points at which it is not known whether the event occurs. The interval reaches from the lower end
+        without them to the upper end with all of them.
+    cause : ndarray of int64, shape (n,)
+        Number of the commonest cause of that; 0 where there is none.
     """
 
     points: np.ndarray
+    unknown: np.ndarray
+    cause: np.ndarray
 
 
 def chance(
@@ -155,7 +165,8 @@ def chance(
     Sampled
         If `most` points are not enough, the interval is wider than requested.
     """
-    happened = np.zeros((rows, SCRAMBLINGS))
+    happened, possible = np.zeros((rows, SCRAMBLINGS)), np.zeros((rows, SCRAMBLINGS))
+    causes = np.zeros((rows, MOST_CAUSES), dtype=np.int64)
     count = np.zeros(rows, dtype=np.int64)
     open_ = np.arange(rows)
     done, target = 0, first
@@ -165,14 +176,21 @@ def chance(
         flat = new.reshape(-1, new.shape[2])
         index = np.repeat(open_, len(flat))
         occurred = event(index, np.tile(flat, (len(open_), 1))).reshape(len(open_), SCRAMBLINGS, -1)
-        happened[open_] += occurred.sum(axis=2)
+        happened[open_] += (occurred > 0).sum(axis=2)
+        possible[open_] += (occurred != 0).sum(axis=2)
+        for code in np.unique(occurred[occurred < 0]):
+            causes[open_, -code] += (occurred == code).sum(axis=(1, 2))
         count[open_] = target
         done = target
-        low, high = interval(happened[open_], target, sure)
-        open_ = open_[high - low > 2.0 * half_width]
+        width = np.zeros(len(open_))
+        for counted in (happened, possible):
+            low, high = interval(counted[open_], target, sure)
+            width = np.maximum(width, high - low)
+        open_ = open_[width > 2.0 * half_width]
         target = min(2 * target, max(most // SCRAMBLINGS, first))
-    low, high = interval(happened, count, sure)
-    return Sampled(happened.sum(axis=1) / (SCRAMBLINGS * count), low, high, SCRAMBLINGS * count)
+    low, high = interval(happened, count, sure)[0], interval(possible, count, sure)[1]
+    drawn = SCRAMBLINGS * count
+    return Sampled(happened.sum(axis=1) / drawn, low, high, drawn, causes.sum(axis=1) / drawn, causes.argmax(axis=1))
 
 
 def interval(happened: np.ndarray, count: np.ndarray | int, confidence: float) -> tuple[np.ndarray, np.ndarray]:

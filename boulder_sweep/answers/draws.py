@@ -79,7 +79,20 @@ class Draws:
         For a design that stands, the distance is its margin beyond the requested one; for one that overturns, the
         earlier, the more negative.
         """
-        return self._measured(index, z, inputs)
+        return self.drawn(index, z, **inputs)[0]
+
+    def drawn(self, index: np.ndarray, z: np.ndarray, **inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the distances of designs and what is known of each; arguments: see `distance`.
+
+        Returns
+        -------
+        distance : ndarray, shape (m,)
+            See `distance`.
+        known : ndarray of int64, shape (m,)
+            1 where the design passes, 0 where it does not, and less the code of its reason where it is undecided.
+        """
+        distance, known = self._measured(index, z, inputs)
+        return distance, known.astype(np.int64)
 
     def reserve(self, index: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Return the reserve of designs, positive where they pass, shape (m,); arguments: see `distance`.
@@ -91,14 +104,14 @@ class Draws:
         the product of three reserves, which does not change its order where one of them is the same for all; for
         others, minus the sum of all that is wrong.
         """
-        return self._measured(index, z, {}, reserve=True)
+        return self._measured(index, z, {}, reserve=True)[0]
 
     def _measured(
         self, index: np.ndarray, z: np.ndarray, inputs: dict[str, np.ndarray], *, reserve: bool = False
     ) -> np.ndarray:
         parts = [slice(at, at + AT_ONCE) for at in range(0, len(index), AT_ONCE)]
         calls = (call(self._piece, index[part], z[part], rows_at(inputs, part), reserve) for part in parts)
-        return np.concatenate(list(self.parallel(calls))) if parts else np.empty(0)
+        return np.concatenate(list(self.parallel(calls)), axis=1) if parts else np.empty((2, 0))
 
     def passes(self, index: np.ndarray, z: np.ndarray, **inputs: np.ndarray) -> np.ndarray:
         """Return whether designs pass; arguments: see `distance`."""
@@ -114,25 +127,31 @@ class Draws:
             return self._each(given, self.judges, reserve)
         count = len(self.variants)
         chosen = np.minimum((ndtr(z[:, -1]) * count).astype(np.int64), count - 1)
-        measures = np.empty(len(index))
+        measures = np.empty((2, len(index)))
         for k, judges in enumerate(self.variants):
             rows = np.flatnonzero(chosen == k)
             if len(rows):
-                measures[rows] = self._each(rows_at(given, rows), judges, reserve)
+                measures[:, rows] = self._each(rows_at(given, rows), judges, reserve)
         return measures
 
     def _each(self, given: InputRows, judges: Judges, reserve: bool) -> np.ndarray:
         def judged_by(evaluation: Evaluation, rows: InputRows) -> tuple[Judged, np.ndarray]:
             block = block_of(rows)
             judged = evaluation(block)
-            return judged, _reserve_of(judged, judges, block) if reserve else _distance_of(judged, judges)
+            measure = _reserve_of(judged, judges, block) if reserve else _distance_of(judged, judges)
+            return judged, np.stack([measure, _known(judged, judges)])
 
         judged, measures = judged_by(judges.coarse, given)
         if judges.coarse is not judges.final:
             near = np.flatnonzero(np.abs(judged["margin"] - judges.least_margin) < NEAR)
             if len(near):
-                measures[near] = judged_by(judges.final, rows_at(given, near))[1]
+                measures[:, near] = judged_by(judges.final, rows_at(given, near))[1]
         return measures
+
+
+def _known(judged: Judged, judges: Judges) -> np.ndarray:
+    """Return what is known of designs; see `Draws.drawn`."""
+    return np.where(judged.verdict == UNDECIDED, -judged.reason, judges.holds(judged).astype(np.int64))
 
 
 def _distance_of(judged: Judged, judges: Judges) -> np.ndarray:

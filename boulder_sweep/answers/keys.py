@@ -38,6 +38,11 @@ TOLERANCES = {
 LEAST_RATIO = 0.35
 """Smallest embedment tried where the file sets no range, as a share of the height. A boulder that is hardly embedded
 may slide a metre instead of turning, and pass; buried deeper, it is held at its foot and overturns."""
+MILDEST = {"impact_speed_m_s": 0.0, "vehicle_mass_kg": 100.0}
+"""Inputs of which a barrier must hold every smaller value, and where a search for the largest begins (units of the
+table),"""
+STRONGEST = ("friction_angle_deg", "embedment_depth_m", "embedment_ratio")
+"""and those of which it must pass at every greater value. A value that passes between two that fail is no answer."""
 MOST_PLACES = 2**53
 """Multiples of the tolerance up to which every one is a number of its own."""
 
@@ -64,6 +69,11 @@ class Key:
     def name(self) -> str:
         """Column of the input (or ``embedment_ratio``)."""
         return self.field.name
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether everything between the answer and the safe end of the input must pass too."""
+        return self.name in (MILDEST if self.most else STRONGEST)
 
     @property
     def is_coarse(self) -> bool:
@@ -202,7 +212,8 @@ def range_of(sweep: Sweep, key: Key, given: Mapping[str, np.ndarray], between: E
     Parameters
     ----------
     sweep
-        The sweep. Where the input is an axis of its grid, the axis is the range.
+        The sweep. Where the input is an axis of its grid, the axis is the range; for the largest speed
+        or mass of the vehicle it begins as `MILDEST` says all the same.
     key
         The input.
     given
@@ -242,7 +253,7 @@ def _whole_range(
     axes = sweep_ranges(sweep)
     if key.name in axes:
         low, high = axes[key.name]
-        return low * one, high * one
+        return _mildest(key, low) * one, high * one
     if key.name == "embedment_depth_m":
         height, bumper = given["boulder_height_m"], given["bumper_height_m"]
         low, high = axes.get("embedment_ratio", (LEAST_RATIO, 1.0))
@@ -255,9 +266,7 @@ def _whole_range(
         return LEAST_RATIO * one, 1.0 - bumper / height
     if key.name == "impact_height_m":
         return 0.0 * one, given["hood_height_m"]
-    usual = key.field.usual or key.field.admitted
-    assert usual is not None
-    lowest, highest = usual.low * one, usual.high * one
+    lowest, highest = (end * one for end in usual_ends(key))
     second = "vehicle_second_spring_N_m"
     if key.name == second:
         lowest = np.maximum(lowest, given["vehicle_spring_N_m"])  # a softer one is refused
@@ -266,6 +275,17 @@ def _whole_range(
     elif key.name == "vehicle_second_spring_from_m":
         highest = np.minimum(highest, given["bed_offset_m"])  # no more than what is in front of the cargo bed
     return lowest, highest
+
+
+def usual_ends(key: Key) -> tuple[float, float]:
+    """Return the ends of the usual range of an input, with all that is milder where the largest is asked for."""
+    usual = key.field.usual or key.field.admitted
+    assert usual is not None
+    return _mildest(key, usual.low), usual.high
+
+
+def _mildest(key: Key, low: float) -> float:
+    return min(low, MILDEST[key.name]) if key.most and key.name in MILDEST else low
 
 
 def refuse_coarse(sweep: Sweep, key: Key, pieces: Iterable[Mapping[str, np.ndarray]], between: Ends) -> None:

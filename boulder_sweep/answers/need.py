@@ -17,7 +17,15 @@ from typing import TYPE_CHECKING, Any
 from boulder_sweep.answers.keys import BOULDER_MASS, Ends, Key, key_of, margin_asked, share
 from boulder_sweep.answers.lightest import SIDES, LightestQuestion
 from boulder_sweep.answers.questions import Question
-from boulder_sweep.answers.result import Result, TableColumn, joined_tables, rows_table, to_build, write_parquet
+from boulder_sweep.answers.result import (
+    Result,
+    TableColumn,
+    chance_columns,
+    joined_tables,
+    rows_table,
+    to_build,
+    write_parquet,
+)
 from boulder_sweep.answers.search import BLOCKED, WORDS
 from boulder_sweep.answers.trials import NO_FACE, Judges, every_reading, judges_of, other_readings, ranges
 from boulder_sweep.columns import INPUTS, SECOND_SPRING_COLUMNS
@@ -225,7 +233,9 @@ def need(
             "cohesion, one spring of the vehicle and corrected readings only"
         )
     if robust and drawn:
-        raise QuestionError("--robust and --probability cannot be used together")
+        raise QuestionError(
+            "--robust and --probability cannot be used together: second opinions are not asked of the designs drawn"
+        )
     sweeps = [sweep, other_readings(sweep)] if both_readings and not open_readings and not robust else [sweep]
     judges = [judges_of(one, least_margin, compared=drawn and one is not sweep, robust=robust) for one in sweeps]
     pairs = zip(sweeps, judges, strict=True)
@@ -329,8 +339,8 @@ def _table_of(asked: Sequence[Question | LightestQuestion], start: int, stop: in
         (key.answer, unit, f"{what}; null where none does", first.passes),
         ("fails_at", unit, next_to_it, first.fails),
         ("passes_at", unit, "the same as the answer: judged as a run judges it", first.passes),
-        ("found", "", "found, always, never, not_monotone or blocked_by_overlap", word_array(first.kind, WORDS)),
-        ("passes_within", unit, "where it fails again further on: all stretches that pass", first.stretches),
+        ("found", "", ", ".join(WORDS), word_array(first.kind, WORDS)),
+        ("passes_within", unit, "where it is not monotone: all stretches that pass", first.stretches),
         *to_build(first.block, sweep),
     ]
     for question, other in zip(asked[1:], answers[1:], strict=True):
@@ -340,10 +350,6 @@ def _table_of(asked: Sequence[Question | LightestQuestion], start: int, stop: in
             (f"found_{name}", "", f"as found, by the readings {name}", word_array(other.kind, WORDS)),
         ]
     if first.chances is not None:
-        columns += [
-            ("p_pass", "1", "chance of passing at the answer, or at the value tried last", first.chances.estimate),
-            ("p_pass_low", "1", "lower end of the interval of p_pass", first.chances.low),
-            ("p_pass_high", "1", "upper end of the interval of p_pass", first.chances.high),
-        ]
+        columns += chance_columns(first.chances, "chance of passing at the answer, or at the value tried last")
     table = rows_table(start, first.block, first.judged, columns, at=1 + len(INPUTS))
     return table, sum(answer.simulated for answer in answers)

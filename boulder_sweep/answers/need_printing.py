@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 import shlex
-from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -18,14 +16,19 @@ from boulder_sweep.answers.printing import (
     Cell,
     Column,
     Row,
+    answer_cell,
+    flag_lines,
     foot_lines,
     grade_lines,
     head_of,
     leading,
     number_of,
+    reasons_in,
     rows_of,
     table_lines,
     table_texts,
+    undecided_columns,
+    undecided_lines,
     varies,
     volume_columns,
     volume_lines,
@@ -34,7 +37,6 @@ from boulder_sweep.answers.printing import (
 )
 from boulder_sweep.columns import GRADES
 from boulder_sweep.judge.quantities import BACKFILLED, EXCAVATED
-from boulder_sweep.judge.validity import NOT_A_RATING, flag_counts
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.shown_units import shown_unit
 from boulder_sweep.text import counted
@@ -42,7 +44,6 @@ from boulder_sweep.text import counted
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from boulder_sweep.answers.keys import Key
     from boulder_sweep.answers.need import Need
 
 MOST_IN_ALL = 1000
@@ -53,8 +54,9 @@ NEAR_M = 1.5e-3
 NOTES = {
     "always": "≤, ≥: passes throughout the searched range, up to this end of it",
     "never": "never: passes nowhere in the searched range",
-    "not_monotone": "*: fails again further on; column passes_within (-o) lists all passing ranges",
+    "not_monotone": "*: {}; column passes_within (-o) lists all passing ranges",
     "blocked_by_overlap": "blocked: does not pass up to where the truck would pass or ride over the boulder",
+    "undecided": "undecided: no value is known to pass, and the one tried last would if it were decided",
 }
 SHORT = {"as_printed": "printed", "corrected": "corrected"}
 """Heads of the columns of other readings."""
@@ -95,7 +97,9 @@ def need_lines(need: Need, units: str = "si", file: str = "GRID.yaml") -> list[s
     if by_soil and need.others:
         lines.append("(by the readings of the file; -o writes those by the others as well)")
     remarks = [*volume_lines(tables[0][0]), *_legend(need, file), *_grades(need), *_outside(need)]
-    remarks += foot_lines(need.sweep.model, need.arrow["reason"].unique().to_pylist(), units)
+    if need.probability is not None:
+        remarks += undecided_lines(need.arrow)
+    remarks += foot_lines(need.sweep.model, reasons_in(need.arrow), units)
     if need.key.name == BOULDER_MASS.name:
         remarks += _edges(need, units, file)
     return [*lines, *wrapped(remarks)]
@@ -104,7 +108,7 @@ def need_lines(need: Need, units: str = "si", file: str = "GRID.yaml") -> list[s
 def _shown_part(need: Need) -> pa.Table:
     """Return the columns that lines are made of: rows of all would take longer to make than to search."""
     needed = {*HEADS, *need.sweep.plan.labels, "design_id", "boulder_mass_kg", "passes_at", "robustness"}
-    needed |= {"margin", "p_pass", EXCAVATED.name, BACKFILLED.name}
+    needed |= {"margin", "p_pass", "p_undecided", "p_undecided_reason", EXCAVATED.name, BACKFILLED.name}
     answers = (need.key.answer, "found")
     return need.arrow.select([n for n in need.arrow.column_names if n in needed or n.startswith(answers)])
 
@@ -124,7 +128,7 @@ def _by_soil(need: Need, rows: Sequence[Row], units: str) -> list[list[str]]:
     others = [((name, ""), word_of(name)) for name in labels if name != SOIL]
     others += [(head_of(name, units), number_of(name, units)) for name in names if BY_NAME[name].section != SOIL]
     others += [] if key.name.startswith("boulder_") else [_mass(units)]
-    answer = _answer(key, "", 1.0 if units == "si" else shown_unit(key.field.unit, units).size)
+    answer = answer_cell(key, key.answer, "found", units)
     answers: dict[tuple[str, ...], dict[tuple[str, ...], str]] = {}
     for row in rows:
         by_soil = answers.setdefault(tuple(cell(row) for _, cell in others), {})
@@ -155,8 +159,11 @@ def _legend(need: Need, file: str) -> list[str]:
     """Return what the words of the answers mean, how many rows have each, and what to ask next."""
     counts = need.counts()
     occurring = {*counts, *(word for name in need.others for word in need.arrow[f"found_{name}"].unique().to_pylist())}
+    smaller = "smaller" if need.key.most else "greater"
+    steady = f"passes here and at all {smaller} values, and in other places between values that fail"
+    broken = f"{steady} (never*: there alone)" if need.key.is_steady else "fails again further on"
     lines = [
-        f"{note} ({counted(counts[word], 'row')})" if word in counts else note
+        f"{note.format(broken)} ({counted(counts[word], 'row')})" if word in counts else note.format(broken)
         for word, note in NOTES.items()
         if word in occurring
     ]
@@ -179,14 +186,7 @@ def _grades(need: Need) -> list[str]:
 
 def _outside(need: Need) -> list[str]:
     """Return what a pass is, and how many answers lie outside what the model was tested on."""
-    passing = need.arrow.filter(need.arrow["passes_at"].is_valid())
-    if not len(passing):
-        return []
-    count = len(passing)
-    flags = flag_counts(Counter(passing["validity"].to_pylist()).items())
-    named = ", ".join(f"{name} {flagged:,}" for name, flagged in flags.items() if name)
-    inside = f"flags: {flags.get('', 0):,} of {counted(count, 'answer')} inside what the model was tested on"
-    return [f"an answer is {NOT_A_RATING}", f"{inside}{f'; {named}' if named else ''} (docs/validity.md)"]
+    return flag_lines(need.arrow.filter(need.arrow["passes_at"].is_valid())["validity"].to_pylist())
 
 
 def _edges(need: Need, units: str, file: str) -> list[str]:
@@ -218,24 +218,27 @@ def _edges(need: Need, units: str, file: str) -> list[str]:
 def _need_columns(need: Need, units: str) -> list[Column]:
     """Return the columns of a terminal table: varying inputs, the answer, and what follows from it."""
     key = need.key
-    unit, size = (key.field.unit, 1.0) if units == "si" else shown_unit(key.field.unit, units)
+    unit = key.field.unit if units == "si" else shown_unit(key.field.unit, units).unit
     hidden = (key.name, *need.derived, BOULDER_MASS.name)  # the mass has a column of its own
     columns = leading(need.sweep, need.arrow, [name for name in HEADS if name not in hidden], units)
     if key.name == BOULDER_MASS.name:
-        columns.append((("mass", unit), _answer(key, "", size)))
+        columns.append((("mass", unit), answer_cell(key, key.answer, "found", units)))
         columns += [(head_of(name, units), _where_it_passes(_length(name))) for name in (*SIDES, DEPTH)]
     else:
-        columns.append((head_of(key.name, units), _answer(key, "", size)))
+        columns.append((head_of(key.name, units), answer_cell(key, key.answer, "found", units)))
         if key.name == DEPTH:
             columns.append((("ratio", "d/H"), _where_it_passes(lambda row: f"{row[DEPTH] / row[HEIGHT]:.3f}")))
             columns.append((("above", unit), _where_it_passes(lambda row: f"{row[HEIGHT] - row[DEPTH]:.2f}")))
         columns.append(_mass(units))
     if "p_pass" in need.arrow.column_names:
-        columns.append((("P(pass)", ""), _where_it_passes(lambda row: f"{row['p_pass']:.3f}")))
+        columns.append((("P(pass)", ""), _chance))
+        columns += undecided_columns(need.arrow)
     else:
         columns.append((("margin", ""), _where_it_passes(_margin)))
-    columns.append((GRADE[0], lambda row: (row["passes_at"] and row["robustness"]) or "-"))
-    columns += [((SHORT[name], unit), _answer(key, f"_{name}", size)) for name in need.others]
+        columns.append((GRADE[0], lambda row: (row["passes_at"] and row["robustness"]) or "-"))
+    columns += [
+        ((SHORT[name], unit), answer_cell(key, f"{key.answer}_{name}", f"found_{name}", units)) for name in need.others
+    ]
     return [*columns, *((head, _where_it_passes(cell)) for head, cell in volume_columns(units))]
 
 
@@ -249,22 +252,12 @@ def _length(name: str) -> Cell:
     return lambda row: f"{row[name]:.3f}"
 
 
+def _chance(row: Row) -> str:
+    return "" if row["passes_at"] is None and not row["p_undecided"] else f"{row['p_pass']:.3f}"
+
+
 def _margin(row: Row) -> str:
     return "" if row["margin"] is None else f"{row['margin']:.1%}"
-
-
-def _answer(key: Key, suffix: str, size: float) -> Cell:
-    """Return a formatter for the answer by some readings."""
-    decimals = max(0, -math.floor(math.log10(key.tolerance / size) + 1e-9))
-    name, kind = f"{key.answer}{suffix}", f"found{suffix}"
-
-    def cell(row: Row) -> str:
-        if row[name] is None:
-            return "blocked" if row[kind] == "blocked_by_overlap" else str(row[kind])
-        before = {"always": "≥" if key.most else "≤"}.get(row[kind], "")
-        return f"{before}{row[name]:.{decimals}f}{'*' if row[kind] == 'not_monotone' else ''}"
-
-    return cell
 
 
 def _mass(units: str) -> Column:

@@ -1,18 +1,36 @@
-"""Which way up, and with which face to the vehicle, a scanned stone passes at a site in the least depth."""
+"""Which way up, and with which face to the vehicle, a scanned stone passes at a site in the least depth.
+
+Every way is asked as ``sweep need`` asks: a depth is an answer only if all greater depths pass too.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
-from boulder_sweep.answers.need import need
+from boulder_sweep.answers.keys import Key, key_of
+from boulder_sweep.answers.need import Need, need
+from boulder_sweep.answers.search import ALWAYS, BLOCKED, NEVER, NOT_MONOTONE, UNKNOWN, WORDS
+from boulder_sweep.answers.trials import ROUNDING_M
 from boulder_sweep.drawing import draw
 from boulder_sweep.settings import Sweep
 from boulder_sweep.stones.standing import Standing
 from boulder_sweep.stones.weighing import ScannedStone
 from boulder_sweep.text import ProgressCallback
+
+SIGNS = {
+    WORDS[ALWAYS]: "≤: passes from the least depth tried on; a lesser one may do",
+    WORDS[NOT_MONOTONE]: "*: passes less deep as well, but fails in between: no depth to build",
+}
+"""What the signs beside depths mean."""
+NOTHING = {
+    WORDS[NEVER]: "it fails at every depth",
+    WORDS[BLOCKED]: "it fails down to where the truck would pass or ride over it",
+    WORDS[NOT_MONOTONE]: "it passes at some depths, and fails at greater ones",
+}
+"""Why there is no depth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,12 +44,19 @@ class Way:
     row : dict
         Row of `boulder_sweep.need` that asks for the largest depth, or has no depth at which the stone passes.
     depth_m : float or None
-        Least depth at which it passes in every soil and before every vehicle of the site [m].
+        Depth from which on it passes in every soil and before every vehicle of the site [m].
     """
 
     standing: Standing
     row: dict[str, Any]
     depth_m: float | None
+
+    @property
+    def why_not(self) -> str:
+        """Why there is no depth, where there is none."""
+        if self.row["found"] == WORDS[UNKNOWN]:
+            return f"it is undecided ({self.row['reason']})"
+        return NOTHING.get(self.row["found"], "one vehicle would ride over it at the depth that another asks for")
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +82,8 @@ class Placing:
 
     shown = 3
     """Ways that are drawn, at most."""
+    key: ClassVar[Key] = key_of("embedment_depth")
+    """What is asked for."""
 
     @property
     def passing(self) -> list[Way]:
@@ -87,6 +114,20 @@ def boulder_block(stone: ScannedStone, standing: Standing) -> str:
     points = zip(*(side.tolist() for side in (profile.height, profile.width, profile.near, profile.far)), strict=True)
     listed = ", ".join(f"{{height: {z!r} m, width: {w!r} m, near: {n!r} m, far: {f!r} m}}" for z, w, n, f in points)
     return f"boulder={{density: {stone.density_kg_m3!r} kg/m^3, profile: [{listed}]}}"
+
+
+def _common(answers: Need) -> tuple[dict[str, Any], float | None]:
+    """Return the row that decides, and the depth from which on all rows pass; None where there is none."""
+    rows, name = answers.arrow.to_pylist(), answers.key.answer
+    none = next((row for row in rows if row[name] is None), None)
+    if none is not None:
+        return none, None
+    worst = max(rows, key=lambda row: row[name])
+    depth: float = worst[name]
+    # A truck with a high bumper may go over the stone at the depth that one with a low bumper asks for.
+    least = answers.sweep.criterion.min_overlap_m - ROUNDING_M
+    met = all(row["overlap_m"] + row[name] - depth >= least for row in rows)
+    return worst, depth if met else None
 
 
 def placed(
@@ -123,12 +164,9 @@ def placed(
     for done, standing in enumerate(flat):
         if progress is not None:
             progress(done, len(flat))
-        answers = need(site(boulder_block(stone, standing)), margin=margin)
-        rows, name = answers.arrow.to_pylist(), answers.key.answer
-        cases = len(rows)
-        none = next((row for row in rows if row[name] is None), None)
-        worst = max(rows, key=lambda row: row[name]) if none is None else none
-        ways.append(Way(standing, worst, worst[name]))
+        answers = need(site(boulder_block(stone, standing)), Placing.key.name, margin=margin)
+        cases = len(answers)
+        ways.append(Way(standing, *_common(answers)))
     if progress is not None:
         progress(len(flat), len(flat))
     ways.sort(key=lambda way: (way.depth_m is None, way.depth_m or 0.0))

@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from boulder_sweep.answers.keys import key_of
+from boulder_sweep.answers.search import ALWAYS, BLOCKED, NEVER, NOT_MONOTONE, UNKNOWN, WORDS
 from boulder_sweep.columns import BY_NAME as COLUMNS
 from boulder_sweep.columns import GRADES, WAY_OUT
 from boulder_sweep.judge.quantities import BACKFILLED, EXCAVATED
+from boulder_sweep.judge.validity import NOT_A_RATING, flag_counts
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import FOOT_WORDS
 from boulder_sweep.settings.shown_units import number_text, quantity_text, shown_unit
 from boulder_sweep.stones.rock import ROCK_KG_M3
+from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
     from boulder_sweep.answers.doubts import Doubt
-    from boulder_sweep.answers.reserves import Reserve, Reserves
+    from boulder_sweep.answers.keys import Key
+    from boulder_sweep.answers.reserves import Reserves
     from boulder_sweep.answers.result import Result
     from boulder_sweep.answers.uncertainty import Uncertainty
     from boulder_sweep.settings import Sweep
@@ -57,6 +62,15 @@ NOT_FAILING = {
     "no_progress": "no_progress: small steps lead no nearer to the rare designs; see P(pass)",
     "contradicts": "contradicts: P(fail) would contradict P(pass), which is counted; see P(pass)",
 }
+WITHSTOOD = {
+    WORDS[ALWAYS]: "≥, ≤: passes throughout, up to the worst value tried",
+    WORDS[NOT_MONOTONE]: "*: up to here everything passes; it passes again beyond values that fail, which counts for "
+    "nothing (columns ..._passes_within, -o). never*: fails already at the mildest value tried",
+    WORDS[NEVER]: "never: passes at no value tried",
+    WORDS[BLOCKED]: "blocked: the truck would pass or ride over the boulder",
+    WORDS[UNKNOWN]: "undecided: passes at no value tried; see the reason below",
+}
+"""What the kinds of answers mean to a design that withstands something."""
 Row = Mapping[str, Any]
 Cell = Callable[[Row], str]
 Column = tuple[tuple[str, str], Cell]
@@ -89,6 +103,16 @@ def grade_lines(rows: Iterable[Row]) -> list[str]:
     return wrapped(f"{word}: {meaning}" for word, meaning in ranked)
 
 
+def flag_lines(answers: Sequence[str]) -> list[str]:
+    """Return what an answer is, and how many lie outside what the model was tested on, from their flags."""
+    if not answers:
+        return []
+    flags = flag_counts(Counter(answers).items())
+    named = ", ".join(f"{name} {flagged:,}" for name, flagged in flags.items() if name)
+    inside = f"flags: {flags.get('', 0):,} of {counted(len(answers), 'answer')} inside what the model was tested on"
+    return wrapped([f"an answer is {NOT_A_RATING}", f"{inside}{f'; {named}' if named else ''} (docs/validity.md)"])
+
+
 def foot_lines(model: Model, reasons: Iterable[str | None] = (), units: str = "si") -> list[str]:
     """Return on which foot boulders stand, of what rock they are if that is assumed, and what to do about reasons."""
     words = [FOOT_WORDS[model.foot]]
@@ -97,6 +121,26 @@ def foot_lines(model: Model, reasons: Iterable[str | None] = (), units: str = "s
     occurring = set(reasons)
     words += [f"undecided ({reason}): {advice}" for reason, advice in WAY_OUT.items() if reason in occurring]
     return wrapped(words)
+
+
+def reasons_in(table: pa.Table) -> set[str | None]:
+    """Return the reasons of rows, and of the designs drawn for their probabilities."""
+    columns = [name for name in ("reason", "p_undecided_reason") if name in table.column_names]
+    return {reason for name in columns for reason in table[name].unique().to_pylist()}
+
+
+def undecided_columns(table: pa.Table) -> list[Column]:
+    """Return the column of the share of the designs drawn that is undecided, where some are."""
+    if not any(table["p_undecided"].to_pylist()):
+        return []
+    return [(("not", "decided"), lambda row: f"{row['p_undecided']:.4f}")]
+
+
+def undecided_lines(table: pa.Table) -> list[str]:
+    """Return why designs that were drawn are undecided, and what that does to the probability of passing."""
+    reasons = sorted({reason for reason in table["p_undecided_reason"].unique().to_pylist() if reason})
+    words = f"not decided: undecided ({', '.join(reasons)}); if all of these passed, P(pass) would be larger by as much"
+    return wrapped([words] if reasons else [])
 
 
 def wrapped(texts: Iterable[str]) -> list[str]:
@@ -138,10 +182,10 @@ def uncertainty_lines(result: Uncertainty, units: str = "si") -> list[str]:
     """
     columns: list[Column] = [
         (("at the", "means"), lambda row: str(row["verdict"])),
-        *([GRADE] if result.sweep.model.second_opinion else []),
         (("P(pass)", ""), lambda row: f"{row['p_pass']:.4f}"),
         (("from", ""), lambda row: f"{row['p_pass_low']:.4f}"),
         (("to", ""), lambda row: f"{row['p_pass_high']:.4f}"),
+        *undecided_columns(result.arrow),
         *([(("P(fail)", ""), _failing)] if "p_fail" in result.arrow.column_names else []),
         (("decided", "by"), lambda row: row["p_pass_driver"] or "-"),
         (("designs", "drawn"), lambda row: f"{row['p_pass_designs']:,}"),
@@ -149,9 +193,7 @@ def uncertainty_lines(result: Uncertainty, units: str = "si") -> list[str]:
     lines, rows = _rows_lines(result, columns, units)
     occurring = {row.get("p_fail_by") for row in rows}
     lines += [note for word, note in NOT_FAILING.items() if word in occurring]
-    if result.sweep.model.second_opinion:
-        lines += grade_lines(rows)
-    lines += foot_lines(result.sweep.model, units=units)
+    lines += [*undecided_lines(result.arrow), *foot_lines(result.sweep.model, reasons_in(result.arrow), units)]
     return [*lines, "", *_index_lines(result)] if len(result) == 1 else lines
 
 
@@ -203,32 +245,39 @@ def reserve_lines(result: Reserves, units: str = "si") -> list[str]:
     from boulder_sweep.answers.reserves import RESERVES
 
     columns: list[Column] = [(("verdict", ""), lambda row: str(row["verdict"])), GRADE]
-    for reserve, decimals in zip(RESERVES, (2, 0, 2), strict=True):
-        field = key_of(reserve.input).field
-        size = 1.0 if units == "si" else shown_unit(field.unit, units).size
-        columns.append((head_of(field.name, units), _format_withstood(reserve, field.name, decimals, size)))
+    for key, column, word, _ in RESERVES:
+        columns.append((head_of(key.name, units), _format_withstood(key, column, f"{word}_found", units)))
     columns.append((("class,", "simulated"), lambda row: row["simulated_class"] or row["simulated_iso_speed"] or "-"))
     lines, rows = _rows_lines(result, [*columns, *volume_columns(units)], units)
     lines += volume_lines(lines[0])
-    if any(sign in line for line in lines for sign in "≥≤"):
-        lines.append("≥, ≤: passes at the worst value tried")
-    return [*lines, *grade_lines(rows), *foot_lines(result.sweep.model, units=units)]
+    kinds = {row[f"{reserve.word}_found"] for row in rows for reserve in RESERVES}
+    lines += wrapped(words for kind, words in WITHSTOOD.items() if kind in kinds)
+    return [*lines, *grade_lines(rows), *foot_lines(result.sweep.model, reasons_in(result.arrow), units)]
 
 
-def _format_withstood(reserve: Reserve, name: str, decimals: int, size: float) -> Cell:
-    """Return a formatter for a value that is withstood and its distance from that of the design.
-
-    A design that passes at the worst value tried may withstand more.
-    """
-    sense, sign = (1.0, "≥") if reserve.worst > reserve.best else (-1.0, "≤")
-    end = (sense - 1e-9) * reserve.worst / size
+def _format_withstood(key: Key, column: str, found: str, units: str) -> Cell:
+    """Return a formatter for a value that is withstood and its distance from that of the design."""
+    answer = answer_cell(key, column, found, units)
 
     def cell(row: Row) -> str:
-        value = row[reserve.column]
-        if value is None:
-            return "-"
-        before = sign if row["verdict"] == "pass" and sense * value >= end else ""
-        return f"{before}{value:.{decimals}f} ({value / row[name] - 1.0:+.0%})"
+        away = "" if row[column] is None else f" ({row[column] / row[key.name] - 1.0:+.0%})" if row[key.name] else ""
+        return f"{answer(row)}{away}"
+
+    return cell
+
+
+def answer_cell(key: Key, column: str, found: str, units: str) -> Cell:
+    """Return a formatter for an answer to a question, from the columns of its value and of what was found."""
+    size = 1.0 if units == "si" else shown_unit(key.field.unit, units).size
+    decimals = max(0, -math.floor(math.log10(key.tolerance / size) + 1e-9))
+
+    def cell(row: Row) -> str:
+        kind = row[found]
+        star = "*" if kind == WORDS[NOT_MONOTONE] else ""
+        if row[column] is None:
+            return "blocked" if kind == WORDS[BLOCKED] else f"{'never' if star else kind}{star}"
+        before = {WORDS[ALWAYS]: "≥" if key.most else "≤"}.get(kind, "")
+        return f"{before}{row[column]:.{decimals}f}{star}"
 
     return cell
 

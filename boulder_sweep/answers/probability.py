@@ -13,18 +13,30 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boulder_sweep.answers.chance import SCRAMBLINGS, Points, Sampled, chance
-from boulder_sweep.answers.draws import Draws
-from boulder_sweep.answers.keys import Ends, Key
+from boulder_sweep.answers.draws import WORST, Draws
+from boulder_sweep.answers.keys import Ends, Key, range_of
 from boulder_sweep.answers.lightest import DEPTH, RATIO, SIDES, Boulders, LightestQuestion, Sides
 from boulder_sweep.answers.questions import CHECKED_AT_ONCE, Answers, Question, Trial
 from boulder_sweep.answers.search import BEYOND, FAILS, HOLDS, Search
 from boulder_sweep.answers.spread import Spread
-from boulder_sweep.answers.trials import InputRows, Judges, Remembered, beyond_reach, ranges, rows_at, uncertain_rows
+from boulder_sweep.answers.trials import (
+    InputRows,
+    Judges,
+    Remembered,
+    beyond_reach,
+    ranges,
+    rows_at,
+    uncertain_rows,
+    ungraded,
+)
 from boulder_sweep.errors import QuestionError
+from boulder_sweep.judge.judged import OVERRIDE
 from boulder_sweep.runner.pool import Pool
 from boulder_sweep.settings.fields import BY_NAME
 
 if TYPE_CHECKING:
+    from boulder_sweep.designs import DesignBlock
+    from boulder_sweep.judge.judged import Judged
     from boulder_sweep.settings import Sweep
 
 DRAWN = 4096
@@ -69,8 +81,10 @@ class Sampling:
         """Return what draws the designs of some rows."""
         return Draws(rows, self.spread, self.judges, Pool(1), self.variants)
 
-    def often(self, draws: Draws, index: np.ndarray, inputs: InputRows, points: np.ndarray) -> np.ndarray:
-        """Return whether designs pass often enough, by some of the points, bool, shape (m,).
+    def codes(self, draws: Draws, index: np.ndarray, inputs: InputRows, points: np.ndarray) -> np.ndarray:
+        """Return the predicate of `search` for designs, by some of the points, shape (m,).
+
+        It holds where they pass often enough; where the truck goes over too many of them there is nothing to try.
 
         Parameters
         ----------
@@ -83,18 +97,21 @@ class Sampling:
         points
             The points.
         """
-        enough = np.empty(len(index), dtype=bool)
+        codes = np.empty(len(index), dtype=np.int8)
         for start, stop in ranges(len(index), AT_ONCE // len(points)):
             repeated = np.repeat(np.arange(start, stop), len(points))
-            passes = draws.passes(index[repeated], np.tile(points, (stop - start, 1)), **rows_at(inputs, repeated))
-            enough[start:stop] = passes.reshape(-1, len(points)).mean(axis=1) >= self.probability
-        return enough
+            drawn = draws.drawn(index[repeated], np.tile(points, (stop - start, 1)), **rows_at(inputs, repeated))
+            distance, known = (values.reshape(-1, len(points)) for values in drawn)
+            over = (known == -OVERRIDE) | ((known == 0) & (distance <= WORST))
+            failing = np.where(over.mean(axis=1) > 1.0 - self.probability, BEYOND, FAILS)
+            codes[start:stop] = np.where((known == 1).mean(axis=1) >= self.probability, HOLDS, failing)
+        return codes
 
     def chances(self, draws: Draws, inputs: InputRows) -> Sampled:
         """Return the probabilities of passing of all rows with inputs set, from the points and more where needed."""
 
         def event(index: np.ndarray, z: np.ndarray) -> np.ndarray:
-            return draws.passes(index, z, **rows_at(inputs, index))
+            return draws.drawn(index, z, **rows_at(inputs, index))[1]
 
         count, points = len(next(iter(inputs.values()))), Points(draws.dimensions, self.seed)
         return chance(event, count, points, half_width=HALF_WIDTH, first=DRAWN // SCRAMBLINGS)
@@ -136,9 +153,19 @@ class ProbabilityQuestion(Question):
         """Return the object that tries values in some rows."""
         return ProbabilityTrial(self, rows)
 
+    def graded(self, judged: Judged, block: DesignBlock) -> Judged:
+        """Return the outcomes at the means, without a grade."""
+        return ungraded(judged)
+
+    def undecided(self, judged: Judged, chances: Sampled | None) -> np.ndarray:
+        """Return where enough designs would pass if those that are undecided did, bool, shape (n,)."""
+        assert chances is not None
+        return (chances.unknown > 0.0) & (chances.estimate + chances.unknown >= self.sampling.probability)
+
     def values_to_try(self) -> int:
         """Return how many values are tried in all, if every row changes once from failing to passing."""
-        pieces = [self.lattice(self.open.rows(*ends)) for ends in ranges(self.count, CHECKED_AT_ONCE)]
+        rows = (self.open.rows(*ends) for ends in ranges(self.count, CHECKED_AT_ONCE))
+        pieces = [self.lattice(*range_of(self.sweep, self.key, some, self.between)) for some in rows]
         widest = np.concatenate([np.abs(last - first) for first, last in pieces]) / self.cells
         return int(np.sum(self.cells + 1 + np.ceil(np.log2(np.maximum(widest, 1.0)))))
 
@@ -163,11 +190,11 @@ class ProbabilityTrial(Trial):
     def _codes(self, index: np.ndarray, positions: np.ndarray, *, quick: bool) -> np.ndarray:
         block, judged = self.judged(index, positions, quick=True)
         sampling = self.asked.sampling
-        often = sampling.often(self.draws, index, {self.key.name: self.key.values(positions)}, sampling.points)
+        codes = sampling.codes(self.draws, index, {self.key.name: self.key.values(positions)}, sampling.points)
         self.simulated += DRAWN * len(index)
         if self.asked.tried is not None:
             self.asked.tried(len(index))
-        return np.where(beyond_reach(block, judged), BEYOND, np.where(often, HOLDS, FAILS))
+        return np.where(beyond_reach(block, judged), BEYOND, codes)
 
 
 class LikelyLightestQuestion(LightestQuestion):
@@ -213,7 +240,8 @@ class LikelyLightestQuestion(LightestQuestion):
         answers = super().answered(start, stop)
         sizes = {name: answers.block.columns[name].to_numpy() for name in (*SIDES, DEPTH)}
         chances = self.sampling.chances(self.sampling.draws(self.given(start, stop)), sizes)
-        return replace(answers, chances=chances, simulated=answers.simulated + int(chances.points.sum()))
+        simulated = answers.simulated + int(chances.points.sum())
+        return replace(answers, judged=ungraded(answers.judged), chances=chances, simulated=simulated)
 
 
 class LikelyBoulders(Boulders):
@@ -230,7 +258,6 @@ class LikelyBoulders(Boulders):
         points = self.sampling.few if quick else self.sampling.points
         self.simulated += len(block) + len(points) * int(reached.sum())
         sizes = {name: block.columns[name].to_numpy()[reached] for name in (*SIDES, DEPTH)}
-        often = self.sampling.often(self.draws, index[reached], sizes, points)
         codes = np.full(len(index), BEYOND, dtype=np.int8)
-        codes[reached] = np.where(often, HOLDS, FAILS)
+        codes[reached] = self.sampling.codes(self.draws, index[reached], sizes, points)
         return codes

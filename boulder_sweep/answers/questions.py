@@ -18,9 +18,12 @@ from boulder_sweep.answers.search import (
     HOLDS,
     NEVER,
     NOT_MONOTONE,
+    UNKNOWN,
+    Predicate,
     Search,
     search,
     searched_again,
+    steady,
 )
 from boulder_sweep.answers.trials import (
     InputRows,
@@ -33,13 +36,18 @@ from boulder_sweep.answers.trials import (
     too_low,
     uncertain_rows,
 )
-from boulder_sweep.judge.judged import with_rows
+from boulder_sweep.judge.judged import UNDECIDED, with_rows
 
 CHECKED_AT_ONCE = 65_536
 """Rows whose ranges are checked together, before any row is searched."""
 FAST_OVERTURN_S = 0.3
 """No passing value is searched between two at which the design reaches the limit before this time. Where one exists,
 one of its neighbours reaches the limit after 0.5 s or later (see tests/answers/test_scan.py)."""
+SHALLOW, SLIDES_M = 0.45, 0.1
+"""Embedment over height below which a boulder that passes by sliding so far [m] may overturn for values between two
+that pass, in stretches of 1 % of the value and less,"""
+FINE_CELLS = 400
+"""and pieces into which its range is then cut."""
 
 if TYPE_CHECKING:
     from boulder_sweep.answers.chance import Sampled
@@ -92,7 +100,93 @@ class Answers(Brackets):
     chances: Sampled | None = None
 
 
-class Question:
+class ValueSearch:
+    """Searches designs for the smallest, or the largest, value of one input that passes.
+
+    Parameters
+    ----------
+    sweep
+        The sweep asked about.
+    key
+        The input.
+    judges
+        How designs are judged.
+    """
+
+    cells = CELLS
+    """Number of cells into which the scan divides a range."""
+
+    def __init__(self, sweep: Sweep, key: Key, judges: Judges) -> None:
+        self.sweep, self.key, self.judges = sweep, key, judges
+
+    def trial(self, rows: InputRows) -> Trial:
+        """Return the object that tries values in some rows."""
+        return Trial(self.key, self.judges, rows)
+
+    def lattice(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the first and the last position that are searched between the ends of ranges."""
+        first, last = self.key.ends(low, high)
+        return (last, first) if self.key.most else (first, last)
+
+    def answers_of(self, rows: InputRows, low: np.ndarray, high: np.ndarray) -> Answers:
+        """Return the answers of n designs, between the ends of a range for each, shape (n,)."""
+        every = np.arange(len(low))
+        first, last = self.lattice(low, high)
+        trial = self.trial(rows)
+        result = search(trial.coarse, first, last, self.cells)
+        result = self._again(trial.coarse, result, every[trial.slides], trial, first, last)
+        wrong = trial.contradicted(result)
+        block, judged = trial.judged(every, result.shown)
+        if len(wrong):
+            result = self._again(trial.final, result, wrong, trial, first, last)
+            judged = with_rows(judged, wrong, trial.judged(wrong, result.shown[wrong])[1])
+            block = trial.block(every, result.shown)
+        chances = trial.chances(result.shown)
+        return Answers(
+            block,
+            self._kinds(rows, result, judged, chances, high if not self.key.most else low),
+            np.where(result.has_fails, self.key.values(result.fails), np.nan),
+            np.where(result.has_holds, self.key.values(result.holds), np.nan),
+            self.graded(judged, block),
+            [_stretches(self.key, result.changes.get(row), first[row], last[row]) for row in every.tolist()],
+            trial.simulated,
+            chances,
+        )
+
+    def graded(self, judged: Judged, block: DesignBlock) -> Judged:
+        """Return the outcomes at the answers with their grades."""
+        return self.judges.final.graded(judged, block)
+
+    def undecided(self, judged: Judged, chances: Sampled | None) -> np.ndarray:
+        """Return where designs that are no answers would be if what is undecided passed, bool, shape (n,)."""
+        return judged.verdict == UNDECIDED
+
+    def _again(
+        self, predicate: Predicate, result: Search, rows: np.ndarray, trial: Trial, first: np.ndarray, last: np.ndarray
+    ) -> Search:
+        """Search some rows again, those whose boulders slide by smaller steps."""
+        for some, cells in ((rows[~trial.slides[rows]], self.cells), (rows[trial.slides[rows]], FINE_CELLS)):
+            result = searched_again(predicate, result, some, first, last, cells)
+        return steady(result) if self.key.is_steady else result
+
+    def _kinds(
+        self, rows: InputRows, result: Search, judged: Judged, chances: Sampled | None, end: np.ndarray
+    ) -> np.ndarray:
+        """Return the kinds of the answers of some rows, codes of `WORDS`, shape (n,).
+
+        Where nothing passes, the design at the end of the range tells by its sizes whether the truck goes over it: not
+        the last position of the lattice, which may lie before it, nor its verdict, which may name another failure.
+        """
+        kind = result.kind.copy()
+        none = np.flatnonzero(~result.has_holds & (kind != NOT_MONOTONE))
+        if len(none):
+            last = block_at(rows, none, **{self.key.name: end[none]})
+            kind[none] = np.where(too_low(last, self.sweep.criterion.min_overlap_m), BLOCKED, NEVER)
+            kind[none[self.undecided(judged, chances)[none]]] = UNKNOWN
+        return kind
+
+
+class Question(ValueSearch):
     """The smallest, or the largest, value of one input that passes.
 
     Parameters
@@ -114,13 +208,12 @@ class Question:
 
     rows_at_once = 2048
     """Rows of a block; small enough that an interruption takes effect soon."""
-    cells = CELLS
-    """Number of cells into which the scan divides a range."""
     tried: Callable[[int], None] | None = None
     """Called with how many values have been tried, by the threads that try them; for questions with slow rows."""
 
     def __init__(self, sweep: Sweep, key: Key, between: Ends, judges: Judges) -> None:
-        self.sweep, self.key, self.between, self.judges = sweep, key, between, judges
+        super().__init__(sweep, key, judges)
+        self.between = between
         self.open = Open(sweep, (key.name,))
         pieces = (self.open.rows(start, stop) for start, stop in ranges(self.count, CHECKED_AT_ONCE))
         refuse_coarse(sweep, key, pieces, between)  # also refuses a wrong range, before anything is computed
@@ -137,50 +230,8 @@ class Question:
     def answered(self, start: int, stop: int) -> Answers:
         """Answer the rows ``[start, stop)``."""
         rows = uncertain_rows(self.open.sweep, self.open.rows(start, stop), start, stop)
-        first, last = self.lattice(rows)
-        trial = self.trial(rows)
-        result = search(trial.coarse, first, last, self.cells)
-        every = np.arange(stop - start)
-        wrong = trial.contradicted(result)
-        block, judged = trial.judged(every, result.shown)
-        if len(wrong):
-            result = searched_again(trial.final, result, wrong, first, last, self.cells)
-            judged = with_rows(judged, wrong, trial.judged(wrong, result.shown[wrong])[1])
-            block = trial.block(every, result.shown)
-        return Answers(
-            replace(block, labels=self.open.labels(start, stop)),
-            self.kinds(rows, result),
-            np.where(result.has_fails, self.key.values(result.fails), np.nan),
-            np.where(result.has_holds, self.key.values(result.holds), np.nan),
-            self.judges.final.graded(judged, block),
-            [_stretches(self.key, result.changes.get(row), first[row], last[row]) for row in range(stop - start)],
-            trial.simulated,
-            trial.chances(result.shown),
-        )
-
-    def lattice(self, rows: InputRows) -> tuple[np.ndarray, np.ndarray]:
-        """Return the first and the last position that are searched in some rows."""
-        low, high = range_of(self.sweep, self.key, rows, self.between)
-        first, last = self.key.ends(low, high)
-        return (last, first) if self.key.most else (first, last)
-
-    def trial(self, rows: InputRows) -> Trial:
-        """Return the object that tries values in some rows."""
-        return Trial(self.key, self.judges, rows)
-
-    def kinds(self, rows: InputRows, result: Search) -> np.ndarray:
-        """Return the kinds of the answers of some rows, codes of `WORDS`, shape (n,).
-
-        Where nothing passes, the design at the end of the range tells by its sizes whether the truck goes over it: not
-        the last position of the lattice, which may lie before it, nor its verdict, which may name another failure.
-        """
-        kind = result.kind.copy()
-        none = np.flatnonzero(~result.has_holds)
-        if len(none):
-            end = range_of(self.sweep, self.key, rows, self.between)[0 if self.key.most else 1]
-            last = block_at(rows, none, **{self.key.name: end[none]})
-            kind[none] = np.where(too_low(last, self.sweep.criterion.min_overlap_m), BLOCKED, NEVER)
-        return kind
+        answers = self.answers_of(rows, *range_of(self.sweep, self.key, rows, self.between))
+        return replace(answers, block=replace(answers.block, labels=self.open.labels(start, stop)))
 
 
 class Trial:
@@ -189,6 +240,8 @@ class Trial:
     def __init__(self, key: Key, judges: Judges, rows: InputRows) -> None:
         self.key, self.judges, self.rows = key, judges, rows
         self.simulated = 0
+        self.slides = np.zeros(len(next(iter(rows.values()))), dtype=bool)
+        """Rows of which some value that passes makes a shallow boulder slide, shape (n,)."""
         self._final = Remembered(judges.final)
 
     def coarse(self, index: np.ndarray, positions: np.ndarray) -> np.ndarray:
@@ -226,7 +279,13 @@ class Trial:
         return None
 
     def _codes(self, index: np.ndarray, positions: np.ndarray, *, quick: bool) -> np.ndarray:
-        return self.codes(*self.judged(index, positions, quick=quick))
+        block, judged = self.judged(index, positions, quick=quick)
+        codes = self.codes(block, judged)
+        if self.key.is_steady:
+            depth, height = (block.columns[name].to_numpy() for name in ("embedment_depth_m", "boulder_height_m"))
+            sliding = (depth < SHALLOW * height) & (judged["max_displacement_m"] > SLIDES_M)
+            self.slides[index[sliding & (codes == HOLDS)]] = True
+        return codes
 
     def codes(self, block: DesignBlock, judged: Judged) -> np.ndarray:
         """Return what a search asks of judged designs."""

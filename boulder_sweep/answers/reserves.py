@@ -1,6 +1,7 @@
 """What a design withstands: how fast and how heavy a truck and how weak a soil, with everything else unchanged.
 
-An input is made worse until the design fails or, if the design fails as it is, better until it passes.
+Three questions of ``sweep need``, put to every design. Each answer is the end of the stretch from zero, or of the soil
+from the strongest, in which everything passes.
 """
 
 from __future__ import annotations
@@ -11,8 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from boulder_sweep.answers.keys import Key, key_of
-from boulder_sweep.answers.questions import Trial
+from boulder_sweep.answers.keys import Key, key_of, usual_ends
+from boulder_sweep.answers.questions import ValueSearch
 from boulder_sweep.answers.result import (
     Result,
     TableColumn,
@@ -22,8 +23,8 @@ from boulder_sweep.answers.result import (
     to_build,
     write_parquet,
 )
-from boulder_sweep.answers.search import FAILS, HOLDS, Predicate, contradicted, search, searched_again
-from boulder_sweep.answers.trials import InputRows, Judges, judges_of, ranges
+from boulder_sweep.answers.search import WORDS
+from boulder_sweep.answers.trials import Judges, judges_of, ranges
 from boulder_sweep.designs import block_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import Location
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 
     from boulder_sweep.settings import Sweep
 
-ROWS_AT_ONCE = 2048
+ROWS_AT_ONCE = 512
 MPH = 0.44704
 CLASSES = {"M30": 30 * MPH, "M40": 40 * MPH, "M50": 50 * MPH}
 """Nominal speeds [m/s] of the ASTM F2656 classes for a medium-duty truck."""
@@ -51,21 +52,18 @@ CLASS_TOLERANCE = 0.02
 class Reserve(NamedTuple):
     """One input that is made worse."""
 
-    input: str
-    """Key of the file."""
+    key: Key
     column: str
     """Column of what is withstood."""
-    best: float
-    """Best value tried."""
-    worst: float
-    """Worst value tried, unless the design itself has a worse one."""
+    word: str
+    """What the columns of its bracket are called by."""
     meaning: str
 
 
 RESERVES = (
-    Reserve("speed", "withstands_speed_m_s", 1.0, 40.0, "largest impact speed"),
-    Reserve("vehicle.mass", "withstands_mass_kg", 100.0, 60_000.0, "largest mass of the vehicle"),
-    Reserve("friction_angle", "withstands_friction_angle_deg", 59.0, 15.0, "smallest friction angle of the soil"),
+    Reserve(key_of("speed", most=True), "withstands_speed_m_s", "speed", "largest impact speed"),
+    Reserve(key_of("vehicle.mass", most=True), "withstands_mass_kg", "mass", "largest mass of the vehicle"),
+    Reserve(key_of("friction_angle"), "withstands_friction_angle_deg", "soil", "smallest friction angle of the soil"),
 )
 
 
@@ -103,8 +101,8 @@ def reserves(sweep: Sweep, *, jobs: int | None = None, progress: ProgressCallbac
     Returns
     -------
     Reserves
-        One row a design. If a design fails at every value tried, the column is null; if it never fails, the column
-        holds the last value tried, or the design's own value if that is worse still.
+        One row a design, with the answer to each question and its bracket, as `boulder_sweep.need` gives them: from
+        zero, or from 49 degrees, to the end of the usual range or to the design's own value where that lies beyond.
 
     Raises
     ------
@@ -119,52 +117,6 @@ def reserves(sweep: Sweep, *, jobs: int | None = None, progress: ProgressCallbac
     calls = (call(_table, sweep, judges, start, stop) for start, stop in ranges(sweep.n_designs, ROWS_AT_ONCE))
     tables = collected(Pool(jobs)(calls), sweep.n_designs, progress)
     return Reserves(sweep, joined_tables(tables, sweep, judges, "boulder_sweep.answers.reserves"))
-
-
-def withstood(key: Key, judges: Judges, rows: InputRows, passes: np.ndarray, best: float, worst: float) -> np.ndarray:
-    """Return the worst value of an input that each of n designs withstands; NaN where it fails at every value.
-
-    Parameters
-    ----------
-    key
-        The input.
-    judges
-        How designs are judged.
-    rows
-        Inputs of the designs.
-    passes
-        Whether they pass as they are.
-    best, worst
-        Range over which the input is changed. It begins at the design's own value: a design that passes beyond `worst`
-        withstands its own value, and nothing is tried for one that fails beyond `best`.
-    """
-    trial = Trial(key, judges, rows)
-    position = rows[key.name] / key.tolerance
-    # The nearest lattice position on the better side; a design that passes also passes there.
-    first = (np.floor(position + 1e-9) if worst > best else np.ceil(position - 1e-9)).astype(np.int64)
-    ends = (round(end / key.tolerance) for end in (worst, best))
-    last = np.where(passes, *ends)
-    # A range never runs backwards: towards the better side for a design that passes, or the worse for one that fails.
-    upwards = passes == (worst > best)
-    backwards = np.where(upwards, last < first, last > first)
-    last = np.where(backwards, first, last)
-
-    def change(codes: Predicate) -> Predicate:
-        """Search for the change of verdict; for a design that passes, for the first value at which it does not."""
-
-        def changed(index: np.ndarray, positions: np.ndarray) -> np.ndarray:
-            return np.where((codes(index, positions) == HOLDS) != passes[index], HOLDS, FAILS)
-
-        return changed
-
-    result = search(change(trial.coarse), first, last)
-    wrong = contradicted(change(trial.final), result)
-    result = searched_again(change(trial.final), result, wrong, first, last)
-    # `fails` is the last position before the change; for a design that passes, that is the withstood value.
-    at = np.where(passes, np.where(result.has_holds, result.fails, last), result.holds)
-    at = np.where(passes & result.has_holds & ~result.has_fails, first, at)
-    values = np.where(passes | result.has_holds, key.values(at), np.nan)
-    return np.where(backwards, np.where(passes, rows[key.name], np.nan), values)
 
 
 def classes(
@@ -189,18 +141,27 @@ def classes(
 
 def _table(sweep: Sweep, judges: Judges, start: int, stop: int) -> pa.Table:
     """Return the table of the designs ``[start, stop)``."""
+    from boulder_sweep.store.schema import word_array
+
     rows = sweep.plan.given_rows(start, stop)
     block = block_of(rows)
     judged = judges.final(block)
-    judged, passes = judges.final.graded(judged, block), judges.holds(judged)
+    judged = judges.final.graded(judged, block)
     columns: list[TableColumn] = []
-    values = {}
-    for reserve in RESERVES:
-        key = key_of(reserve.input, most=reserve.worst > reserve.best)
-        values[reserve.column] = withstood(key, judges, rows, passes, reserve.best, reserve.worst)
-        meaning = f"{reserve.meaning} at which the design passes, all else unchanged; simulated"
-        columns.append((reserve.column, key.field.unit, meaning, values[reserve.column]))
-    speed, mass = values["withstands_speed_m_s"], rows["vehicle_mass_kg"]
+    withstood = {}
+    for key, column, word, meaning in RESERVES:
+        own = rows[key.name]
+        low, high = usual_ends(key)
+        answers = ValueSearch(sweep, key, judges).answers_of(rows, np.minimum(low, own), np.maximum(high, own))
+        withstood[column] = answers.passes
+        safe = "all greater angles" if key.name == "friction_angle_deg" else "all smaller values"
+        columns += [
+            (column, key.field.unit, f"{meaning} at which the design passes, as at {safe}; simulated", answers.passes),
+            (f"{word}_fails_at", key.field.unit, "value next to it that does not pass", answers.fails),
+            (f"{word}_found", "", "kind of the answer, as of the same question", word_array(answers.kind, WORDS)),
+            (f"{word}_passes_within", key.field.unit, "where not monotone: all stretches that pass", answers.stretches),
+        ]
+    speed, mass = withstood["withstands_speed_m_s"], rows["vehicle_mass_kg"]
     meaning = "class of ASTM F2656 whose nominal speed is withstood; simulated, which rates no barrier"
     columns.append(("simulated_class", "", meaning, classes(speed, mass)))
     meaning = "speed of tests to ISO 22343-1 (IWA 14-1) of 7200 kg that is withstood; simulated, which rates no barrier"

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_sweep.columns import DESIGN_ID
+from boulder_sweep.columns import DESIGN_ID, REASONS
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.quantities import QUANTITIES, quantities
 from boulder_sweep.locations import Location, RemotePath, location_of
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
+    from boulder_sweep.answers.chance import Sampled
     from boulder_sweep.answers.trials import Judges
     from boulder_sweep.designs import DesignBlock
     from boulder_sweep.judge.judged import Judged
@@ -60,6 +61,22 @@ class Result:
         frame = self.arrow.to_pandas()
         frame.attrs = _attributes(self.arrow)
         return frame
+
+
+def chance_columns(sampled: Sampled, meaning: str) -> list[TableColumn]:
+    """Return the columns of probabilities of passing, the first with a meaning of its own."""
+    from boulder_sweep.store.schema import word_array
+
+    low = "lower end of the interval of p_pass"
+    high = "upper end of the interval of p_pass, at which all that is undecided passes"
+    reason = "commonest reason of the designs drawn that are undecided; null where none is"
+    return [
+        ("p_pass", "1", meaning, sampled.estimate),
+        ("p_pass_low", "1", low, sampled.low),
+        ("p_pass_high", "1", high, sampled.high),
+        ("p_undecided", "1", "chance that the design is undecided", sampled.unknown),
+        ("p_undecided_reason", "", reason, word_array(sampled.cause - 1, REASONS[1:])),
+    ]
 
 
 def rows_table(

@@ -9,15 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 FAILS, HOLDS, BEYOND, FAR = range(4)
 """Values of the predicate: it fails, it holds, there is nothing to try at this position, or it is far from holding."""
-FOUND, ALWAYS, NEVER, NOT_MONOTONE, BLOCKED = range(5)
-"""Kinds of result, codes of `WORDS`."""
-WORDS = ("found", "always", "never", "not_monotone", "blocked_by_overlap")
+FOUND, ALWAYS, NEVER, NOT_MONOTONE, BLOCKED, UNKNOWN = range(6)
+"""Kinds of result, codes of `WORDS`; a search gives all but the last, which is for designs that stay undecided."""
+WORDS = ("found", "always", "never", "not_monotone", "blocked_by_overlap", "undecided")
 CELLS = 16
 """Number of cells into which the scan divides a range."""
 STRIDE = 4
@@ -41,6 +41,8 @@ class Search:
         Whether there is such a position.
     shown : ndarray of int64, shape (n,)
         The position shown for the row: `holds`, or the last position that could be tried.
+    holds_last : ndarray of bool, shape (n,)
+        Whether it holds at the last position that can be tried.
     changes : dict of int to list of (int, int, bool)
         For each row that is not monotone: adjacent positions where it changes, in search order, and whether it holds
         beyond.
@@ -52,6 +54,7 @@ class Search:
     has_fails: np.ndarray
     has_holds: np.ndarray
     shown: np.ndarray
+    holds_last: np.ndarray
     changes: dict[int, list[tuple[int, int, bool]]]
 
 
@@ -109,7 +112,23 @@ def search(predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int
         changes.setdefault(int(edge_rows[k]), []).append(change)
     for row in np.flatnonzero(kind == NOT_MONOTONE):
         changes.setdefault(int(row), [])
-    return Search(kind, fails, held, has_fails, ~none, shown, changes)
+    return Search(kind, fails, held, has_fails, ~none, shown, holds[rows, last_tried], changes)
+
+
+def steady(result: Search) -> Search:
+    """Return a search whose answers hold at all further positions that can be tried.
+
+    Rows that are not monotone begin to hold for good where they rise last. Those that do not hold at the last position
+    have no answer; shown is where the last stretch that holds ends.
+    """
+    fails, holds, shown = result.fails.copy(), result.holds.copy(), result.shown.copy()
+    has_fails, has_holds = result.has_fails.copy(), result.has_holds.copy()
+    for row, changes in result.changes.items():
+        rising = bool(result.holds_last[row])
+        before, behind, _ = next(change for change in reversed(changes) if change[2] == rising)
+        fails[row], holds[row], shown[row] = (before, behind, behind) if rising else (behind, before, behind)
+        has_fails[row], has_holds[row] = True, rising
+    return replace(result, fails=fails, holds=holds, has_fails=has_fails, has_holds=has_holds, shown=shown)
 
 
 def contradicted(predicate: Predicate, result: Search) -> np.ndarray:
@@ -133,7 +152,7 @@ def searched_again(
 def _replace_rows(result: Search, rows: np.ndarray, part: Search) -> Search:
     """Return a search with some of its rows replaced by those of another."""
     arrays = {}
-    for name in ("kind", "fails", "holds", "has_fails", "has_holds", "shown"):
+    for name in ("kind", "fails", "holds", "has_fails", "has_holds", "shown", "holds_last"):
         arrays[name] = getattr(result, name).copy()
         arrays[name][rows] = getattr(part, name)
     again = set(rows.tolist())

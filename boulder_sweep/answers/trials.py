@@ -33,7 +33,7 @@ ends below the impact height of the file."""
 ROUNDING_M = 1e-9
 """What sums of heights may be off by [m]."""
 PLACEHOLDER = 0.5
-SEARCHED = ("verdict", "reason", "margin", "time_to_limit_s", "vehicle_crush_m")
+SEARCHED = ("verdict", "reason", "margin", "time_to_limit_s", "max_displacement_m", "vehicle_crush_m")
 GRADED = ("robustness", "stands_under")
 """Outcomes that searches look at; others are not worked out for the many designs that are only tried."""
 
@@ -213,6 +213,12 @@ def uncertain_rows(sweep: Sweep, given: InputRows, start: int, stop: int) -> Inp
         return given
     labels = sweep.block(start, stop).labels
     return given | {section: np.asarray(labels[section].codes, dtype=float) for section in sets}
+
+
+def ungraded(judged: Judged) -> Judged:
+    """Return outcomes at the means of uncertain inputs without a grade, which would be that of the mean soil alone."""
+    none = np.full(len(judged), -1, dtype=np.int32)
+    return dataclasses.replace(judged, columns=judged.columns | dict.fromkeys(GRADED, none))
 
 
 def beyond_reach(block: DesignBlock, judged: Judged) -> np.ndarray:

@@ -25,6 +25,7 @@ from boulder_sweep.answers.keys import margin_asked, share
 from boulder_sweep.answers.result import (
     Result,
     TableColumn,
+    chance_columns,
     checked_parquet,
     collected,
     joined_tables,
@@ -32,7 +33,7 @@ from boulder_sweep.answers.result import (
     write_parquet,
 )
 from boulder_sweep.answers.spread import Spread
-from boulder_sweep.answers.trials import Judges, judges_of, ranges, uncertain_rows
+from boulder_sweep.answers.trials import Judges, judges_of, ranges, uncertain_rows, ungraded
 from boulder_sweep.designs import block_of
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
@@ -241,24 +242,20 @@ def _rows(asked: _Asked, points: Points, parallel: Pool, start: int, stop: int) 
     first: list[np.ndarray] = []
 
     def event(index: np.ndarray, z: np.ndarray) -> np.ndarray:
-        distance = draws.distance(index, z)
+        distance, known = draws.drawn(index, z)
         if not first:
             first.append(distance.reshape(n, -1))
-        return distance > 0.0
+        return known
 
     sampled = chance(event, n, points, half_width=asked.half_width, confidence=asked.confidence, most=asked.most)
     z = points.upto(FIRST).reshape(FIRST * SCRAMBLINGS, -1)
     driver = drivers(z, first[0])
     failing = rare_failing(asked, draws, sampled) if asked.rare else None
     block = replace(block_of(draws.rows), labels=asked.sweep.block(start, stop).labels)
-    judged = asked.judges.final(block)
-    if asked.sweep.model.second_opinion:
-        judged = asked.judges.final.graded(judged, block)
+    judged = ungraded(asked.judges.final(block))
     driver_meaning = "most influential of the uncertain inputs; null where they change nothing"
     columns: list[TableColumn] = [
-        ("p_pass", "1", "chance that the design passes", sampled.estimate),
-        ("p_pass_low", "1", "lower end of the interval of p_pass", sampled.low),
-        ("p_pass_high", "1", "upper end of the interval of p_pass", sampled.high),
+        *chance_columns(sampled, "chance that the design passes"),
         ("p_pass_driver", "", driver_meaning, word_array(driver, tuple(asked.spread.words))),
         ("p_pass_designs", "1", "designs drawn for p_pass", sampled.points),
     ]

@@ -22,7 +22,6 @@ from boulder_sweep.cli.options import (
     refuse_missing,
     refuse_units_of_json,
     refuse_unwritable,
-    second_opinion_option,
     set_option,
     take_values,
     units_option,
@@ -101,8 +100,10 @@ def need(
 
     If KEY is an axis of the grid, the axis is the search range; otherwise the usual range, for depths from 0.35 of the
     height to where the truck would go over the boulder. Every answer has a bracket: the value that passes and the next
-    one, which does not, both judged as in `sweep run`. A row of which nothing passes is `blocked_by_overlap` if the
-    truck goes over the boulder at the end of the range (overlap below criterion.min_overlap), and `never` if not.
+    one, which does not, both judged as in `sweep run`. A largest speed or vehicle mass is the end of the interval from
+    zero in which everything passes; from a least friction angle or embedment on everything passes. A row of which
+    nothing passes is `blocked_by_overlap` if the truck goes over the boulder at the end of the range (overlap below
+    criterion.min_overlap), `undecided` if the last value tried is, and `never` if neither.
     """
     from boulder_sweep.answers.need import need as find
     from boulder_sweep.answers.need_printing import need_lines
@@ -149,7 +150,6 @@ Examples:
 @click.option("--confidence", default="95 %", metavar="SHARE", help="Confidence level of the interval [95 %].")
 @margin_option
 @click.option("--rare", is_flag=True, help="Also small probabilities, by subset simulation.")
-@second_opinion_option
 @click.option(
     "--doubts", is_flag=True, help="Divide a design's uncertainty among inputs, readings and numerical error."
 )
@@ -168,7 +168,6 @@ Examples:
 @json_option
 def uncertainty(
     grid: str | None,
-    second_opinion: bool,
     doubts: bool,
     out: str | None,
     picture: str | None,
@@ -193,7 +192,7 @@ def uncertainty(
     from boulder_sweep.answers.uncertainty import uncertainty as estimate
 
     refuse_units_of_json(units, as_json)
-    sweep = load_sweep(grid, overrides, quiet, units, second_opinion=second_opinion)
+    sweep = load_sweep(grid, overrides, quiet, units)
     refuse_missing(sweep, grid, design)
     refuse_unwritable(out, picture)
     with working(quiet) as progress:
@@ -259,7 +258,7 @@ def capacity(
     overrides: tuple[str, ...],
     as_json: bool,
 ) -> int:
-    """Find how far speed, mass of the truck and friction angle may change before each verdict does.
+    """Find up to which speed and mass of the truck, and down to which friction angle, every design passes throughout.
 
     Also names the highest ASTM F2656 class whose nominal speed (30, 40, 50 mph) is withstood. The class is
     simulated; the standard rates by test.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -84,8 +85,8 @@ def stone(
     and distances of the near and the far face over the height. The ends a, b and c are those of the long, the middle
     and the short axis of the stone, a the slimmer end and -a the other; x, y and z are the axes of the scan.
 
-    With SITE, a settings file, the stone takes the place of its boulder, and for each of the 24 ways to stand the least
-    depth is found at which it passes in all soils and before all vehicles of the file.
+    With SITE, a settings file, the stone takes the place of its boulder, and for each of the 24 ways to stand the depth
+    is found from which on it passes in all soils and before all vehicles of the file.
     """
     if (up is None) != (facing is None):
         raise click.UsageError("--up and --facing belong together; give both")
@@ -135,7 +136,8 @@ def _find_placing(
         """Return the site with a boulder; what is to be said of it is said once."""
         nonlocal said
         said, silent = True, quiet or said
-        return take_values(load_sweep(site, (*overrides, block), silent), at, silent)
+        sweep = load_sweep(site, (*overrides, block), silent)
+        return sweep if at is None else take_values(sweep, at, silent)
 
     if not any(standing.has_foot for standing in standings or scan.standings):
         raise click.UsageError("no way to stand has a flat foot; bed the stone in concrete")
@@ -145,49 +147,51 @@ def _find_placing(
 
 def placing_lines(result: Placing, rock: str, unit: str, site: str) -> list[str]:
     """Return the ways to stand at a site, the one of least depth first, and a block of settings for that one."""
-    from boulder_sweep.answers.printing import grade_lines
-    from boulder_sweep.judge.validity import NOT_A_RATING
+    from boulder_sweep.answers.placing import SIGNS
+    from boulder_sweep.answers.printing import answer_cell, flag_lines, grade_lines
 
     passing = result.passing
     cases = "" if result.cases == 1 else f", in the worst of {result.cases} combinations of soil and vehicle"
-    never, rounded = len(result.ways) - len(passing), result.rounded
-    rest = [
-        *([f"{counted(never, 'way')} to stand {'fails' if never == 1 else 'fail'} at every depth"] if never else []),
-        *([f"{counted(rounded, 'way')} without a flat foot, not computed"] if rounded else []),
-    ]
+    nothing = Counter(way.why_not for way in result.ways if way.depth_m is None)
+    rest = [f"{counted(count, 'way')} to stand: {why}" for why, count in nothing.items()]
+    if result.rounded:
+        rest.append(f"{counted(result.rounded, 'way')} without a flat foot, not computed")
     if not passing:
-        return [f"at {site} it passes at no depth{cases}", *rest]
+        return [f"at {site} there is no depth from which on it passes{cases}", *rest]
 
     def depth(way: Way) -> float:
         return way.depth_m or 0.0
 
+    answer = answer_cell(result.key, result.key.answer, "found", "si")
+
     columns: list[tuple[tuple[str, str], Callable[[Way], str]]] = [
         (("up", ""), lambda way: way.standing.up),
         (("facing", ""), lambda way: way.standing.facing),
-        (("depth", "m"), lambda way: f"{depth(way):.3f}"),
+        (("depth", "m"), lambda way: answer(way.row)),
         (("above", "m"), lambda way: f"{way.standing.profile.height[-1] - depth(way):.2f}"),
-        (("length", "m"), lambda way: f"{way.standing.profile.length.max():.2f}"),
-        (("width", "m"), lambda way: f"{way.standing.profile.width.max():.2f}"),
+        (("turns", "deg"), lambda way: f"{way.row['max_rotation_deg']:.1f}"),
+        (("slides", "m"), lambda way: f"{way.row['max_displacement_m']:.2f}"),
         (("foot", "m"), lambda way: foot_text(way.standing)),
         (("cut", "m"), lambda way: f"{way.standing.cut_m:.2f}"),
         (("mass", "t"), lambda way: f"{result.found.density_kg_m3 * way.standing.volume / 1e3:.1f}"),
-        (("turns", "deg"), lambda way: f"{way.row['max_rotation_deg']:.1f}"),
     ]
     best = passing[0]
+    kinds = {way.row["found"] for way in passing}
     words = "" if unit == "m" else f", unit: {unit}"
     return [
-        f"at {site}, least depth{cases}:",
+        f"at {site}, depth from which on it passes{cases}:",
         *_table(columns, passing),
         "up, facing: the end of the stone that is up, and the one that faces the vehicle",
         "above: height over the ground; mass: of what is left after the cut",
+        *(words for kind, words in SIGNS.items() if kind in kinds),
         *rest,
         *grade_lines(way.row for way in passing),
-        f"an answer is {NOT_A_RATING}",
+        *flag_lines([way.row["validity"] for way in passing]),
         "",
-        "# the best of these, for the settings file in place of its boulder",
+        "# the first of these, for the settings file in place of its boulder",
         "boulder:",
         f"  scan: {{file: {_beside(rock, site)}, up: {best.standing.up}, facing: {best.standing.facing}{words}}}",
-        f"  mass: {result.found.mass_kg / 1e3:.6g} t",
+        f"  mass: {result.found.mass_kg / 1e3:.12g} t",
         "site:",
         f"  embedment_depth: {depth(best):.3f} m",
     ]

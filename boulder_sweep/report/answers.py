@@ -63,7 +63,7 @@ def answer_of(rows: ResultRows) -> Answer:
     means = ", at the means of their uncertain inputs" if uncertain else ""
     sentences: list[Sentence] = [*(sentence for sentence, _ in uncertain)]
     sentences.append((f"{n:,} of {total:,} designs {verb(n, 'pass', 'passes')} ({share(n, total)}){means}.",))
-    if n and rows.grades:
+    if n and rows.grades and not uncertain:
         sentences.append(_grades(rows, n))
     if NOT_YET in counts:
         left = f"{counted(counts[NOT_YET], 'design')} {verb(counts[NOT_YET], 'are', 'is')}"
@@ -105,7 +105,7 @@ def _of_answers(rows: ResultRows, need: Need, n: int) -> Answer:
     if n == 1:
         sentences += _of_row(rows, rows.row(named[0].number))
     elif n:
-        sentences += [_grades(rows, n), *_flagged(rows, n)]
+        sentences += [*([_grades(rows, n)] if need.probability is None else []), *_flagged(rows, n)]
     return Answer(tuple(sentences), tuple(named))
 
 
@@ -145,7 +145,11 @@ def _uncertain(rows: ResultRows) -> list[tuple[Sentence, Named | None]]:
         driver = row["p_pass_driver"]
         most = f", decided most by {driver.replace('.', ' ').replace('_', ' ')}" if driver else ""
         interval = f"{row['p_pass_low']:.1%} to {row['p_pass_high']:.1%}"
-        return [((f"The probability of passing is {row['p_pass']:.1%} ({interval}){most}.",), Named("The design", 0))]
+        chance = f"The probability of passing is {row['p_pass']:.1%} ({interval}){most}."
+        if row["p_undecided"]:
+            why = REASON_WORDS[row["p_undecided_reason"]]
+            chance += f" {row['p_undecided']:.1%} of the designs drawn are undecided ({why})."
+        return [((chance,), Named("The design", 0))]
     safe = chances >= SAFE
     n = int(safe.sum())
     first = f"{n:,} of {len(chances):,} designs {verb(n, 'pass', 'passes')} with a probability of {SAFE:.0%} or more"

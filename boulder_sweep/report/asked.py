@@ -5,6 +5,7 @@ The parts of sentences, here and in `boulder_sweep.report.answers`, are words an
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -13,7 +14,7 @@ import numpy as np
 from boulder_sweep.answers.lightest import SIDES
 from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.outputs import CAPACITY, NEED, UNCERTAINTY, AnswerFile
-from boulder_sweep.answers.search import BLOCKED, NEVER, WORDS
+from boulder_sweep.answers.search import BLOCKED, NEVER, NOT_MONOTONE, UNKNOWN, WORDS
 from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS
 from boulder_sweep.report.rows import CONDITIONS, DEPTH, RATIO, ResultRows, condition_of, label_of
 from boulder_sweep.settings.fields import BY_NAME
@@ -24,6 +25,8 @@ MOST_LINES = 200
 NOTHING = {
     WORDS[NEVER]: "not pass anywhere in the searched range",
     WORDS[BLOCKED]: "not pass up to where the truck would pass or ride over the boulder; another boulder is needed",
+    WORDS[UNKNOWN]: "not pass for certain: the last value tried is undecided",
+    WORDS[NOT_MONOTONE]: "not pass but in places, between values that fail",
 }
 """What is said where there is no answer."""
 
@@ -86,7 +89,8 @@ def need_sentences(rows: ResultRows, need: Need) -> tuple[list[Sentence], list[N
     if total > 1:
         asked = f"The {key_words(need)} that passes{_terms(need, rows)}"
         sentences.append((f"{asked}: {n:,} of {total:,} combinations have one ({share(n, total)}).",))
-    for word, count in need.counts().items():
+    without = need.arrow.filter(need.arrow["passes_at"].is_null())["found"].to_pylist()
+    for word, count in Counter(without).items():
         if word in NOTHING:
             who = f"{counted(count, 'combination')}" if total > 1 else "The boulder"
             sentences.append((f"{who} {verb(count, 'do', 'does')} {NOTHING[word]}.",))
@@ -160,7 +164,7 @@ def capacity_sentences(row: dict[str, Any]) -> list[Sentence]:
         value = row[column]
         parts += ["; " if parts else "", f"{name} "]
         parts += ["none of those tried"] if value is None else [Measure(value, unit)]
-    return [("All else unchanged, the worst at which it passes: ", *parts, ".")]
+    return [("All else unchanged, the worst up to which it passes throughout: ", *parts, ".")]
 
 
 def answers_table(rows: ResultRows) -> AnswerTable | None:
@@ -196,8 +200,9 @@ def _answer_columns(kind: str, answers: Any) -> list[tuple[str, str, str]]:
         columns += [("embedment depth", DEPTH, "m")] if key.name != DEPTH else []
         columns += [("mass", BOULDER_MASS, "kg")] if key.name != BOULDER_MASS else []
         chance = "p_pass" in answers.arrow.column_names
-        columns += [("P(pass)", "p_pass", "%")] if chance else [("margin", "margin", "%")]
-        return [*columns, ("second opinion", "robustness", "")]
+        if chance:
+            return [*columns, ("P(pass)", "p_pass", "%"), ("undecided", "p_undecided", "%")]
+        return [*columns, ("margin", "margin", "%"), ("second opinion", "robustness", "")]
     columns_of = {
         CAPACITY: [
             ("verdict", "verdict", ""),
@@ -212,6 +217,7 @@ def _answer_columns(kind: str, answers: Any) -> list[tuple[str, str, str]]:
             ("P(pass)", "p_pass", "%"),
             ("from", "p_pass_low", "%"),
             ("to", "p_pass_high", "%"),
+            ("undecided", "p_undecided", "%"),
             ("decided by", "p_pass_driver", ""),
         ],
     }
@@ -222,7 +228,7 @@ def _cell(row: dict[str, Any], name: str, unit: str, searched: set[str]) -> str 
     """Return one cell; of a row without an answer, why there is none in place of it."""
     value, none = row[name], "passes_at" in row and row["passes_at"] is None
     if none and name.startswith(("least_", "most_")):
-        return str(row["found"]).replace("_", " ")
+        return "in places only" if row["found"] == WORDS[NOT_MONOTONE] else str(row["found"]).replace("_", " ")
     if value is None or (none and name in (*searched, "margin", "p_pass", "robustness")):
         return "–"
     if unit == "%":

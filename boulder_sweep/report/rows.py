@@ -263,8 +263,11 @@ class ResultRows:
     def grade(self, row: dict[str, Any]) -> str | None:
         """Return the robustness of a row; where the table left it open, second opinions are asked now.
 
-        None where the row does not pass, or not by today's rules, or its settings are not those of this version.
+        None where the row does not pass, or not by today's rules, or its settings are not those of this version; and
+        where the row stands for the designs drawn, of which it is the mean.
         """
+        if "p_pass" in row:
+            return None
         if row["verdict"] != "pass" or row.get("robustness") not in ("open", None):
             return row.get("robustness")
         identity = self.finished.identity

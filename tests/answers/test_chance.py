@@ -38,6 +38,24 @@ def test_no_more_points_than_allowed() -> None:
     assert found.high[0] - found.low[0] > 2e-6
 
 
+def test_what_is_not_known_widens_the_interval_and_has_its_commonest_cause() -> None:
+    """Of one row half passes and a sixth is not known for two causes; of the other nothing is known."""
+
+    def event(row: np.ndarray, z: np.ndarray) -> np.ndarray:
+        share = ndtr(linear(z))
+        some = np.where(share < 0.5, 1, np.where(share < 0.6, -3, np.where(share < 2.0 / 3.0, -5, 0)))
+        return np.where(row == 0, some, -9)
+
+    found = chance(event, 2, Points(2, 1), half_width=0.01)
+    assert found.estimate == pytest.approx([0.5, 0.0], abs=5e-3)
+    assert found.unknown == pytest.approx([1.0 / 6.0, 1.0], abs=5e-3)
+    assert found.cause.tolist() == [3, 9]
+    assert found.low == pytest.approx([0.5, 0.0], abs=0.011)
+    assert found.high == pytest.approx([2.0 / 3.0, 1.0], abs=0.011)
+    assert found.low[0] < 0.5 < 2.0 / 3.0 < found.high[0]
+    assert chance(lambda _, z: linear(z) < 0.3, 1, Points(2, 1), half_width=0.01).unknown[0] == 0.0
+
+
 def test_the_same_seed_gives_the_same() -> None:
     one, two, other = (chance(lambda _, z: linear(z) <= 0.3, 1, Points(2, seed), half_width=0.01) for seed in (1, 1, 2))
     assert one.estimate[0] == two.estimate[0] != other.estimate[0]

@@ -9,15 +9,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from boulder_sweep.answers.keys import key_of
+from boulder_sweep.answers.need import need
 from boulder_sweep.answers.printing import reserve_lines
-from boulder_sweep.answers.reserves import CLASSES, ISO_MASS_KG, ISO_SPEEDS, RESERVES, classes, reserves
+from boulder_sweep.answers.reserves import CLASSES, ISO_MASS_KG, ISO_SPEEDS, RESERVES, Reserve, classes, reserves
 from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.judged import PASS
 from boulder_sweep.judge.quantiles import at_values
-from boulder_sweep.settings import Sweep, load
+from boulder_sweep.settings import Sweep, load, load_text
 from boulder_sweep.settings.sweep import DesignList
 from tests.answers.designs import random_designs, site
 
@@ -40,27 +40,78 @@ def with_constants(sweep: Sweep, **values: float) -> Sweep:
     return dataclasses.replace(sweep, constants=sweep.constants | values)
 
 
-@pytest.mark.parametrize(
-    ("column", "own", "worse"),
-    [
-        ("withstands_speed_m_s", "impact_speed_m_s", 0.01),
-        pytest.param("withstands_mass_kg", "vehicle_mass_kg", 1.0, marks=pytest.mark.nightly),
-        ("withstands_friction_angle_deg", "friction_angle_deg", -0.01),
-    ],
-)
-def test_a_design_passes_at_what_it_withstands_and_not_beyond(
-    reserves_of_many: pd.DataFrame, column: str, own: str, worse: float
-) -> None:
-    frame = reserves_of_many
-    ends = [getattr(reserve, end) for reserve in RESERVES if reserve.column == column for end in ("best", "worst")]
-    there = frame[frame[column].notna()]
-    assert len(there) > 100
-    assert passes(there, **{own: there[column].to_numpy()}).all()
-    inside = there[~np.isclose(there[column], ends[0]) & ~np.isclose(there[column], ends[1])]
-    # The very value that was judged: a boulder that rocks near its limit for long may turn over by the last bit.
-    beside = np.round((inside[column].to_numpy() + worse) / abs(worse)) / round(1.0 / abs(worse))
-    assert not passes(inside, **{own: beside}).any()
-    assert (frame[frame.verdict == "pass"][column].notna()).all()
+@pytest.mark.parametrize("reserve", [RESERVES[0], pytest.param(RESERVES[1], marks=pytest.mark.nightly), RESERVES[2]])
+def test_a_design_passes_at_what_it_withstands_and_not_beyond(reserves_of_many: pd.DataFrame, reserve: Reserve) -> None:
+    frame, own = reserves_of_many, reserve.key.name
+    there = frame[frame[reserve.column].notna()]
+    assert len(there) > 50
+    assert passes(there, **{own: there[reserve.column].to_numpy()}).all()
+    inside = there[there[f"{reserve.word}_found"] != "always"]
+    assert not passes(inside, **{own: inside[f"{reserve.word}_fails_at"].to_numpy()}).any()
+    beside = (inside[f"{reserve.word}_fails_at"] - inside[reserve.column]).abs()
+    assert np.allclose(beside, reserve.key.tolerance, rtol=1e-6)
+
+
+@pytest.mark.parametrize("reserve", RESERVES)
+def test_the_answers_are_those_of_the_same_questions(reserve: Reserve) -> None:
+    sweep = shallow_designs(24)
+    found, key = reserves(sweep).frame, reserve.key
+    asked = need(sweep, **{"most" if key.most else "least": key.field.path}).frame
+    for column, same in (
+        (reserve.column, key.answer),
+        (f"{reserve.word}_fails_at", "fails_at"),
+        (f"{reserve.word}_found", "found"),
+        (f"{reserve.word}_passes_within", "passes_within"),
+    ):
+        assert found[column].equals(asked[same]), column
+
+
+def shallow_designs(count: int) -> Sweep:
+    """Return a list of designs of 0.1 to 0.45 of their height deep, many of which slide."""
+    sweep = random_designs(count, seed=3)
+    assert sweep.table is not None
+    columns = dict(sweep.table.columns)
+    columns["embedment_depth_m"] = np.linspace(0.1, 0.45, count) * columns["boulder_height_m"]
+    return dataclasses.replace(sweep, table=DesignList("shallow.csv", columns))
+
+
+def test_everything_passes_up_to_what_a_shallow_boulder_withstands() -> None:
+    """Also at speeds that no search has tried; of angles from the strongest soil downwards."""
+    found = reserves(shallow_designs(120)).frame
+    assert (found.speed_found == "not_monotone").sum() >= 3
+    rng = np.random.default_rng(0)
+    for reserve, safe in ((RESERVES[0], 0.0), (RESERVES[2], 49.0)):
+        there = found[found[reserve.column].notna()]
+        again = there.loc[there.index.repeat(20)]
+        share = rng.random(len(again))
+        values = share * safe + (1.0 - share) * again[reserve.column].to_numpy()
+        failing = ~passes(again, **{reserve.key.name: values})
+        assert failing.sum() <= 5e-3 * len(again)
+
+
+SLIDES = """
+name: slides
+boulder: {length: 2 m, width: 2.4 m, height: 2.0 m, density: 2600 kg/m^3}
+site: {embedment_depth: 0.6 m}
+soil: {density: 1860 kg/m^3, friction_angle: 32 deg, subgrade_reaction: 30 MN/m^3}
+vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
+"""
+
+
+def test_a_boulder_that_a_slower_truck_overturns_has_no_class() -> None:
+    """It passes at 30 mph by sliding, and overturns at 12.6 m/s; in better soil it overturns at 30 mph, too."""
+    found = reserves(load_text(SLIDES, Path("slides.yaml")))
+    row = found.frame.iloc[0]
+    assert row.withstands_speed_m_s < 12.6
+    assert row.speed_fails_at == pytest.approx(row.withstands_speed_m_s + 0.01)
+    assert (row.speed_found, row.soil_found) == ("not_monotone", "not_monotone")
+    assert row.speed_passes_within.endswith(f", 0 to {row.withstands_speed_m_s}")
+    assert np.isnan(row.withstands_friction_angle_deg)
+    assert row.simulated_class is None or pd.isna(row.simulated_class)
+    text = " ".join(reserve_lines(found))
+    assert f"{row.withstands_speed_m_s:.2f}* (-" in text
+    assert "never*" in text
+    assert "*: up to here everything passes" in text
 
 
 def test_reserves_of_designs_that_pass_are_on_the_worse_side() -> None:
@@ -100,18 +151,18 @@ def test_crash_tests() -> None:
     lines = reserve_lines(found)
     assert all(len(line) <= 80 for line in lines)
     assert "M30" in lines[4]
-    assert lines[5].startswith("robust: ")
+    assert any(line.startswith("robust: ") for line in lines)
 
 
 @pytest.mark.parametrize(
     ("column", "value", "shown"),
     [
         ("impact_speed_m_s", 45.0, "≥45.00 (+0%)"),
-        ("vehicle_mass_kg", 70_000.4, "≥70000 (+0%)"),
+        ("vehicle_mass_kg", 70_000.4, "≥70000 (-0%)"),
         ("friction_angle_deg", 14.0, "≤14.00 (+0%)"),
     ],
 )
-def test_a_design_that_passes_beyond_what_is_tried_withstands_its_own_value(
+def test_a_design_that_passes_beyond_the_usual_range_withstands_its_own_value(
     column: str, value: float, shown: str
 ) -> None:
     strong = site(height="3.2 m", site="embedment_depth: 2.2 m", friction="44 deg")
@@ -119,19 +170,19 @@ def test_a_design_that_passes_beyond_what_is_tried_withstands_its_own_value(
     found = reserves(with_constants(strong, **(mild | {column: value})))
     (row,) = found.frame.to_dict("records")
     assert row["verdict"] == "pass"
-    (own,) = (reserve for reserve in RESERVES if key_of(reserve.input).name == column)
-    assert row[own.column] == value
+    (own,) = (reserve for reserve in RESERVES if reserve.key.name == column)
+    assert row[own.column] == pytest.approx(value, abs=0.5)
     lines = reserve_lines(found)
     assert shown in lines[3]
-    assert lines[4].startswith("≥, ≤: ")
-    assert all("≥" in line or "≤" in line for line in reserve_lines(found, units="us")[3:5])
+    assert any(line.startswith("≥, ≤: ") for line in lines)
 
 
-def test_a_design_that_fails_beyond_the_best_value_tried_withstands_none() -> None:
+def test_a_design_that_fails_in_the_strongest_soil_withstands_none() -> None:
     fast = {"impact_speed_m_s": 22.0}
     frame = reserves(with_constants(site(friction="59.5 deg", site="embedment_depth: 1.2 m"), **fast)).frame
     assert (frame.verdict == "fail").all()
     assert frame.withstands_friction_angle_deg.isna().all()
+    assert set(frame.soil_found) <= {"never", "blocked_by_overlap", "not_monotone"}
 
 
 def test_only_the_end_of_what_is_tried_is_marked() -> None:

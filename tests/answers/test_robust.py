@@ -71,12 +71,13 @@ def test_capacity_shows_the_grade_of_every_pass() -> None:
     assert any("robust" in line.split() for line in reserve_lines(found))
 
 
-def test_uncertainty_grades_the_design_at_the_means_if_asked() -> None:
-    sweep = site(friction="{mean: 40 deg, sd: 1 deg}", site="embedment_ratio: 0.7", height="3.4 m")
-    without = uncertainty(sweep, half_width=0.2)
+def test_no_grade_stands_beside_a_probability() -> None:
+    """It would be that of the mean soil, and says nothing of the designs drawn."""
+    sweep = site(friction="{mean: 40 deg, sd: 1 deg}", height="3.4 m")
     asked = replace(sweep, model=replace(sweep.model, second_opinion=SECOND_OPINIONS))
-    found = uncertainty(asked, half_width=0.2)
-    assert found.arrow["p_pass"].to_pylist() == without.arrow["p_pass"].to_pylist()
-    assert found.arrow["robustness"].to_pylist() == ["robust"]
-    assert "opinion" in uncertainty_lines(found)[1]
-    assert "opinion" not in uncertainty_lines(without)[1]
+    found, likely = uncertainty(asked, half_width=0.2), need(asked, probability=0.9)
+    assert likely.counts() == {"found": 1}
+    for answers, lines in ((found, uncertainty_lines(found)), (likely, need_lines(likely))):
+        assert answers.arrow["robustness"].to_pylist() == [None]
+        assert answers.arrow["stands_under"].to_pylist() == [None]
+        assert not any(word in "\n".join(lines) for word in ("robust", "sensitive", "opinion"))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from boulder_sweep.answers.keys import Ends, key_of
+from boulder_sweep.answers.keys import Ends, key_of, range_of
 from boulder_sweep.answers.questions import Question
 from boulder_sweep.answers.search import CELLS, FAILS, FAR, HOLDS, search
 from boulder_sweep.answers.trials import judges_of
@@ -25,7 +25,7 @@ def compared(sweep: Sweep, word: str, between: Ends = None) -> tuple[int, int]:
     asked = Question(sweep, key, between, judges_of(sweep))
     rows = asked.open.rows(0, asked.count)
     trials = asked.trial(rows), asked.trial(rows)
-    first, last = asked.lattice(rows)
+    first, last = asked.lattice(*range_of(sweep, key, rows, between))
 
     def thorough(index: np.ndarray, places: np.ndarray) -> np.ndarray:
         codes = trials[1].coarse(index, places)

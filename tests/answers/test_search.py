@@ -17,6 +17,7 @@ from boulder_sweep.answers.search import (
     Predicate,
     last_before,
     search,
+    steady,
 )
 
 
@@ -104,6 +105,32 @@ def test_rows_that_are_not_monotone_tell_every_change() -> None:
     assert found.changes == {0: [(199, 200, True), (400, 401, False), (699, 700, True)]}
     first = one((0, 400, HOLDS))
     assert (first.kind[0], first.has_fails[0], first.changes[0]) == (NOT_MONOTONE, False, [(400, 401, False)])
+
+
+@pytest.mark.parametrize(
+    ("stretch", "fails", "holds", "shown"),
+    [
+        ([(200, 400, HOLDS), (700, 1000, HOLDS)], 699, 700, 700),
+        ([(0, 100, HOLDS), (300, 400, HOLDS), (700, 1000, HOLDS)], 699, 700, 700),
+        ([(200, 400, HOLDS), (700, 800, HOLDS), (801, 1000, BEYOND)], 699, 700, 700),
+        ([(200, 400, HOLDS), (700, 800, HOLDS)], 801, None, 801),
+        ([(0, 400, HOLDS)], 401, None, 401),
+    ],
+)
+def test_a_steady_answer_holds_at_all_further_places(
+    stretch: list[tuple[int, int, int]], fails: int, holds: int | None, shown: int
+) -> None:
+    found = steady(one(*stretch))
+    assert (found.kind[0], found.has_fails[0], found.fails[0], found.shown[0]) == (NOT_MONOTONE, True, fails, shown)
+    assert found.has_holds[0] == (holds is not None)
+    assert holds is None or found.holds[0] == holds
+
+
+def test_an_answer_that_is_monotone_is_steady() -> None:
+    for found in (one((200, 1000, HOLDS)), one((0, 1000, HOLDS)), one()):
+        again = steady(found)
+        for name in ("kind", "fails", "holds", "has_fails", "has_holds", "shown"):
+            assert np.array_equal(getattr(found, name), getattr(again, name))
 
 
 def test_a_range_of_one_place() -> None:

@@ -21,7 +21,8 @@ def test_lines_json_and_parquet(sweep, tmp_path):
     assert code == 0
     speeds = frame.withstands_speed_m_s.astype(object).where(frame.withstands_speed_m_s.notna(), None)
     assert [row["withstands_speed_m_s"] for row in rows] == speeds.tolist()
-    assert frame.attrs["units"]["withstands_speed_m_s"] == "m/s"
+    assert frame.attrs["units"]["withstands_speed_m_s"] == frame.attrs["units"]["speed_fails_at"] == "m/s"
+    assert {"found", "blocked_by_overlap"} == {row["speed_found"] for row in rows}
 
 
 def test_rows_that_cannot_be_computed_give_exit_code_3(sweep, grid):

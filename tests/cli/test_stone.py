@@ -203,6 +203,63 @@ def test_the_block_of_the_best_way_is_taken(placed_at_a_site, sweep, tmp_path, m
     assert json.loads(out)["verdict"] == "pass"
 
 
+def placed_way(up, facing, *changes):
+    """Place the example one way in one soil, with changes to the site of the configs; the placing and its lines."""
+    found = scanned(ROCK, mass_kg=23_500.0)
+    way = (found.stone.standing(up, facing),)
+    placing = placed(found, lambda boulder: load(SITE_FILE, [boulder, "soil.friction_angle=40 deg", *changes]), way)
+    return placing, "\n".join(placing_lines(placing, str(ROCK), "m", str(SITE_FILE)))
+
+
+def test_a_depth_between_two_that_fail_is_never_recommended():
+    """Lying on its broad side the stone passes 0.615 m deep by sliding, and overturns at 0.8 m."""
+    placing, text = placed_way("c", "a")
+    (way,) = placing.ways
+    assert (way.depth_m, way.row["found"], way.row["verdict"]) == (None, "not_monotone", "fail")
+    stretches = [tuple(map(float, one.split(" to "))) for one in way.row["passes_within"].split(", ")]
+    assert any(low <= 0.615 <= high for low, high in stretches)
+    assert not any(low <= 0.8 <= high for low, high in stretches)
+    assert "there is no depth from which on it passes\n1 way to stand: it passes at some depths, and fails at" in text
+    assert "boulder:" not in text
+
+
+def test_the_end_of_the_search_is_not_called_the_least_depth():
+    placing, text = placed_way("c", "a", "vehicle.speed=5 mph")
+    (way,) = placing.ways
+    assert way.row["found"] == "always"
+    assert f" ≤{way.depth_m:.3f} " in text
+    assert "\n≤: passes from the least depth tried on; a lesser one may do\n" in text
+    assert "least depth" not in text.replace("least depth tried", "")
+
+
+def test_how_far_it_slides_and_its_flags_stand_beside_a_depth(placed_at_a_site):
+    text = "\n".join(placing_lines(placed_at_a_site, str(ROCK), "m", str(SITE_FILE)))
+    assert " turns  slides " in text
+    for way in placed_at_a_site.passing:
+        assert f"{way.row['max_rotation_deg']:.1f}    {way.row['max_displacement_m']:.2f}" in text
+    assert "flags: 0 of 2 answers inside what the model was tested on; rotation 2" in text
+
+
+def test_a_stone_that_the_truck_goes_over_says_so():
+    placing, text = placed_way("a", "b", "criterion.min_overlap=1.5 m")
+    assert placing.passing == []
+    assert "1 way to stand: it fails down to where the truck would pass or ride over it" in text
+
+
+def test_what_is_recommended_in_uncertain_soil_passes_when_it_is_pasted(sweep, tmp_path):
+    site = SITE_FILE.read_text(encoding="utf-8").replace("[36, 40] deg", "{mean: 38 deg, sd: 2 deg}")
+    (tmp_path / "site.yaml").write_text(site, encoding="utf-8")
+    (tmp_path / "rock.ply").write_bytes(ROCK.read_bytes())
+    words = ("stone", tmp_path / "rock.ply", tmp_path / "site.yaml", "--mass", "23.5 t", "--up", "a", "--facing", "b")
+    code, text, _ = sweep(*words, "-q")
+    assert code == 0
+    before, after = site.index("boulder:"), site.index("soil:")
+    pasted = site[:before] + text[text.index("boulder:") :] + "\n" + site[after:]
+    (tmp_path / "site.yaml").write_text(pasted, encoding="utf-8")
+    code, out, err = sweep("simulate", tmp_path / "site.yaml", "--json")
+    assert (code, json.loads(out)["verdict"]) == (0, "pass"), err
+
+
 def test_a_picture_of_the_best_ways(placed_at_a_site, tmp_path):
     placed_at_a_site.plot(tmp_path / "best.png")
     assert (tmp_path / "best.png").read_bytes().startswith(b"\x89PNG")

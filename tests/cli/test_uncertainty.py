@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -36,6 +37,48 @@ def test_need_with_a_probability(sweep):
     code, out, _ = sweep("need", CONFIG, "--probability", "0.9", "-q")
     assert code == 0
     assert "P(pass)" in out.splitlines()[0]
+
+
+AS_WEIGHED = """
+name: quarry
+boulder: {mass: 23.5 t, length: 1.65 m, width: 1.68 m, height: 3.4 m}
+site: {embedment_depth: 2.55 m}
+soil: {density: 1900 kg/m^3, friction_angle: {mean: 38 deg, sd: 2 deg}, subgrade_reaction: 40 MN/m^3}
+vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
+"""
+
+
+@pytest.fixture
+def weighed(tmp_path):
+    """A stone that fills less than 95 % of the box of its sides."""
+    (tmp_path / "weighed.yaml").write_text(AS_WEIGHED, encoding="utf-8")
+    return tmp_path / "weighed.yaml"
+
+
+def test_a_stone_whose_shape_is_not_known_is_undecided_and_no_failure(sweep, weighed):
+    """Its density decides: with the one that fills the box every design drawn passes."""
+    row = json.loads(sweep("uncertainty", weighed, "--json", "-q")[1])["rows"][0]
+    assert (row["p_pass"], row["p_undecided"], row["p_undecided_reason"]) == (0.0, 1.0, "shape")
+    assert (row["p_pass_low"], row["p_pass_high"]) == (0.0, 1.0)
+    out = sweep("uncertainty", weighed, "-q")[1]
+    assert re.search(r"^undecided +0\.0000 +0\.0000 +1\.0000 +1\.0000 ", out, re.MULTILINE)
+    assert "not decided: undecided (shape)" in out
+    assert "undecided (shape): the boulder fills less than 95 %" in out
+    known = ("--set", "boulder.density=2485 kg/m^3")
+    row = json.loads(sweep("uncertainty", weighed, "--json", "-q", *known)[1])["rows"][0]
+    assert (row["p_pass"], row["p_undecided"], row["p_undecided_reason"]) == (1.0, 0.0, None)
+    assert "not\n" not in sweep("uncertainty", weighed, "-q", *known)[1].split("foot:")[0]
+
+
+@pytest.mark.parametrize("words", [("--probability", "95%"), (), ("--most", "speed"), ("--least", "friction_angle")])
+def test_a_need_that_nothing_decides_names_the_reason(sweep, weighed, words):
+    if words[:1] == ("--least",):
+        words = (*words, "--at", "mean")
+    out = sweep("need", weighed, "-q", *words)[1]
+    assert "undecided: no value is known to pass" in out
+    assert "undecided (shape): the boulder fills less than 95 %" in out
+    assert "blocked" not in out
+    assert "another boulder" not in out
 
 
 def test_an_object_in_us_units_is_refused(sweep):
