@@ -170,13 +170,18 @@ class _Problem:
     def __init__(self, pulse: Pulse, mass_kg: float, speed_m_s: float | None) -> None:
         self.time, self.signals = pulse.time_s, pulse.signals
         self.mass_kg, self.speed_m_s = mass_kg, speed_m_s
-        self.ranges = {name: float(np.nanmax(np.abs(v)) + np.nanmax(v) - np.nanmin(v)) for name, v in pulse.signals.items()}
+        self.ranges = {
+            name: float(np.nanmax(np.abs(v)) + np.nanmax(v) - np.nanmin(v)) for name, v in pulse.signals.items()
+        }
         self.scales = dict(self.ranges)
         self.offset: float | None = None
         self.rows: dict[str, np.ndarray] = {}
+        self.known = {name: np.isfinite(values) for name, values in pulse.signals.items()}
+        self.differences = dict.fromkeys(pulse.signals, 0)
+        latest = min(self.time[known][-FEWEST_SAMPLES] for known in self.known.values())
         span = self.time[-1] - self.time[0]
         low = [math.log(0.01 / span), math.log(RATIO_BOUNDS[0]), self.time[0] - span, 1e-9]
-        high = [math.log(2000.0 / span), math.log(RATIO_BOUNDS[1]), self.time[-1], 1e4]
+        high = [math.log(2000.0 / span), math.log(RATIO_BOUNDS[1]), latest, 1e4]
         count = 4 if speed_m_s is None else 3
         self.bounds = np.array(low[:count]), np.array(high[:count])
 
@@ -194,9 +199,20 @@ class _Problem:
             left["acceleration"] = left["acceleration"] - self.offset
         return left
 
+    def compared(self, unknowns: np.ndarray) -> dict[str, np.ndarray]:
+        """What is made small: the residuals, or their differences from row to row where they wander."""
+        found = self.by_signal(unknowns)
+        for name, order in self.differences.items():
+            if order:
+                spread = np.full(len(self.time), np.nan)
+                spread[self.rows[name]] = found[name]
+                apart = np.diff(spread[self.known[name]], order)
+                found[name] = apart[np.isfinite(apart)]
+        return found
+
     def residuals(self, unknowns: np.ndarray) -> np.ndarray:
-        """Residuals of all signals as multiples of their scales."""
-        return np.concatenate([values / self.scales[name] for name, values in self.by_signal(unknowns).items()])
+        """What is made small, of all signals, as multiples of their scales."""
+        return np.concatenate([values / self.scales[name] for name, values in self.compared(unknowns).items()])
 
     def choose(self, unknowns: np.ndarray, kept: np.ndarray) -> None:
         """Take the rows that are kept, and the zero offset from them; it stays where they show none.
@@ -205,8 +221,7 @@ class _Problem:
         """
         after = self.time >= unknowns[2]
         self.rows = {
-            name: np.isfinite(values) & kept & (after if name == "displacement" else True)
-            for name, values in self.signals.items()
+            name: known & kept & (after if name == "displacement" else True) for name, known in self.known.items()
         }
         if "acceleration" in self.signals:
             clear = unknowns[2] - SMEAR * self.wall(unknowns).peak_force_time_s
@@ -258,7 +273,13 @@ class _Problem:
         for _ in range(PASSES):
             self.choose(unknowns, everything)
             unknowns = self.solve(unknowns, 1e-14).x
-            self.scales = {n: max(_rms(v), 1e-9 * self.ranges[n]) for n, v in self.by_signal(unknowns).items()}
+            for name, values in self.compared(unknowns).items():
+                misfit = _misfit_of(values, self.ranges[name])
+                self.scales[name] = max(misfit.rms, 1e-9 * self.ranges[name])
+                wanders = name != "acceleration" and misfit.rms > 1e-9 * self.ranges[name]
+                if wanders and misfit.correlation > GO_TOGETHER and misfit.systematic_share < SYSTEMATIC_SHARE:
+                    self.differences[name] = min(self.differences[name] + 1, 2)
+                    self.scales[name] = max(_rms(np.diff(values)), 1e-12 * self.ranges[name])
         return unknowns
 
     def errors(self, unknowns: np.ndarray) -> np.ndarray:
@@ -333,7 +354,9 @@ def fit_pulse(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) -
     for name, value in (("mass", mass_kg), ("speed", speed_m_s)):
         if value is not None and not 0.0 < value < math.inf:
             raise FitError(f"the {name} of the vehicle must be positive, not {value:g}")
-        if value is not None and (words := _far_out("vehicle_mass_kg" if name == "mass" else "impact_speed_m_s", value)):
+        if value is not None and (
+            words := _far_out("vehicle_mass_kg" if name == "mass" else "impact_speed_m_s", value)
+        ):
             raise FitError(f"--{name}: {words}; check its unit")
     problem = _Problem(pulse, float(mass_kg), None)
     unknowns = problem.best()
@@ -415,7 +438,9 @@ def _what_to_do(fit: VehicleFit) -> str:
     first, last = fit.pulse.time_s[[0, -1]] - fit.touch_s
     ways = []
     if last < fit.wall.separation_time_s and (not fit.wall.over_damped or last < fit.wall.peak_force_time_s):
-        ways.append(f"give a record that goes on until the vehicle leaves the wall (it ends {last:.3f} s after first touch)")
+        ways.append(
+            f"give a record that goes on until the vehicle leaves the wall (it ends {last:.3f} s after first touch)"
+        )
     if first > 0.0 or (fit.offset_m_s2 is None and "acceleration" in fit.pulse.signals):
         ways.append("give rows from before first touch on")
     if fit.speed_error_m_s is not None:
@@ -460,161 +485,21 @@ def _warnings(fit: VehicleFit) -> Iterator[str]:
         )
 
 
-class _Problem:
-    """The least-squares problem: unknowns log sqrt(k/m), log(c/sqrt(k m)), first touch and, where not given, v_0."""
-
-    def __init__(self, pulse: Pulse, mass_kg: float, speed_m_s: float | None) -> None:
-        self.time, self.signals = pulse.time_s, pulse.signals
-        self.mass_kg, self.speed_m_s = mass_kg, speed_m_s
-        self.ranges = {name: float(np.nanmax(np.abs(v)) + np.nanmax(v) - np.nanmin(v)) for name, v in pulse.signals.items()}
-        self.scales = dict(self.ranges)
-        self.offset: float | None = None
-        self.rows: dict[str, np.ndarray] = {}
-        span = self.time[-1] - self.time[0]
-        low = [math.log(0.01 / span), math.log(RATIO_BOUNDS[0]), self.time[0] - span, 1e-9]
-        high = [math.log(2000.0 / span), math.log(RATIO_BOUNDS[1]), self.time[-1], 1e4]
-        count = 4 if speed_m_s is None else 3
-        self.bounds = np.array(low[:count]), np.array(high[:count])
-
-    def wall(self, unknowns: np.ndarray) -> RigidWall:
-        """Vehicle that the unknowns stand for."""
-        rate, ratio = math.exp(unknowns[0]), math.exp(unknowns[1])
-        speed = float(unknowns[3]) if self.speed_m_s is None else self.speed_m_s
-        return RigidWall(self.mass_kg, speed, self.mass_kg * rate**2, ratio * rate * self.mass_kg)
-
-    def by_signal(self, unknowns: np.ndarray) -> dict[str, np.ndarray]:
-        """Measured minus computed in the rows in use, in the units of the signals."""
-        response = dict(zip(PULSE_UNITS, self.wall(unknowns).response(self.time - unknowns[2]), strict=True))
-        left = {name: (values - response[name])[self.rows[name]] for name, values in self.signals.items()}
-        if self.offset is not None:
-            left["acceleration"] = left["acceleration"] - self.offset
-        return left
-
-    def residuals(self, unknowns: np.ndarray) -> np.ndarray:
-        """Residuals of all signals as multiples of their scales."""
-        return np.concatenate([values / self.scales[name] for name, values in self.by_signal(unknowns).items()])
-
-    def choose(self, unknowns: np.ndarray, kept: np.ndarray) -> None:
-        """Take the rows that are kept, and the zero offset from them; it stays where they show none.
-
-        A displacement counts from first touch: some records hold it at 0 before, others let it come up from below.
-        """
-        after = self.time >= unknowns[2]
-        self.rows = {
-            name: np.isfinite(values) & kept & (after if name == "displacement" else True)
-            for name, values in self.signals.items()
-        }
-        if "acceleration" in self.signals:
-            clear = unknowns[2] - SMEAR * self.wall(unknowns).peak_force_time_s
-            before = self.rows["acceleration"] & (self.time < clear)
-            if before.sum() >= FEWEST_BEFORE:
-                self.offset = float(self.signals["acceleration"][before].mean())
-
-    def solve(self, start: np.ndarray, tolerance: float) -> OptimizeResult:
-        """Solve from a start."""
-        from scipy.optimize import least_squares  # heavy, and only fits need it
-
-        tight = {"xtol": tolerance, "ftol": tolerance, "gtol": tolerance}
-        return least_squares(self.residuals, np.clip(start, *self.bounds), bounds=self.bounds, x_scale="jac", **tight)
-
-    def starts(self, count: int = 4) -> list[np.ndarray]:
-        """Return the best vehicles of a grid of rates, ratios and first touches; the speed follows from each.
-
-        First touch is sought at the zero of the times, and at and ahead of the first row that shows the impact.
-        """
-        every = max(1, len(self.time) // 300)
-        signals = {name: values[::every] for name, values in self.signals.items()}
-        thin = _Problem(Pulse("", self.time[::every], signals), self.mass_kg, None)
-        found, span, onset = [], float(self.time[-1] - self.time[0]), _onset(self)
-        for rate in np.geomspace(0.5, 200.0, 14) / span:
-            for ratio in np.geomspace(0.02, 20.0, 7):
-                for touch in (0.0, onset, onset - 0.3 / rate, onset - 0.8 / rate):
-                    guess = np.array([math.log(rate), math.log(ratio), touch, 0.0])
-                    if not thin.bounds[0][2] <= touch <= onset:
-                        continue
-                    thin.offset = None
-                    thin.choose(guess, np.full(len(thin.time), True))
-                    data = thin.residuals(guess)
-                    shape = data - thin.residuals(guess + [0.0, 0.0, 0.0, 1.0])
-                    fitting = float(data @ shape) / max(float(shape @ shape), 1e-300)
-                    speed = max(fitting, 1e-6) if self.speed_m_s is None else self.speed_m_s
-                    guess[3] = speed
-                    found.append((float(np.mean((data - speed * shape) ** 2)), guess[: len(self.bounds[0])]))
-        return [guess for _, guess in sorted(found, key=lambda pair: pair[0])[:count]]
-
-    def best(self) -> np.ndarray:
-        """Solve, with every signal weighted by its own scatter in the end."""
-        everything, tried = np.full(len(self.time), True), []
-        for start in self.starts():
-            self.offset = None
-            self.choose(start, everything)
-            solved = self.solve(start, 1e-8)
-            tried.append((solved.cost / len(solved.fun), solved.x))
-        unknowns = min(tried, key=lambda pair: pair[0])[1]
-        for _ in range(PASSES):
-            self.choose(unknowns, everything)
-            unknowns = self.solve(unknowns, 1e-14).x
-            self.scales = {n: max(_rms(v), 1e-9 * self.ranges[n]) for n, v in self.by_signal(unknowns).items()}
-        return unknowns
-
-    def errors(self, unknowns: np.ndarray) -> np.ndarray:
-        """Half widths of the 95 % intervals of log k_v, log c_v, first touch and, where not given, v_0, shape (p,).
-
-        By a jackknife over stretches of the record, and at least those of white noise by the curvature, which see a
-        flat valley that the jackknife may not follow.
-        """
-        from scipy.stats import t as student
-
-        to_logs = np.eye(len(unknowns))
-        to_logs[0, 0], to_logs[1, 0] = 2.0, 1.0  # k = m exp(2 u_0), c = m exp(u_0 + u_1)
-        offset, rows = self.offset, self.rows
-        solved = self.solve(unknowns, 1e-14)
-        _, sizes, vectors = np.linalg.svd(solved.jac, full_matrices=False)
-        free = max(len(solved.fun) - len(unknowns), 1)
-        roots = to_logs @ vectors.T / np.maximum(sizes, 1e-300) * math.sqrt(2.0 * solved.cost / free)
-        white = np.sqrt((roots**2).sum(axis=1))
-        moved = []
-        for block in self.stretches(unknowns):
-            kept = np.full(len(self.time), True)
-            kept[block] = False
-            self.choose(unknowns, kept)
-            moved.append(self.solve(unknowns, 1e-9).x - unknowns)
-            self.offset, self.rows = offset, rows
-        count = len(moved)
-        scatter = np.sqrt((count - 1) / count * ((np.array(moved) @ to_logs.T) ** 2).sum(axis=0))
-        return float(student.ppf(0.975, min(BLOCKS, count) - 1)) * np.maximum(scatter, white)
-
-    def speed_of_record(self, unknowns: np.ndarray, error_m_s: float) -> tuple[float, float]:
-        """Speed before first touch by the record's own change of speed, and how far it may be off [m/s].
-
-        The change is the integral of the acceleration where there is one; what the fit makes of the speed at the end of
-        the record is added. By how much fit and integral differ is part of the error.
-        """
-        drift = 0.0
-        if "acceleration" in self.signals:
-            drift = -float(np.trapezoid(self.by_signal(unknowns)["acceleration"], self.time[self.rows["acceleration"]]))
-        record = float(unknowns[3]) + drift
-        return record, SURE * error_m_s + abs(drift) + GAUGE_SHARE * record
-
-    def stretches(self, unknowns: np.ndarray) -> list[np.ndarray]:
-        """Rows of each stretch: before first touch, up to separation, after it."""
-        ends = unknowns[2], unknowns[2] + self.wall(unknowns).separation_time_s
-        parts = np.split(np.arange(len(self.time)), np.searchsorted(self.time, ends))
-        counts = (BLOCKS_BESIDE, BLOCKS, BLOCKS_BESIDE)
-        return [b for part, n in zip(parts, counts, strict=True) for b in np.array_split(part, n) if len(b)]
-
-
 def _onset(problem: _Problem) -> float:
     """Return the first time at which a signal shows the impact, noise averaged out [s]."""
     times = []
     for name, values in problem.signals.items():
-        known = np.isfinite(values)
-        time, values = problem.time[known], values[known]
-        width = max(1, len(values) // 50)
-        smooth = np.convolve(values, np.full(width, 1.0 / width), mode="same")
+        time, smooth = problem.time[problem.known[name]], _smooth(values[problem.known[name]], 0.02)
         change = {"acceleration": -smooth, "velocity": smooth[0] - smooth, "displacement": smooth}[name]
         times.append(float(time[np.argmax(change > 0.3 * change.max())]))
     return min(times)
+
+
+def _smooth(values: np.ndarray, share: float) -> np.ndarray:
+    """Means over windows of a share of the values."""
+    window = max(1, round(share * len(values)))
+    sums = np.concatenate([[0.0], np.cumsum(values)])
+    return np.asarray((sums[window:] - sums[:-window]) / window)
 
 
 def _rms(values: np.ndarray) -> float:
@@ -624,8 +509,7 @@ def _rms(values: np.ndarray) -> float:
 
 def _misfit_of(residuals: np.ndarray, span: float) -> SignalMisfit:
     """Describe the residuals of one signal."""
-    window = max(1, round(SMOOTHING_SHARE * len(residuals)))
-    smooth = np.convolve(residuals, np.full(window, 1.0 / window), mode="valid")
+    smooth = _smooth(residuals, SMOOTHING_SHARE)
     scatter = float(residuals @ residuals)
     correlation = float(residuals[1:] @ residuals[:-1]) / scatter if scatter > 0.0 else 0.0
     size = _rms(residuals)
