@@ -150,14 +150,15 @@ def fit_lines(fit: VehicleFit) -> list[str]:
         ("spring", f"{wall.spring_N_m / 1e3:.1f} ± {fit.spring_error_N_m / 1e3:.1f} kN/m (95 %)"),
         ("damper", f"{wall.damper_N_s_m / 1e3:.2f} ± {fit.damper_error_N_s_m / 1e3:.2f} kN*s/m (95 %)"),
         ("impact speed", speed),
-        ("first touch", f"{1e3 * fit.touch_s + 0.0:.1f} ± {1e3 * fit.touch_error_s:.1f} ms"),
+        ("first touch", f"{round(1e3 * fit.touch_s, 1) + 0.0:.1f} ± {1e3 * fit.touch_error_s:.1f} ms"),
         ("damping", damping),
         ("largest crush", f"{wall.max_displacement_m:.3f} m"),
         ("peak force", f"{wall.peak_force / 1e3:.0f} kN, {wall.peak_force_time_s:.4f} s after first touch"),
         ("rebound", f"{abs(wall.rebound_speed_m_s):.2f} m/s"),
     ]
     if "acceleration" in fit.misfits:
-        words = "not known: no rows before first touch" if offset is None else f"{offset:.2f} m/s^2, taken off"
+        known = "not known: no rows before first touch"
+        words = known if offset is None else f"{round(offset, 2) + 0.0:.2f} m/s^2, taken off"
         rows.append(("zero offset", words))
     for name, misfit in fit.misfits.items():
         rows.append((f"misfit of {name}", f"{misfit.share:.1%} of its range (root mean square)"))

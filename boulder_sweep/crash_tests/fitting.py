@@ -52,6 +52,8 @@ PASSES = 4
 """How often the weights of the signals, the offset and the rows it stands on are renewed from the last fit."""
 LEAST_SHIFT_S = 5e-4
 """A first touch this close to the zero of the times is not worth a word."""
+MOST_SHIFT = 0.1
+"""Part of the largest crush by which a front that is no spring and damper may move first touch: it may be soft first."""
 BLOCKS, BLOCKS_BESIDE = 16, 4
 """Stretches that are left out in turn: from first touch to separation, and before and after it."""
 FEWEST_BEFORE = 5
@@ -254,7 +256,7 @@ class _Problem:
                     thin.offset = None
                     thin.choose(guess, np.full(len(thin.time), True))
                     data = thin.residuals(guess)
-                    shape = data - thin.residuals(guess + [0.0, 0.0, 0.0, 1.0])
+                    shape = data - thin.residuals(guess + np.array([0.0, 0.0, 0.0, 1.0]))
                     fitting = float(data @ shape) / max(float(shape @ shape), 1e-300)
                     speed = max(fitting, 1e-6) if self.speed_m_s is None else self.speed_m_s
                     guess[3] = speed
@@ -403,13 +405,22 @@ def _far_out(name: str, value: float) -> str:
     return f"{range_words(value, value, field.unit, unit)} is far outside what vehicles have, {ends}"
 
 
+def _systematic(misfits: dict[str, SignalMisfit]) -> dict[str, float]:
+    """Misfits that noise does not explain, as shares of the ranges."""
+    return {
+        name: misfit.systematic_share
+        for name, misfit in misfits.items()
+        if misfit.systematic_share > SYSTEMATIC_SHARE and misfit.correlation > GO_TOGETHER
+    }
+
+
 def _refuse(fit: VehicleFit) -> None:
     """Refuse a fit that says nothing about a vehicle, with its reasons and what to do."""
     wall, ratio = fit.wall, fit.wall.damper_N_s_m / math.sqrt(fit.wall.spring_N_m * fit.wall.mass_kg)
     reasons = [
-        f"no spring and damper in series come near it: the {name} is off by {misfit.systematic_share:.0%} of its range"
-        for name, misfit in fit.misfits.items()
-        if misfit.systematic_share > NOT_NEAR and misfit.correlation > GO_TOGETHER
+        f"no spring and damper in series come near it: the {name} is off by {share:.0%} of its range"
+        for name, share in _systematic(fit.misfits).items()
+        if share > NOT_NEAR
     ]
     open_ends = (
         ("spring", "damper", ratio < 2.0 * RATIO_BOUNDS[0], fit.spring_error_N_m / wall.spring_N_m),
@@ -419,6 +430,14 @@ def _refuse(fit: VehicleFit) -> None:
         if alone or share > 1.0:
             why = f"a {other} alone fits as well" if alone else "its error is larger than itself"
             reasons.append(f"the record does not determine the {name}: {why}")
+    shift, least = fit.touch_s, max(fit.touch_error_s, LEAST_SHIFT_S)
+    unseen = shift > least or fit.pulse.time_s[0] - shift > least
+    far = abs(shift) * wall.speed_m_s > MOST_SHIFT * wall.max_displacement_m
+    if unseen and far and abs(shift) > least and _systematic(fit.misfits):
+        reasons.append(
+            f"no spring and damper in series fit it from its time 0 on, and not well from {1e3 * shift:.1f} ms on: "
+            f"either first touch is then, and {1e3 * shift:.1f} ms must be taken from its times, or the front is none"
+        )
     if not reasons:
         found = {
             "impact_speed_m_s": wall.speed_m_s,
@@ -436,28 +455,27 @@ def _refuse(fit: VehicleFit) -> None:
 def _what_to_do(fit: VehicleFit) -> str:
     """Return how a record that was refused may be put right."""
     first, last = fit.pulse.time_s[[0, -1]] - fit.touch_s
-    ways = []
-    if last < fit.wall.separation_time_s and (not fit.wall.over_damped or last < fit.wall.peak_force_time_s):
-        ways.append(
-            f"give a record that goes on until the vehicle leaves the wall (it ends {last:.3f} s after first touch)"
-        )
+    ways = ["check the units of its columns and --mass"]
     if first > 0.0 or (fit.offset_m_s2 is None and "acceleration" in fit.pulse.signals):
-        ways.append("give rows from before first touch on")
-    if fit.speed_error_m_s is not None:
-        ways.append("give --speed")
-    return f"To do: {', '.join([*ways, 'check the units of its columns and --mass'])}"
+        ways.insert(0, "give rows from before first touch on")
+    if last < min(fit.wall.separation_time_s, 2.0 * fit.wall.peak_force_time_s):
+        open_speed = fit.speed_error_m_s is not None and last < fit.wall.max_displacement_time_s
+        ended = f"it ends {last:.3f} s after first touch"
+        ways.insert(
+            0, f"give a record until the vehicle leaves the wall ({ended}){', or --speed' if open_speed else ''}"
+        )
+    return f"To do: {'; '.join(ways)}"
 
 
 def _warnings(fit: VehicleFit) -> Iterator[str]:
     """Yield what the user of a fit should know before trusting it."""
     wall = fit.wall
-    for name, misfit in fit.misfits.items():
-        if misfit.systematic_share > SYSTEMATIC_SHARE and misfit.correlation > GO_TOGETHER:
-            yield (
-                f"the {name} is off by {misfit.systematic_share:.0%} of its range even with the noise averaged out: "
-                f"this front is not a spring and a damper in series (it may stiffen as it is crushed); "
-                f"use the constants only for impacts that crush it about as far"
-            )
+    for name, share in _systematic(fit.misfits).items():
+        yield (
+            f"the {name} is off by {share:.0%} of its range even with the noise averaged out: this front is not a "
+            f"spring and a damper in series (it may stiffen as it is crushed); use the constants only for impacts that "
+            f"crush it about as far"
+        )
     shares = ("spring", fit.spring_error_N_m / wall.spring_N_m), ("damper", fit.damper_error_N_s_m / wall.damper_N_s_m)
     for name, share in shares:
         if share > UNSURE:
