@@ -53,7 +53,7 @@ PASSES = 4
 LEAST_SHIFT_S = 5e-4
 """A first touch this close to the zero of the times is not worth a word."""
 MOST_SHIFT = 0.1
-"""Part of the largest crush by which a front that is no spring and damper may move first touch: it may be soft first."""
+"""Share of the crush by which a front that is no spring and damper may move first touch: it may be soft at first."""
 BLOCKS, BLOCKS_BESIDE = 16, 4
 """Stretches that are left out in turn: from first touch to separation, and before and after it."""
 FEWEST_BEFORE = 5
@@ -68,10 +68,8 @@ class SignalMisfit:
 
     Attributes
     ----------
-    rms : float
-        Root mean square of the residuals, in the unit of the signal.
-    share : float
-        The same as a share of the signal's range.
+    rms, share : float
+        Root mean square of the residuals, in the unit of the signal and as a share of its range.
     systematic_share : float
         Largest residual after the noise has been averaged out, as a share of the range.
     correlation : float
@@ -353,12 +351,10 @@ def fit_pulse(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) -
         Mass or speed are not those of a vehicle, the record contradicts the speed, no vehicle comes near the record,
         the record does not determine spring or damper, or they are not those of a vehicle.
     """
-    for name, value in (("mass", mass_kg), ("speed", speed_m_s)):
+    for name, column, value in (("mass", "vehicle_mass_kg", mass_kg), ("speed", "impact_speed_m_s", speed_m_s)):
         if value is not None and not 0.0 < value < math.inf:
             raise FitError(f"the {name} of the vehicle must be positive, not {value:g}")
-        if value is not None and (
-            words := _far_out("vehicle_mass_kg" if name == "mass" else "impact_speed_m_s", value)
-        ):
+        if value is not None and (words := _far_out(column, value)):
             raise FitError(f"--{name}: {words}; check its unit")
     problem = _Problem(pulse, float(mass_kg), None)
     unknowns = problem.best()
@@ -422,8 +418,9 @@ def _refuse(fit: VehicleFit) -> None:
         for name, share in _systematic(fit.misfits).items()
         if share > NOT_NEAR
     ]
+    at_once = wall.peak_force_time_s < 2.0 * float(np.median(np.diff(fit.pulse.time_s)))
     open_ends = (
-        ("spring", "damper", ratio < 2.0 * RATIO_BOUNDS[0], fit.spring_error_N_m / wall.spring_N_m),
+        ("spring", "damper", at_once or ratio < 2.0 * RATIO_BOUNDS[0], fit.spring_error_N_m / wall.spring_N_m),
         ("damper", "spring", ratio > 0.5 * RATIO_BOUNDS[1], fit.damper_error_N_s_m / wall.damper_N_s_m),
     )
     for name, other, alone, share in open_ends:
@@ -434,18 +431,12 @@ def _refuse(fit: VehicleFit) -> None:
     unseen = shift > least or fit.pulse.time_s[0] - shift > least
     far = abs(shift) * wall.speed_m_s > MOST_SHIFT * wall.max_displacement_m
     if unseen and far and abs(shift) > least and _systematic(fit.misfits):
-        reasons.append(
-            f"no spring and damper in series fit it from its time 0 on, and not well from {1e3 * shift:.1f} ms on: "
-            f"either first touch is then, and {1e3 * shift:.1f} ms must be taken from its times, or the front is none"
-        )
+        words = f"a spring and a damper in series fit it only from {1e3 * shift:.1f} ms on, and not well"
+        reasons.append(words + (f"; if first touch is then, take {1e3 * shift:.1f} ms from its times" * (shift > 0.0)))
     if not reasons:
-        found = {
-            "impact_speed_m_s": wall.speed_m_s,
-            "vehicle_spring_N_m": wall.spring_N_m,
-            "vehicle_damper_N_s_m": wall.damper_N_s_m,
-        }
-        words = ((BY_NAME[name].key, _far_out(name, value)) for name, value in found.items())
-        reasons = [f"the fitted {key} of {text}" for key, text in words if text]
+        names = "impact_speed_m_s", "vehicle_spring_N_m", "vehicle_damper_N_s_m"
+        found = ((BY_NAME[name].key, _far_out(name, fit.to_dict()[name])) for name in names)
+        reasons = [f"the fitted {key} of {text}" for key, text in found if text]
         if wall.max_displacement_m > MOST_CRUSH_M:
             reasons.append(f"the fitted vehicle is crushed by {wall.max_displacement_m:,.0f} m, more than it is long")
     if reasons:
@@ -460,10 +451,8 @@ def _what_to_do(fit: VehicleFit) -> str:
         ways.insert(0, "give rows from before first touch on")
     if last < min(fit.wall.separation_time_s, 2.0 * fit.wall.peak_force_time_s):
         open_speed = fit.speed_error_m_s is not None and last < fit.wall.max_displacement_time_s
-        ended = f"it ends {last:.3f} s after first touch"
-        ways.insert(
-            0, f"give a record until the vehicle leaves the wall ({ended}){', or --speed' if open_speed else ''}"
-        )
+        longer = f"give a record until the vehicle leaves the wall (it ends {last:.3f} s after first touch)"
+        ways.insert(0, longer + ", or --speed" * open_speed)
     return f"To do: {'; '.join(ways)}"
 
 

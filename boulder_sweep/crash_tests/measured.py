@@ -326,7 +326,7 @@ def pulse_of(history: TimeHistory) -> Pulse:
         known = values[np.isfinite(values)]
         if name == "acceleration":
             zero = float(np.median(values[before & np.isfinite(values)])) if np.isfinite(values[before]).any() else 0.0
-            if known.mean() > zero:
+            if known.mean() > zero or known.mean() == zero > 0.0:
                 raise FitError(
                     f"{history.path}: the acceleration is positive, as if the wall pushed the vehicle on; "
                     f"if it counts slowing down as positive, name the column deceleration"

@@ -232,7 +232,7 @@ def draw_fit(fit: VehicleFit, path: str | Path) -> None:
         The picture cannot be written, or matplotlib is not installed.
     """
     names = [name for name in ORDER if name in fit.pulse.signals]
-    fine = np.linspace(*fit.pulse.time_s[[0, -1]], POINTS)
+    fine = np.linspace(float(fit.pulse.time_s[0]), float(fit.pulse.time_s[-1]), POINTS)
     curves, at_rows = fit.fitted(fine), fit.fitted(fit.pulse.time_s)
     with pictures.figure(path, max(3.4 * len(names), 5.6), 4.9) as fig:
         grid = fig.subplots(2, len(names), sharex=True, squeeze=False, height_ratios=(2.4, 1.0))
