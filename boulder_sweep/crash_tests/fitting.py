@@ -149,8 +149,8 @@ class VehicleFit:
         }
 
     def fitted(self, time_s: np.ndarray) -> dict[str, np.ndarray]:
-        """Fitted response at times of the pulse [s], by signal, with the zero offset of the acceleration in it."""
-        values = dict(zip(PULSE_UNITS, self.wall.response(time_s - self.touch_s), strict=True))
+        """Fitted response at times since first touch [s], by signal, with the zero offset of the acceleration in it."""
+        values = dict(zip(PULSE_UNITS, self.wall.response(time_s), strict=True))
         return {name: values[name] + (self.offset_m_s2 or 0.0) * (name == "acceleration") for name in self.misfits}
 
     def plot(self, path: str | Path) -> None:
@@ -432,7 +432,8 @@ def _refuse(fit: VehicleFit) -> None:
     far = abs(shift) * wall.speed_m_s > MOST_SHIFT * wall.max_displacement_m
     if unseen and far and abs(shift) > least and _systematic(fit.misfits):
         words = f"a spring and a damper in series fit it only from {1e3 * shift:.1f} ms on, and not well"
-        reasons.append(words + (f"; if first touch is then, take {1e3 * shift:.1f} ms from its times" * (shift > 0.0)))
+        later = f"; if first touch is then, take {1e3 * shift:.1f} ms from its times" if shift > 0.0 else ""
+        reasons.append(words + later)
     if not reasons:
         names = "impact_speed_m_s", "vehicle_spring_N_m", "vehicle_damper_N_s_m"
         found = ((BY_NAME[name].key, _far_out(name, fit.to_dict()[name])) for name in names)
@@ -452,7 +453,7 @@ def _what_to_do(fit: VehicleFit) -> str:
     if last < min(fit.wall.separation_time_s, 2.0 * fit.wall.peak_force_time_s):
         open_speed = fit.speed_error_m_s is not None and last < fit.wall.max_displacement_time_s
         longer = f"give a record until the vehicle leaves the wall (it ends {last:.3f} s after first touch)"
-        ways.insert(0, longer + ", or --speed" * open_speed)
+        ways.insert(0, f"{longer}{', or --speed' if open_speed else ''}")
     return f"To do: {'; '.join(ways)}"
 
 

@@ -232,23 +232,25 @@ def draw_fit(fit: VehicleFit, path: str | Path) -> None:
         The picture cannot be written, or matplotlib is not installed.
     """
     names = [name for name in ORDER if name in fit.pulse.signals]
-    fine = np.linspace(float(fit.pulse.time_s[0]), float(fit.pulse.time_s[-1]), POINTS)
-    curves, at_rows = fit.fitted(fine), fit.fitted(fit.pulse.time_s)
+    time = fit.pulse.time_s - fit.touch_s
+    fine = np.linspace(float(time[0]), float(time[-1]), POINTS)
+    curves, at_rows = fit.fitted(fine), fit.fitted(time)
     with pictures.figure(path, max(3.4 * len(names), 5.6), 4.9) as fig:
         grid = fig.subplots(2, len(names), sharex=True, squeeze=False, height_ratios=(2.4, 1.0))
         for (above, below), name in zip(grid.T, names, strict=True):
             unit = PULSE_UNITS[name].replace("^2", "²")
-            above.plot(fit.pulse.time_s, fit.pulse.signals[name], ".", color=GREY, markersize=3.0, label="measured")
+            above.plot(time, fit.pulse.signals[name], ".", color=GREY, markersize=3.0, label="measured")
             above.plot(fine, curves[name], color=ORANGE, label="Maxwell element")
             above.set_title(name.capitalize())
             above.set_ylabel(f"{name} [{unit}]")
             residuals = fit.pulse.signals[name] - at_rows[name]
-            below.plot(fit.pulse.time_s, residuals, ".", color=GREY, markersize=3.0)
+            below.plot(time, residuals, ".", color=GREY, markersize=3.0)
             below.axhline(0.0, color=BLACK, linewidth=0.8)
             reach = 1.15 * float(np.nanmax(np.abs(residuals)))
             below.set_ylim(-reach or -1.0, reach or 1.0)
             below.set_ylabel(f"residual [{unit}]")
             pictures.time_axis(below, float(fine[-1]))
+            below.set_xlim(left=float(fine[0]))
             below.locator_params(axis="x", nbins=5)  # more numbers run into one another
         grid[0, 0].legend(loc="best")
         pictures.headline(fig, fit_line(fit), size=10.5)
