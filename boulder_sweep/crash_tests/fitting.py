@@ -426,6 +426,8 @@ def _refuse(fit: VehicleFit) -> None:
     for name, other, alone, share in open_ends:
         if alone or share > 1.0:
             why = f"a {other} alone fits as well" if alone else "its error is larger than itself"
+            if alone and other == "spring" and fit.pulse.time_s[-1] - fit.touch_s > wall.separation_time_s:
+                why += ", since the vehicle leaves the wall as fast as it came, which no front of sheet metal does"
             reasons.append(f"the record does not determine the {name}: {why}")
     shift, least = fit.touch_s, max(fit.touch_error_s, LEAST_SHIFT_S)
     unseen = shift > least or fit.pulse.time_s[0] - shift > least

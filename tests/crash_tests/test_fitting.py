@@ -199,7 +199,10 @@ def stiffening(t: np.ndarray, k: float = 3e5, k_3: float = 8e6, damper: float = 
     ("pulse", "message"),
     [
         (made(end=0.02), "does not determine the damper: .*To do: give a record until the vehicle leaves the wall"),
-        (made(replace(PAPER, damper_N_s_m=1e9)), "does not determine the damper: a spring alone fits as well.*To do: "),
+        (
+            made(replace(PAPER, damper_N_s_m=1e9)),
+            "does not determine the damper: a spring alone fits as well, since .*To do: ",
+        ),
         (
             Pulse("", TIMES, {"velocity": replace(PAPER, spring_N_m=1e12).velocity(TIMES)}),
             "does not determine the spring: a damper alone",
