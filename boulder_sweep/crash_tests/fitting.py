@@ -271,6 +271,7 @@ class _Problem:
             tried.append((solved.cost / len(solved.fun), solved.x))
         unknowns = min(tried, key=lambda pair: pair[0])[1]
         for _ in range(PASSES):
+            self.offset = None
             self.choose(unknowns, everything)
             unknowns = self.solve(unknowns, 1e-14).x
             for name, values in self.compared(unknowns).items():

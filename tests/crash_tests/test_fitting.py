@@ -264,6 +264,13 @@ def test_an_accelerometer_without_rows_before_first_touch_is_named() -> None:
     assert both.warnings == ()
 
 
+def test_the_first_rows_of_an_impact_are_not_taken_for_a_zero_offset() -> None:
+    wall = RigidWall(6800.0, 10.164, 6800.0 * 18.125**2, 1.347 * 18.125 * 6800.0)
+    fit = fit_pulse(made(wall, start=0.0, seed=1034), 6800.0)
+    assert fit.offset_m_s2 is None
+    assert max(abs(miss) for miss in misses(fit, wall)) < 1.0
+
+
 def test_gaps_are_left_out() -> None:
     pulse = made(signals=("displacement", "acceleration"))
     pulse.signals["displacement"][np.arange(len(pulse.time_s)) % 10 != 0] = np.nan
