@@ -276,7 +276,7 @@ class Pulse:
     name : str
         Where it comes from.
     time_s : ndarray, shape (n,)
-        Times since first touch [s], ascending, from 0 on.
+        Times [s], ascending. Zero need not be first touch exactly, and rows before it are of use.
     signals : dict of str to ndarray, shape (n,)
         ``displacement`` [m], ``velocity`` [m/s], ``acceleration`` [m/s^2], one or more; NaN in gaps.
     """
@@ -300,12 +300,12 @@ def read_pulse(path: str | Path) -> Pulse:
 
 
 def pulse_of(history: TimeHistory) -> Pulse:
-    """Return the part of a measured history from first touch on; a deceleration becomes an acceleration.
+    """Return a measured history as a crash pulse; a deceleration becomes an acceleration.
 
     Raises
     ------
     FitError
-        Fewer than 8 samples are left, the vehicle seems to be accelerated by the wall or to move away from it, or a
+        A signal has fewer than 8 values, the vehicle seems to be accelerated by the wall or to move away from it, or a
         signal does not change or has a size that no impact has.
     """
     signals = dict(history.signals)
@@ -313,23 +313,26 @@ def pulse_of(history: TimeHistory) -> Pulse:
         if "acceleration" in signals:
             raise FitError(f"{history.path}: holds both acceleration and deceleration; give one of them")
         signals["acceleration"] = -signals.pop("deceleration")
-    after = history.time_s >= 0.0
-    time = history.time_s[after]
-    signals = {name: values[after] for name, values in signals.items()}
     for name, values in signals.items():
         if np.isfinite(values).sum() < FEWEST_SAMPLES:
-            raise FitError(f"{history.path}: {name} has fewer than {FEWEST_SAMPLES} values from first touch (t = 0) on")
+            raise FitError(f"{history.path}: {name} has fewer than {FEWEST_SAMPLES} values")
         _check_size(f"{history.path}: the {name}", values, name)
-    if "acceleration" in signals and np.nanmean(signals["acceleration"]) > 0.0:
-        raise FitError(
-            f"{history.path}: the acceleration is positive, as if the wall pushed the vehicle on; "
-            f"if it counts slowing down as positive, name the column deceleration"
-        )
+    before = history.time_s < 0.0
     for name, values in signals.items():
-        # The first that noise does not explain: the rebound, which is negative, comes later.
-        if name != "acceleration" and values[np.abs(values) >= 0.25 * np.nanmax(np.abs(values))][0] < 0.0:
+        known = values[np.isfinite(values)]
+        if name == "acceleration":
+            zero = float(np.median(values[before & np.isfinite(values)])) if np.isfinite(values[before]).any() else 0.0
+            if known.mean() > zero or known.mean() == zero > 0.0:
+                raise FitError(
+                    f"{history.path}: the acceleration is positive, as if the wall pushed the vehicle on; "
+                    f"if it counts slowing down as positive, name the column deceleration"
+                )
+            continue
+        # The first change that noise does not explain: the rebound, which is negative, comes later.
+        moved = known - known[0] if name == "displacement" else known
+        if moved[np.abs(moved) >= 0.25 * np.abs(moved).max()][0] < 0.0:
             raise FitError(f"{history.path}: the {name} is negative at first; it counts as positive towards the wall")
-    return Pulse(str(history.path), time, signals)
+    return Pulse(str(history.path), history.time_s, signals)
 
 
 def _check_size(label: str, values: np.ndarray, name: str) -> None:

@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_sweep.crash_tests.cases import CLOSE_UNTIL_S, NAMES, PAPERS_N
-from boulder_sweep.crash_tests.fit_problem import RESPONSES
 from boulder_sweep.crash_tests.measured import PULSE_UNITS
-from boulder_sweep.crash_tests.rigid_wall import StiffeningWall
 from boulder_sweep.crash_tests.score import simulated_signal
 from boulder_sweep.store.files import replacing
 from boulder_sweep.views import pictures
@@ -234,22 +232,25 @@ def draw_fit(fit: VehicleFit, path: str | Path) -> None:
         The picture cannot be written, or matplotlib is not installed.
     """
     names = [name for name in ORDER if name in fit.pulse.signals]
-    residuals = fit.residuals
-    fine = np.linspace(0.0, float(fit.pulse.time_s[-1]), POINTS)
+    time = fit.pulse.time_s - fit.touch_s
+    fine = np.linspace(float(time[0]), float(time[-1]), POINTS)
+    curves, at_rows = fit.fitted(fine), fit.fitted(time)
     with pictures.figure(path, max(3.4 * len(names), 5.6), 4.9) as fig:
         grid = fig.subplots(2, len(names), sharex=True, squeeze=False, height_ratios=(2.4, 1.0))
         for (above, below), name in zip(grid.T, names, strict=True):
             unit = PULSE_UNITS[name].replace("^2", "²")
-            above.plot(fit.pulse.time_s, fit.pulse.signals[name], ".", color=GREY, markersize=3.0, label="measured")
-            above.plot(fine, RESPONSES[name](fit.wall, fine), color=ORANGE, label="Maxwell element")
+            above.plot(time, fit.pulse.signals[name], ".", color=GREY, markersize=3.0, label="measured")
+            above.plot(fine, curves[name], color=ORANGE, label="Maxwell element")
             above.set_title(name.capitalize())
             above.set_ylabel(f"{name} [{unit}]")
-            below.plot(fit.pulse.time_s, residuals[name], ".", color=GREY, markersize=3.0)
+            residuals = fit.pulse.signals[name] - at_rows[name]
+            below.plot(time, residuals, ".", color=GREY, markersize=3.0)
             below.axhline(0.0, color=BLACK, linewidth=0.8)
-            reach = 1.15 * float(np.nanmax(np.abs(residuals[name])))
+            reach = 1.15 * float(np.nanmax(np.abs(residuals)))
             below.set_ylim(-reach or -1.0, reach or 1.0)
             below.set_ylabel(f"residual [{unit}]")
             pictures.time_axis(below, float(fine[-1]))
+            below.set_xlim(left=float(fine[0]))
             below.locator_params(axis="x", nbins=5)  # more numbers run into one another
         grid[0, 0].legend(loc="best")
         pictures.headline(fig, fit_line(fit), size=10.5)
@@ -259,10 +260,7 @@ def draw_fit(fit: VehicleFit, path: str | Path) -> None:
 
 
 def fit_line(fit: VehicleFit) -> str:
-    """Spring and damper with their standard errors on one line."""
+    """Spring and damper with their errors of 95 % on one line."""
     spring = f"spring {fit.wall.spring_N_m / 1e3:.1f} ± {fit.spring_error_N_m / 1e3:.1f} kN/m"
     damper = f"damper {fit.wall.damper_N_s_m / 1e3:.2f} ± {fit.damper_error_N_s_m / 1e3:.2f} kN·s/m"
-    wall = fit.wall
-    if isinstance(wall, StiffeningWall):
-        spring += f", {wall.second_spring_N_m / 1e3:.1f} kN/m from {wall.second_spring_from_m:.3f} m"
     return f"{spring}, {damper}"

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from boulder_sweep.cli.main import COMMANDS
+from docs.studies.example_pulse import example_pulse
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SITE = CONFIGS / "site.yaml"
@@ -38,9 +39,6 @@ WORDS = {
 """A plain use of every command."""
 LONG = ("uncertainty", "tradeoff", "validate")
 """Commands that take seconds; their widths are nightly."""
-PULSE = "time_s,acceleration_m_s2\n" + "".join(
-    f"{t / 1000:.3f},{-153 * (t / 60) * (2 - t / 60):.3f}\n" for t in range(121)
-)
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +49,7 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("width")
     run(load(SITE), folder / "site.sweep")
     run(load(SITE, ["vehicle.speed=40 mph"]), folder / "other.sweep")
-    (folder / "pulse.csv").write_text(PULSE)
+    (folder / "pulse.csv").write_text(example_pulse())
     return folder
 
 

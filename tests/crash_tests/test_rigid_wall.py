@@ -88,6 +88,14 @@ def test_it_coasts_after_separation() -> None:
     assert np.diff(x) == pytest.approx(wall.rebound_speed_m_s * np.diff(t))
 
 
+def test_it_keeps_its_speed_before_first_touch() -> None:
+    wall = rigid_wall_test()
+    x, v, acceleration = wall.response(np.array([-0.1, -1e-9]))
+    assert x == pytest.approx([-1.34, -13.4e-9])
+    assert np.all(v == wall.speed_m_s)
+    assert np.all(acceleration == 0.0)
+
+
 def test_an_over_damped_vehicle_never_comes_off() -> None:
     wall = RigidWall(MASS, 13.4, SPRING, 0.3 * CRITICAL)
     assert wall.over_damped

@@ -97,7 +97,6 @@ MUTATIONS = (
     Mutation((111,), _SECOND, "return u * (1.0 - k_v / k_2)", "return u * (1.0 + k_v / k_2)"),
     Mutation((111,), _SECOND, "k_m=c.k_m * (k_2 / c.k_v)", "k_m=c.k_m"),
     Mutation((111,), _DYNAMICS, "(c.v_0 - v_v) - c.u_0", "(c.v_0 - v_v) + c.u_0"),
-    Mutation((111,), _WALL, "(a_2 - w.a * v_2) * odd", "(a_2 + w.a * v_2) * odd"),
     Mutation((112,), _SECOND, "/ (1.0 - k_v / k_2) if k_2 > k_v", "* (1.0 - k_v / k_2) if k_2 > k_v"),
     Mutation((121,), _PLASTIC, "F_n = behind - ahead", "F_n = -behind - ahead"),
     Mutation((122,), _PLASTIC, "= max(front, u - y)", "= max(front, u)"),
