@@ -169,9 +169,7 @@ def drawn(name: str, case: Case, every: int = 1) -> pd.DataFrame:
     return designs.drop(columns=list(SIDES) if case.outlined else []).iloc[::every]
 
 
-def outcomes(
-    cases: Mapping[str, Case], configs: tuple[str, ...] = CONFIGS, every: int = 1
-) -> Iterator[tuple[str, pd.DataFrame]]:
+def outcomes(cases: Mapping[str, Case], configs: tuple[str, ...], every: int = 1) -> Iterator[tuple[str, pd.DataFrame]]:
     """Run every case and every file; yield its name and what is compared.
 
     Parameters
@@ -193,7 +191,7 @@ def outcomes(
         folder = Path(name)
         files = {f"configs/{config}.yaml": FOLDER.parent / "configs" / f"{config}.yaml" for config in configs}
         for number, (title, case) in enumerate(cases.items()):
-            drawn(title, case, every).to_parquet(folder / f"{number}.parquet")
+            drawn(title, case, every).to_parquet(folder / f"{number}.parquet", index=False)
             files[title] = folder / f"{number}.yaml"
             files[title].write_text(f"name: flips\ntable: {number}.parquet\n{case.settings}\n")
         for title, file in files.items():
@@ -370,7 +368,7 @@ def main() -> int:
     if not arguments.record and known.keys() != (expected := {*CASES, *(f"configs/{name}.yaml" for name in CONFIGS)}):
         parser.error(f"{arguments.file} holds other cases ({sorted(known.keys() ^ expected)}): freeze it with --record")
     found = {}
-    for case, frame in outcomes(CASES, every=TENTH if arguments.tenth else 1):
+    for case, frame in outcomes(CASES, CONFIGS, TENTH if arguments.tenth else 1):
         print(f"{case}: {len(frame)} designs", flush=True)
         found[case] = frame
     if arguments.record:

@@ -25,7 +25,7 @@ def test_a_kernel_without_a_stamp_is_of_no_sources():
 
 
 def test_the_hash_covers_all_that_is_compiled():
-    """`source_hash` takes the modules of one folder; what the page compiles imports from these and from SOURCES alone."""
+    """`source_hash` takes one folder; what the page compiles imports from there and from SOURCES alone."""
     folder = PACKAGES["boulder_kernels"]
     assert {file.parent for file in folder.rglob("*.py")} == {folder}
     compiled = {f"boulder_sweep.report.{Path(name).stem}" for name in SOURCES} - {"boulder_sweep.report.build"}
