@@ -206,20 +206,23 @@ def outcomes(cases: Mapping[str, Case], configs: tuple[str, ...], every: int = 1
 
 
 def is_at_edge(frame: pd.DataFrame, sweep: Sweep) -> np.ndarray:
-    """Return where the last bits may decide which rule applies to a row of a result, bool, shape (n,)."""
+    """Return where the last bits may decide which rule applies to a row of a result, bool, shape (n,).
+
+    A rotation that is the limit itself has reached it, nobody knows how clearly, and counts as none.
+    """
     criterion = sweep.criterion
     distances = (
         (criterion.max_rotation_deg - frame["max_rotation_deg"], frame["rotation_error_deg"], EDGE_DEG),
         (PENETRATION_LIMITS_M[criterion.rating] - frame["penetration_m"], frame["displacement_error_m"], EDGE_M),
         (frame["bed_offset_m"] - frame["vehicle_crush_m"], frame["displacement_error_m"], EDGE_M),
     )
-    edges = [(room.abs() < edge) | ((room - error).abs() < edge) for room, error, edge in distances]
+    edges = [(room != 0.0) & ((room.abs() < edge) | ((room - error).abs() < edge)) for room, error, edge in distances]
     return np.logical_or.reduce([edge.to_numpy(bool) for edge in edges])
 
 
 def write(found: Mapping[str, pd.DataFrame], path: Path = RECORD) -> None:
     """Write what `outcomes` gave of whole cases as one small Parquet file."""
-    kept = [frame.assign(case=case)[["case", *SETTLED_BY, "max_rotation"]] for case, frame in found.items()]
+    kept = [frame.assign(case=case)[["case", *SETTLED_BY, "max_rotation", "at_edge"]] for case, frame in found.items()]
     table = pa.Table.from_pandas(pd.concat(kept, ignore_index=True), preserve_index=False)
     names = ["case", *SETTLED_BY]
     pq.write_table(table, path, compression="zstd", compression_level=19, use_dictionary=names)
@@ -294,7 +297,7 @@ def compared(case: str, record: pd.DataFrame, now: pd.DataFrame) -> Changes:
     verdict = other["verdict"]
     reason = ~verdict & other["reason"]
     grade = ~verdict & (other["robustness"] | other["stands_under"])
-    rounded = (verdict | reason) & ~moved & now["at_edge"].to_numpy()
+    rounded = (verdict | reason) & ~moved & (before["at_edge"] | now["at_edge"]).to_numpy()
     better = before["robustness"].map(RANKS).to_numpy() < now["robustness"].map(RANKS).to_numpy()
     unsafe = ~rounded & ((verdict & (now["verdict"] == "pass").to_numpy()) | (grade & better))
     shown = verdict | reason | grade
@@ -318,9 +321,9 @@ RANKS = {"": -1} | {grade: rank for rank, grade in enumerate(("sensitive", "open
 assert set(RANKS) == {"", *GRADES}
 
 
-def _words(rows: pd.DataFrame) -> pd.Series:
-    """Return verdict, reason and grade of rows as one text."""
-    return rows[SETTLED_BY].agg(lambda words: ", ".join(filter(None, words)), axis=1)
+def _words(rows: pd.DataFrame) -> list[str]:
+    """Return verdict, reason and grade of each row as one text."""
+    return [", ".join(filter(None, words)) for words in rows[SETTLED_BY].itertuples(index=False)]
 
 
 def is_held(changes: list[Changes]) -> bool:

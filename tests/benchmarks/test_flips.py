@@ -59,7 +59,7 @@ def rows(*given, at_edge=False):
     ],
 )
 def test_a_change_is_counted_for_what_it_is(before, now, at_edge, counts):
-    changes = compared("one", rows(UNASKED, before), rows(UNASKED, now, at_edge=at_edge))
+    changes = compared("one", rows(UNASKED, before, at_edge=at_edge), rows(UNASKED, now))
     none = dict.fromkeys(("verdicts", "reasons", "grades", "unsafe", "rotations", "rounded"), 0)
     assert {name: getattr(changes, name) for name in none} == none | counts
     assert is_held([changes]) is not bool(counts.keys() - {"rounded"})
@@ -99,6 +99,8 @@ def test_unsafe_changes_are_named_first():
         (19.9995, 0.1, -1.0, 0.01, 0.5, True),
         (19.9, 0.1, -1.0, 0.01, 0.5, True),
         (19.9, 0.11, -1.0, 0.01, 0.5, False),
+        (20.0, np.nan, -1.0, 0.01, 0.5, False),
+        (20.0, np.inf, -1.0, 0.01, 0.5, False),
         (12.0, 0.1, 0.999995, 0.001, 0.5, True),
         (12.0, 0.1, 0.98, 0.02, 0.5, True),
         (12.0, 0.1, -1.0, 0.01, 2.9, True),
