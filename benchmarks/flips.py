@@ -39,6 +39,8 @@ NOTABLE_DEG = 1e-3
 EDGE_DEG, EDGE_M = NOTABLE_DEG, 1e-5
 """Where a rotation or a length, with or without its error, is so close to a limit, rounding may decide the verdict:
 processors differ in the last bits [deg], [m]."""
+REACHED = 1e-9
+"""As close as this to a limit, a rotation or length is the limit itself: degrees come from radians [deg], [m]."""
 MOST_ROUNDED = 1e-4
 """Fraction of the designs, or one of them, whose verdict rounding may have changed."""
 SETTLED_BY = ["verdict", "reason", "robustness", "stands_under"]
@@ -216,7 +218,10 @@ def is_at_edge(frame: pd.DataFrame, sweep: Sweep) -> np.ndarray:
         (PENETRATION_LIMITS_M[criterion.rating] - frame["penetration_m"], frame["displacement_error_m"], EDGE_M),
         (frame["bed_offset_m"] - frame["vehicle_crush_m"], frame["displacement_error_m"], EDGE_M),
     )
-    edges = [(room != 0.0) & ((room.abs() < edge) | ((room - error).abs() < edge)) for room, error, edge in distances]
+    edges = [
+        (room.abs() > REACHED) & ((room.abs() < edge) | ((room - error).abs() < edge))
+        for room, error, edge in distances
+    ]
     return np.logical_or.reduce([edge.to_numpy(bool) for edge in edges])
 
 
@@ -312,8 +317,18 @@ def compared(case: str, record: pd.DataFrame, now: pd.DataFrame) -> Changes:
             "rounded": rounded[shown],
         }
     )
-    counts = [int(np.count_nonzero(rows & ~rounded)) for rows in (verdict, reason, grade, unsafe, moved)]
-    return Changes(case, len(now), *counts, int(rounded.sum()), float(np.nanmax(change, initial=0.0)), flips)
+    return Changes(
+        case=case,
+        designs=len(now),
+        verdicts=int((verdict & ~rounded).sum()),
+        reasons=int((reason & ~rounded).sum()),
+        grades=int((grade & ~rounded).sum()),
+        unsafe=int(unsafe.sum()),
+        rotations=int(moved.sum()),
+        rounded=int(rounded.sum()),
+        largest_deg=float(np.nanmax(change, initial=0.0)),
+        flips=flips,
+    )
 
 
 RANKS = {"": -1} | {grade: rank for rank, grade in enumerate(("sensitive", "open", "robust"))}
