@@ -2,7 +2,7 @@
 
 Numba compiles the entry points to LLVM code, llvmlite compiles that for WebAssembly, and zig (from PyPI) links it with
 the few C library functions that it calls. The result is kept among the sources and shipped, so that users need not
-build it. It carries a hash of its sources.
+build it. It carries a hash of its sources, and a page is made only where that is the hash of the sources at hand.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ import tempfile
 from collections.abc import Collection
 from pathlib import Path
 from typing import Any
+
+from boulder_sweep.errors import ReportError
 
 KERNEL = Path(__file__).with_name("kernel.wasm")
 STAMP = "boulder-sweep"
@@ -33,12 +35,16 @@ MATHEMATICS = {"sqrt", "tan", "atan2", "hypot", "pow", "sin", "cos"}
 """C library functions that the kernels call."""
 
 
+SOURCES = ("build.py", "entry_points.py", "page_records.py")
+"""Modules of this folder that the kernel is built from, beside all of `boulder_kernels`."""
+
+
 def sources_hash() -> str:
     """Return the hash of what the kernel is built from: kernels, modules of the page, this one (SHA-256, hex)."""
     from boulder_kernels import source_hash
 
     digest = hashlib.sha256(source_hash().encode())
-    for source in ("build.py", "entry_points.py", "page_records.py"):
+    for source in SOURCES:
         digest.update(Path(__file__).with_name(source).read_bytes())
     return digest.hexdigest()
 
@@ -47,6 +53,24 @@ def stamp_of(module: bytes) -> str:
     """Return the hash in a built kernel; empty if it has none."""
     _, found, behind = module.rpartition(_section(STAMP, b"")[2:])
     return behind[:64].decode() if found else ""
+
+
+def kernel() -> bytes:
+    """Return the kernel that the page carries.
+
+    Raises
+    ------
+    ReportError
+        It is missing, or was built from other sources: the page could judge a design otherwise than a table.
+    """
+    module = KERNEL.read_bytes() if KERNEL.exists() else b""
+    if stamp_of(module) != sources_hash():
+        raise ReportError(
+            f"{KERNEL} was not built from the kernels of this installation, so the simulator in the page could judge "
+            "otherwise than `sweep run`: build it with `python -m boulder_sweep.report.build` in a clone with the "
+            "extra dev (pip install -e '.[dev]'), or reinstall boulder-sweep if you have not changed its sources"
+        )
+    return module
 
 
 def intermediate_code() -> str:

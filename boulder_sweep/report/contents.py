@@ -23,7 +23,7 @@ from boulder_sweep.judge.refinement import finer_controls, reported_step_s
 from boulder_sweep.judge.validity import FLAGS, has_odd_layers, largest_tested_rotation, tested_of
 from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, STATUS_REASONS
 from boulder_sweep.report import page_records
-from boulder_sweep.report.build import KERNEL
+from boulder_sweep.report.build import kernel
 from boulder_sweep.report.figures import COLOURS, parts_of
 from boulder_sweep.report.rows import MOST_ELEMENTS, NOT_YET, ResultRows, label_of
 from boulder_sweep.settings.checks import (
@@ -137,7 +137,7 @@ def page_data(
         "colours": COLOURS,
         "yaml": {system: _yaml(settings, ground, system) for system in SYSTEMS},
         "chosen": [dict(one) for one in chosen],
-        "kernel": _packed(KERNEL.read_bytes()),
+        "kernel": _packed(kernel()),
     }
 
 

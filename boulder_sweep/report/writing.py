@@ -19,6 +19,7 @@ from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.report.answers import answer_of
 from boulder_sweep.report.asked import Named, answers_table
+from boulder_sweep.report.build import kernel
 from boulder_sweep.report.rows import MOST_ELEMENTS, inputs_of, read_rows
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import FOOT_WORDS, SolverSettings, completed
@@ -91,7 +92,7 @@ def write_report(
     ------
     ReportError
         There is nothing to report, a design does not exist, the page cannot be written or printed, an entry of the
-        heading is wrong, or the extra ``report`` is not installed.
+        heading is wrong, the extra ``report`` is not installed, or the kernel of the page was built from other sources.
     StoreError
         There is no result in the folder, or it is damaged.
     ValueError
@@ -154,8 +155,8 @@ def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str = 
     Raises
     ------
     ReportError
-        There is no such design or it cannot be computed, the page cannot be written, or the extra ``report`` is not
-        installed.
+        There is no such design or it cannot be computed, the page cannot be written, the extra ``report`` is not
+        installed, or the kernel of the page was built from other sources.
     ValueError
         The units are unknown.
     """
@@ -210,12 +211,13 @@ def _page_maker() -> Callable[..., str]:
     Raises
     ------
     ReportError
-        One of them is not installed.
+        One of them is not installed, or the kernel of the page was built from other sources.
     """
     try:
         from boulder_sweep.report.page import assembled
     except ImportError as lacking:
         raise ReportError(f"reports need {lacking.name}: pip install 'boulder-sweep[report]'") from lacking
+    kernel()  # refused here, before a result is read and its answer computed
     return assembled
 
 
