@@ -63,7 +63,7 @@ class Open:
             table = DesignList(table.file, kept, table.labels) if kept else None
         axes = tuple(axis for axis in sweep.axes if axis.name not in self._left_out)
         cases = tuple(Open(case, names).sweep for case in sweep.cases)
-        self.sweep = dataclasses.replace(sweep, axes=axes, constants=constants, table=table, cases=cases)
+        self.sweep: Sweep = dataclasses.replace(sweep, axes=axes, constants=constants, table=table, cases=cases)
 
     @property
     def count(self) -> int:

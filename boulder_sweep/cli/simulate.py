@@ -90,11 +90,15 @@ def simulate(
     if verbose:
         say("\n".join(console.value_lines(sweep.resolved())))
     from boulder_sweep.impact.simulation import simulate as simulate_design
+    from boulder_sweep.judge.quantiles import words_of
     from boulder_sweep.settings.shown_units import shown_values
     from boulder_sweep.views.wording import verdict_line
 
     with working(quiet):
         result = simulate_design(sweep, number)
+    decided_at = [case for case in sweep.cases if case.taken_at == result.settings["taken_at"]]
+    if decided_at and not quiet:
+        say("\n".join(wrap(f"note: what follows is decided and drawn with {words_of(decided_at[0], units)}")))
     # Before anything else: there may be nothing to draw, and a film takes a while.
     row = result.summary()
     whole = shown_values(row | _to_build(result), units)

@@ -18,6 +18,7 @@ from boulder_sweep.designs import embedment_of_ratio
 from boulder_sweep.impact.simulation import history_of
 from boulder_sweep.judge.accuracy import known_control
 from boulder_sweep.judge.evaluation import Evaluation
+from boulder_sweep.judge.judged import worst_of
 from boulder_sweep.judge.refinement import reported_step_s
 from boulder_sweep.judge.robustness import can_be_asked
 from boulder_sweep.judge.verdict import limits_of
@@ -143,14 +144,14 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
     block = sweep.block(0, 1)
     laws = sweep.model.second_opinion if can_be_asked(sweep) else ()
     evaluation = Evaluation(readings, control, limits, model=sweep.model, second_opinion=laws)
-    judged = evaluation(block)
-    again = part_table(block, judged, {}).to_pylist()[0]
+    cases = evaluation.by_case(block)
+    again = part_table(block, worst_of(cases), {}).to_pylist()[0]
     computable = not block.reasons[0]
     return Explanation(
         name=sweep.name,
         recomputed={spec.name: again[spec.name] for spec in evaluation.columns if spec.name in manifest.columns},
         changed=tuple(differences(there, identity(*stated))),
-        trajectory=history_of(sweep, 0, evaluation, judged) if computable else None,
+        trajectory=history_of(sweep, 0, evaluation, cases) if computable else None,
         **common,
     )
 

@@ -19,7 +19,7 @@ from boulder_sweep.impact.trajectory import Trajectory
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 from boulder_sweep.judge.inputs import Designs
-from boulder_sweep.judge.judged import Judged
+from boulder_sweep.judge.judged import Judged, worst_case, worst_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.judge.refinement import finer_controls, reported_step_s
 from boulder_sweep.settings import Sweep, load
@@ -102,11 +102,11 @@ def simulate(
     if block.reasons[0]:
         raise ValueError(f"design {design_id} cannot be computed: {block.reasons[0]}")
     evaluation = evaluation_of(sweep, accuracy_of(sweep)).asked()
-    return history_of(sweep, design_id, evaluation, evaluation(block), sample_s)
+    return history_of(sweep, design_id, evaluation, evaluation.by_case(block), sample_s)
 
 
 def history_of(
-    sweep: Sweep, design_id: int, evaluation: Evaluation, judged: Judged, sample_s: float = SAMPLE_S
+    sweep: Sweep, design_id: int, evaluation: Evaluation, cases: list[Judged], sample_s: float = SAMPLE_S
 ) -> Trajectory:
     """Return the time history of a design whose row is known.
 
@@ -114,8 +114,8 @@ def history_of(
     ----------
     sweep, design_id
         The design, one that can be computed.
-    evaluation, judged
-        How its row was simulated, and the row.
+    evaluation, cases
+        How its row was simulated, and the row as judged in each case: the history is of the one that decides.
     sample_s
         Time between two samples [s].
 
@@ -124,7 +124,9 @@ def history_of(
     ValueError
         There would be too many samples, or `sample_s` is not positive.
     """
-    block = sweep.block(design_id, design_id + 1)
+    judged, worst = worst_of(cases), int(worst_case(cases)[0])
+    sweep = (sweep, *sweep.cases)[worst]
+    block = dataclasses.replace(sweep.block(design_id, design_id + 1), cases=())
     inputs = {name: float(column.to_numpy()[0]) for name, column in block.columns.items()}
     designs = evaluation.designs(block)
     row, how = judged.row(0), evaluation.readings

@@ -104,7 +104,7 @@ class Evaluation:
             n rows, in the same order. Of a block with cases, each row has the worst of their verdicts.
         """
         if block.cases:
-            return worst_of([self(replace(block, cases=())), *(self(case) for case in block.cases)])
+            return worst_of(self.by_case(block))
         if not block.reasons.any:
             return self.judged(self.designs(block))
         codes = np.asarray(block.reasons.codes)
@@ -118,6 +118,10 @@ class Evaluation:
         order[computable] = np.arange(computable.sum())
         order[~computable] = np.arange(computable.sum(), len(codes))
         return both.rows(order)
+
+    def by_case(self, block: DesignBlock) -> list[Judged]:
+        """Return the rows of a block as judged at its own inputs, and then in each of its cases."""
+        return [self(case) for case in (replace(block, cases=()), *block.cases)]
 
     def designs(self, block: DesignBlock, rows: np.ndarray | None = None) -> Designs:
         """Return the designs of a block, or some of them, as the kernels take them."""

@@ -51,5 +51,5 @@ def words_of_few_elements(sweep: Sweep) -> str:
 def _judged(sweep: Sweep, rows: np.ndarray) -> Judged:
     """Simulate and judge some designs of a sweep, without second opinions."""
     accuracy = Accuracy("fast", steps_of(sweep)["fast"], error_estimate=False)
-    evaluation = replace(evaluation_of(sweep, accuracy, proved=False), second_opinion=())
+    evaluation = replace(evaluation_of(sweep, accuracy), second_opinion=())
     return evaluation(sweep.plan.selection(rows))

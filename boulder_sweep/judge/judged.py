@@ -154,11 +154,8 @@ def worst_of(cases: list[Judged]) -> Judged:
         Each row whole from one of them: a fail before an error, what is undecided, and a pass; of equal verdicts the
         one with the least reserve, and of equal reserves the first. A pass is graded by the worst of its grades.
     """
-    worst = cases[0]
-    for case in cases[1:]:
-        rank, worst_rank = _ORDER[case.verdict], _ORDER[worst.verdict]
-        worse = (rank < worst_rank) | ((rank == worst_rank) & (reserves(case) < reserves(worst)))
-        worst = with_rows(worst, np.flatnonzero(worse), case.rows(worse)) if worse.any() else worst
+    n = len(cases[0])
+    worst = joined(cases).rows(n * worst_case(cases) + np.arange(n))
     columns, words = dict(worst.columns), dict(worst.words)
     passing = worst.verdict == PASS
     if "robustness" in columns:
@@ -178,6 +175,12 @@ def worst_of(cases: list[Judged]) -> Judged:
         columns["validity"] = (columns["validity"] + changes * len(words["validity"])).astype(np.int32)
         words["validity"] = (*words["validity"], *flagged)
     return joined([Judged(columns, words)])
+
+
+def worst_case(cases: list[Judged]) -> np.ndarray:
+    """Return from which of several judgements of the same n rows `worst_of` takes each, shape (n,)."""
+    rank, left = np.stack([_ORDER[case.verdict] for case in cases]), np.stack([reserves(case) for case in cases])
+    return np.where(rank == rank.min(axis=0), left, np.inf).argmin(axis=0)
 
 
 def reserves(judged: Judged) -> np.ndarray:

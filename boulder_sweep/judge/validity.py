@@ -216,28 +216,29 @@ def run_by_run(function: Callable[[np.ndarray], np.ndarray], column: np.ndarray)
     return np.repeat(function(column[starts]), np.diff(starts, append=len(column)), axis=-1)
 
 
-def _bits(designs: Any, limits: Any, *reached: Any) -> np.ndarray:
+def _bits(designs: Any, limits: Any, reached: tuple[Any, Any, Any, Any]) -> np.ndarray:
     """Return the flags of n designs as bits, from what they reach: the first four of `FlagInputs`."""
     table = designs.table
     rocks = table.rho_b if designs.rocks is None else designs.rocks
-    soil = run_by_run(lambda phi: family_bounds(np.degrees(phi)), table.phi)
+    least_beta, most_beta = run_by_run(lambda phi: family_bounds(np.degrees(phi)), table.phi)
     vehicle = (table.m_v, table.v_0, table.k_v, table.c_v)
-    sizes = (table.L, table.W, table.H, table.d, rocks, table.beta)
-    rows = FlagInputs(*reached, *sizes, *soil, *vehicle, np.degrees(table.phi), table.rho_s, designs.given_factors)
+    sizes = (table.L, table.W, table.H, table.d, rocks, table.beta, least_beta, most_beta)
+    soil = (np.degrees(table.phi), table.rho_s, designs.given_factors)
+    rows = FlagInputs(*reached, *sizes, *vehicle, *soil)
     tested = tested_of(limits.calibrated_crush, limits.tested_rotation, odd_layers=limits.odd_layers)
     return plain(flags_of)(rows, tested)
 
 
 def are_studied(designs: Any, limits: Any) -> np.ndarray:
     """Return which of n designs lie where the study of second opinions has drawn, bool, shape (n,)."""
-    return _bits(designs, limits, 0.0, 0.0, 0.0, math.inf) & _UNSTUDIED == 0
+    return _bits(designs, limits, (0.0, 0.0, 0.0, math.inf)) & _UNSTUDIED == 0
 
 
 def flagged(facts: Any) -> tuple[np.ndarray, tuple[str, ...]]:
     """Return the column ``validity`` of n rows: codes, and the words they stand for."""
     outcomes = facts.outcomes
     reached = (outcomes.x_b_max, outcomes.crush_max, outcomes.theta_max, facts.overlap)
-    bits = _bits(facts.designs, facts.limits, *reached)
+    bits = _bits(facts.designs, facts.limits, reached)
     used = np.flatnonzero(np.bincount(bits, minlength=1))
     words = {mask: SEPARATOR.join(flag.name for k, flag in enumerate(FLAGS) if mask >> k & 1) for mask in used.tolist()}
     named = ("", *sorted(set(words.values()) - {""}))
