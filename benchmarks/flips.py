@@ -43,6 +43,9 @@ REACHED = 1e-9
 """As close as this to a limit, a rotation or length is the limit itself: degrees come from radians [deg], [m]."""
 MOST_ROUNDED = 1e-4
 """Fraction of the designs, or one of them, whose verdict rounding may have changed."""
+MOST_UNSETTLED = 1e-3
+"""Fraction of the designs whose rotation may move within its stated error: of some that rock, the last bits of another
+processor settle it."""
 SETTLED_BY = ["verdict", "reason", "robustness", "stands_under"]
 """Columns of words that are frozen; empty where a row has none."""
 TENTH = 10
@@ -187,7 +190,8 @@ def outcomes(cases: Mapping[str, Case], configs: tuple[str, ...], every: int = 1
     ------
     str, DataFrame
         Name; for each design its number ``row``, the words of `SETTLED_BY`, the largest rotation ``max_rotation`` as a
-        whole number of units, null for none, and whether it is ``at_edge``, see `is_at_edge`.
+        whole number of units, null for none, whether it is ``at_edge``, see `is_at_edge`, and the estimated error
+        ``error_deg`` of the rotation, NaN for none, which is not frozen.
     """
     with tempfile.TemporaryDirectory(prefix="sweep-flips-") as name:
         folder = Path(name)
@@ -204,6 +208,7 @@ def outcomes(cases: Mapping[str, Case], configs: tuple[str, ...], every: int = 1
             found["row"] = np.arange(len(frame)) * (every if title in cases else 1)
             found["max_rotation"] = (frame["max_rotation_deg"] / DEGREES_PER_UNIT).round().astype("Int32")
             found["at_edge"] = is_at_edge(frame, sweep)
+            found["error_deg"] = frame["rotation_error_deg"].astype(float)
             yield title, found
 
 
@@ -249,10 +254,11 @@ class Changes:
         Its name.
     designs : int
         How many were compared.
-    verdicts, reasons, grades, unsafe, rotations, rounded : int
+    verdicts, reasons, grades, unsafe, rotations, unsettled, rounded : int
         Designs with another verdict; with the same one for another reason; with another grade of a pass; those of them
         all that pass now and did not, or have a better grade; with a largest rotation that moved by at least
-        `NOTABLE_DEG`. Where a verdict or reason may have changed by rounding alone, it is counted as rounded only.
+        `NOTABLE_DEG` and more than its error, or not more. Where a verdict or reason may have changed by rounding
+        alone, it is counted as rounded only.
     largest_deg : float
         Largest change of a largest rotation [deg].
     flips : DataFrame
@@ -266,6 +272,7 @@ class Changes:
     grades: int
     unsafe: int
     rotations: int
+    unsettled: int
     rounded: int
     largest_deg: float
     flips: pd.DataFrame
@@ -298,6 +305,7 @@ def compared(case: str, record: pd.DataFrame, now: pd.DataFrame) -> Changes:
     )
     change = np.abs(now_deg - was_deg)
     moved = (np.isnan(was_deg) != np.isnan(now_deg)) | (change > NOTABLE_DEG - 0.5 * DEGREES_PER_UNIT)
+    unsettled = moved & (change <= now["error_deg"].to_numpy())
     other = {name: (before[name] != now[name]).to_numpy() for name in SETTLED_BY}
     verdict = other["verdict"]
     reason = ~verdict & other["reason"]
@@ -324,7 +332,8 @@ def compared(case: str, record: pd.DataFrame, now: pd.DataFrame) -> Changes:
         reasons=int((reason & ~rounded).sum()),
         grades=int((grade & ~rounded).sum()),
         unsafe=int(unsafe.sum()),
-        rotations=int(moved.sum()),
+        rotations=int((moved & ~unsettled).sum()),
+        unsettled=int(unsettled.sum()),
         rounded=int(rounded.sum()),
         largest_deg=float(np.nanmax(change, initial=0.0)),
         flips=flips,
@@ -342,13 +351,14 @@ def _words(rows: pd.DataFrame) -> list[str]:
 
 
 def is_held(changes: list[Changes]) -> bool:
-    """Whether the record holds: nothing has changed, but for a few verdicts by rounding."""
+    """Whether the record holds: nothing has changed, but for a few verdicts by rounding and rotations within errors."""
+    designs = sum(each.designs for each in changes)
     changed = sum(each.verdicts + each.reasons + each.grades + each.rotations for each in changes)
-    allowed = max(1.0, MOST_ROUNDED * sum(each.designs for each in changes))
-    return not changed and sum(each.rounded for each in changes) <= allowed
+    rounded, unsettled = (sum(getattr(each, name) for each in changes) for name in ("rounded", "unsettled"))
+    return not changed and rounded <= max(1.0, MOST_ROUNDED * designs) and unsettled <= MOST_UNSETTLED * designs
 
 
-COUNTED = ("designs", "verdicts", "reasons", "grades", "unsafe", "rotations", "rounded")
+COUNTED = ("designs", "verdicts", "reasons", "grades", "unsafe", "rotations", "unsettled", "rounded")
 
 
 def report(changes: list[Changes]) -> str:

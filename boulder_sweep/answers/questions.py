@@ -19,10 +19,10 @@ from boulder_sweep.answers.search import (
     NEVER,
     NOT_MONOTONE,
     UNKNOWN,
-    Predicate,
     Search,
     search,
     searched_again,
+    shorter,
     steady,
 )
 from boulder_sweep.answers.trials import (
@@ -134,11 +134,11 @@ class ValueSearch:
         first, last = self.lattice(low, high)
         trial = self.trial(rows)
         result = search(trial.coarse, first, last, self.cells)
-        result = self._again(trial.coarse, result, every[trial.slides], trial, first, last)
+        result = self._again(result, every[trial.slides], trial, first, last, quick=True)
         wrong = trial.contradicted(result)
         block, judged = trial.judged(every, result.shown)
         if len(wrong):
-            result = self._again(trial.final, result, wrong, trial, first, last)
+            result = self._again(result, wrong, trial, first, last, quick=False)
             judged = with_rows(judged, wrong, trial.judged(wrong, result.shown[wrong])[1])
             block = trial.block(every, result.shown)
         chances = trial.chances(result.shown)
@@ -162,12 +162,22 @@ class ValueSearch:
         return judged.verdict == UNDECIDED
 
     def _again(
-        self, predicate: Predicate, result: Search, rows: np.ndarray, trial: Trial, first: np.ndarray, last: np.ndarray
+        self, result: Search, rows: np.ndarray, trial: Trial, first: np.ndarray, last: np.ndarray, *, quick: bool
     ) -> Search:
-        """Search some rows again, those whose boulders slide by smaller steps."""
-        for some, cells in ((rows[~trial.slides[rows]], self.cells), (rows[trial.slides[rows]], FINE_CELLS)):
-            result = searched_again(predicate, result, some, first, last, cells)
-        return steady(result) if self.key.is_steady else result
+        """Search some rows again, those whose boulders slide by smaller steps, too, each value before its own truck.
+
+        Slower trucks have been, or are, tried at the wide steps: what they change is not as narrow.
+        """
+        if not quick:
+            result = searched_again(trial.final, result, rows, first, last, self.cells)
+        if not self.key.is_steady:
+            return result
+        some = rows[trial.slides[rows]]
+
+        def alone(index: np.ndarray, positions: np.ndarray) -> np.ndarray:
+            return trial.alone(index, positions, quick=quick)
+
+        return shorter(steady(result), steady(searched_again(alone, result, some, first, last, FINE_CELLS)), last)
 
     def _kinds(
         self, rows: InputRows, result: Search, judged: Judged, chances: Sampled | None, end: np.ndarray
@@ -243,6 +253,7 @@ class Trial:
         self.slides = np.zeros(len(next(iter(rows.values()))), dtype=bool)
         """Rows of which some value that passes makes a shallow boulder slide, shape (n,)."""
         self._final = Remembered(judges.final)
+        self._alone = [replace(each, against_slower=False) for each in (judges.final, judges.coarse)]
 
     def coarse(self, index: np.ndarray, positions: np.ndarray) -> np.ndarray:
         """Predicate of the search, without an error estimate."""
@@ -251,6 +262,12 @@ class Trial:
     def final(self, index: np.ndarray, positions: np.ndarray) -> np.ndarray:
         """Predicate of the search, with the accuracy of the sweep."""
         return self._codes(index, positions, quick=False)
+
+    def alone(self, index: np.ndarray, positions: np.ndarray, *, quick: bool) -> np.ndarray:
+        """Predicate of the search, each design before its own truck alone."""
+        block = self.block(index, positions)
+        self.simulated += len(index)
+        return self.codes(block, self._alone[quick](block))
 
     def judged(self, index: np.ndarray, positions: np.ndarray, *, quick: bool = False) -> tuple[DesignBlock, Judged]:
         """Return the designs with these values, and their verdicts."""

@@ -58,6 +58,10 @@ class Search:
     changes: dict[int, list[tuple[int, int, bool]]]
 
 
+PER_ROW = ("kind", "fails", "holds", "has_fails", "has_holds", "shown", "holds_last")
+"""Attributes of a `Search` that have a value for each row."""
+
+
 def search(predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int = CELLS) -> Search:
     """Search n rows.
 
@@ -131,6 +135,22 @@ def steady(result: Search) -> Search:
     return replace(result, fails=fails, holds=holds, has_fails=has_fails, has_holds=has_holds, shown=shown)
 
 
+def shorter(one: Search, other: Search, last: np.ndarray) -> Search:
+    """Return, of two searches made `steady`, for each row the one that holds over less of its range.
+
+    Parameters
+    ----------
+    one, other
+        Searches of the same n rows; where both hold over as much, `one` counts.
+    last : ndarray of int64, shape (n,)
+        End of the range of every row, in search order.
+    """
+    left = [np.where(each.has_holds, np.abs(last - each.holds), -1) for each in (one, other)]
+    rows = np.flatnonzero(left[1] < left[0])
+    changes = {k: other.changes[row] for k, row in enumerate(rows.tolist()) if row in other.changes}
+    return _replace_rows(one, rows, Search(**{name: getattr(other, name)[rows] for name in PER_ROW}, changes=changes))
+
+
 def contradicted(predicate: Predicate, result: Search) -> np.ndarray:
     """Return the rows of a search of which another predicate does not confirm both ends of the bracket, shape (m,)."""
     failing, holding = np.flatnonzero(result.has_fails), np.flatnonzero(result.has_holds)
@@ -152,7 +172,7 @@ def searched_again(
 def _replace_rows(result: Search, rows: np.ndarray, part: Search) -> Search:
     """Return a search with some of its rows replaced by those of another."""
     arrays = {}
-    for name in ("kind", "fails", "holds", "has_fails", "has_holds", "shown", "holds_last"):
+    for name in PER_ROW:
         arrays[name] = getattr(result, name).copy()
         arrays[name][rows] = getattr(part, name)
     again = set(rows.tolist())

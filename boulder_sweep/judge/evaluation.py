@@ -77,6 +77,8 @@ class Evaluation:
         Laws of the soil's resistance under which every pass is simulated again, see `boulder_sweep.judge.robustness`.
     askable
         Whether second opinions know such designs.
+    against_slower
+        Whether shallow boulders that slide are judged against slower trucks, too; not where the caller does so.
     """
 
     readings: Readings
@@ -89,6 +91,7 @@ class Evaluation:
     least_margin: float = 0.0
     second_opinion: tuple[str, ...] = ()
     askable: bool = False
+    against_slower: bool = True
 
     def __call__(self, block: DesignBlock) -> Judged:
         """Simulate and judge a block.
@@ -151,7 +154,8 @@ class Evaluation:
         reduced by it. Those that do not pass so, too, keep their verdict and get a margin just below the one asked for.
         Second opinions are asked with the reduced limit.
         """
-        judged = joined([self._holding_slower(self._decided(designs), designs)])
+        decided = self._decided(designs)
+        judged = joined([self._holding_slower(decided, designs) if self.against_slower else decided.judged])
         if self.least_margin > 0.0:
             judged = self._margins_proved(judged, designs)
         if not self.second_opinion or (self.only and "robustness" not in self.only):

@@ -25,11 +25,11 @@ def turned(row, by_deg):
     return (*row[:4], row[4] + by_deg)
 
 
-def rows(*given, at_edge=False):
+def rows(*given, at_edge=False, error_deg=1e-6):
     frame = pd.DataFrame([row[:4] for row in given], columns=flips.SETTLED_BY)
     units = [None if row[4] is None else round(row[4] / flips.DEGREES_PER_UNIT) for row in given]
     frame["max_rotation"] = pd.array(units, dtype="Int32")
-    return frame.assign(row=np.arange(len(frame)), at_edge=at_edge)
+    return frame.assign(row=np.arange(len(frame)), at_edge=at_edge, error_deg=error_deg)
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,7 @@ def rows(*given, at_edge=False):
 )
 def test_a_change_is_counted_for_what_it_is(before, now, at_edge, counts):
     changes = compared("one", rows(UNASKED, before, at_edge=at_edge), rows(UNASKED, now))
-    none = dict.fromkeys(("verdicts", "reasons", "grades", "unsafe", "rotations", "rounded"), 0)
+    none = dict.fromkeys(("verdicts", "reasons", "grades", "unsafe", "rotations", "unsettled", "rounded"), 0)
     assert {name: getattr(changes, name) for name in none} == none | counts
     assert is_held([changes]) is not bool(counts.keys() - {"rounded"})
     assert list(changes.flips["row"]) == ([1] if counts.keys() - {"rotations"} else [])
@@ -74,6 +74,18 @@ def test_rounding_excuses_one_design_or_one_in_ten_thousand():
     assert not is_held([rounded(1, 5), rounded(1, 5)])
     assert is_held([rounded(2, 20_000)])
     assert not is_held([rounded(3, 20_000)])
+
+
+def test_a_rotation_may_move_within_its_error_in_one_design_of_a_thousand():
+    def moved(by_deg, error_deg, of):
+        now = rows(turned(STANDS, by_deg), *[STANDS] * (of - 1), error_deg=error_deg)
+        return compared("", rows(*[STANDS] * of), now)
+
+    assert (moved(0.05, 0.06, 1000).rotations, moved(0.05, 0.06, 1000).unsettled) == (0, 1)
+    assert is_held([moved(0.05, 0.06, 1000)])
+    assert not is_held([moved(0.05, 0.06, 999)])
+    assert not is_held([moved(0.05, 0.04, 1000)])
+    assert not is_held([moved(0.05, np.nan, 1000)])
 
 
 def test_some_rows_are_compared_with_theirs():
