@@ -152,6 +152,16 @@ def wall_figures(wall: RigidWall) -> dict[str, float]:
 def _row(trajectory: Trajectory) -> dict[str, Any]:
     """Figures of one test under one preset; NaN where there is none."""
     row = {key: math.nan if value is None else value for key, value in trajectory.summary().items()}
+    if trajectory.row["time_to_limit_s"] is not None:  # the paper follows the boulder beyond its limit
+        beyond = trajectory.motion.outcome.maxima
+        row |= {
+            "max_rotation_deg": math.degrees(beyond.theta),
+            "time_of_max_rotation_s": beyond.t_theta,
+            "max_displacement_m": beyond.x_b,
+            "max_vehicle_displacement_m": beyond.x_v,
+            "time_of_max_vehicle_displacement_s": beyond.t_x_v,
+            "peak_force_kN": beyond.F_v / 1e3,
+        }
     row["max_boulder_centre_displacement_m"] = float(trajectory.boulder_centre_displacement_m.max())
     row["vehicle_still_moving"] = bool(
         trajectory.vehicle_velocity_m_s[-1] > 0.0

@@ -71,7 +71,7 @@ def test_figures_by_hand() -> None:
 def test_whole_impacts_are_those_of_the_oracle(law: str, preset: str) -> None:
     found = simulate(by(law, crash_test("rwg")), readings=preset)
     readings = oracle.CORRECTED if preset == "corrected" else oracle.AS_PRINTED
-    known = oracle.simulate(replace(oracle.RWG, resistance=law), readings, horizon=0.5)
+    known = oracle.simulate(replace(oracle.RWG, resistance=law), readings, horizon=float(found.time_s[-1]))
     maxima = found.motion.outcome.maxima
     assert maxima.theta == pytest.approx(known.max_rotation.value, abs=math.radians(1e-4))
     assert maxima.x_b == pytest.approx(known.max_displacement.value, abs=1e-6)

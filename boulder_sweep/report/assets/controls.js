@@ -221,13 +221,13 @@ class Axes {
 class Player {
   /**
    * @param {string} panel
-   * @param {Float64Array} times of the samples [s]
    * @param {() => void} moved what to do when the slider has moved
    */
-  constructor(panel, times, moved) {
+  constructor(panel, moved) {
     this.slider = byId(`${panel}-time`);
     this.button = byId(`${panel}-play`);
-    this.times = times;
+    /** @type {Float64Array} of the samples [s] */
+    this.times = new Float64Array(0);
     this.moved = moved;
     /** The frame that the browser was asked for; 0 at rest. */
     this.frame = 0;
@@ -245,13 +245,14 @@ class Player {
 
   /**
    * Take another motion.
-   * @param {number} last its last sample
+   * @param {Float64Array} times of its samples [s]
    * @param {number} sample shown first
    */
-  load(last, sample) {
+  load(times, sample) {
     this.pause();
     this.left = false;
-    this.slider.max = last;
+    this.times = times;
+    this.slider.max = Math.max(times.length - 1, 0);
     this.slider.value = sample;
   }
 

@@ -42,7 +42,7 @@ class Page {
     const panels = ["live", ...data.chosen.map((/** @type {any} */ _, /** @type {number} */ k) => `chosen${k}`)];
     /** @type {Record<string, Player>} */
     this.players = Object.fromEntries(
-      panels.map((panel) => [panel, new Player(panel, this.simulator.times, () => this.showScene(panel))]),
+      panels.map((panel) => [panel, new Player(panel, () => this.showScene(panel))]),
     );
     /** @param {string} panel */
     const map = (panel) => new VerdictMap(panel, plots, this.units, data.colours);
@@ -84,7 +84,7 @@ class Page {
     byId(`${panel}-flags`).replaceChildren(...flags.map((name) => element("li", this.data.rules.flags[name])));
     this.plots.draw(panel, motion, this.units, this.data.rules.rotation);
     this.motions[panel] = { scene: this.scene(inputs), motion };
-    this.players[panel].load(Math.max(motion.time.length - 1, 0), this.telling(motion));
+    this.players[panel].load(motion.time, this.telling(motion));
     this.showScene(panel);
   }
 

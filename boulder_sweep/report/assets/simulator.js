@@ -65,15 +65,14 @@ function facesOf(outline, blow) {
   };
 }
 
+/** Samples of a time history over the horizon. */
 const SAMPLES = 400;
+/** A boulder that overturns is shown for this share of the horizon beyond its limit, as by `sweep simulate`. */
+const SEEN_AFTER = 0.5;
 /** A crush that no vehicle reaches [m]. */
 const NEVER = 1e300;
 /** Before the end of the simulation by so little that rounding cannot put the last sample behind it. */
 const BEFORE_THE_END = 1 - 1e-14;
-/** Columns that `sweep simulate`, which goes on beyond the limit, takes from a row of `sweep run`, which stops there. */
-const DECIDED = ["verdict", "reason", "margin", "rating", "time_to_limit_s", "overlap_m", "validity", "step_s"];
-/** Those of the maxima, which are the same unless the boulder overturns. */
-const ERRORS = ["rotation_error_deg", "displacement_error_m"];
 
 /**
  * Volume of a boulder over that of the box of its sides: `boulder_sweep.designs.solidity_of`.
@@ -102,8 +101,7 @@ class Simulator {
   constructor(data, kernel) {
     this.data = data;
     this.kernel = kernel;
-    const horizon = data.controls[0][this.at("horizon")];
-    this.times = Float64Array.from({ length: SAMPLES + 1 }, (_, k) => ((horizon * k) / SAMPLES) * BEFORE_THE_END);
+    this.horizon = data.controls[0][this.at("horizon")];
   }
 
   /** @param {string} setting of the kernel @returns {number} its place among them */
@@ -179,21 +177,20 @@ class Simulator {
   }
 
   /**
-   * Simulate and judge one design as `sweep simulate` does, beyond the limit.
+   * Judge one design as `sweep run` does, and simulate it beyond the limit as `sweep simulate` does.
    * @param {Record<string, number>} design
    * @returns {{judged: Judged, motion: Motion, inputs: Record<string, number>}}
    */
   whole(design) {
     const { inputs, refusal } = this.completed(design);
-    const [{ decided_by, ...decided }] = this.rows([design]);
-    const beyond = this.beyond(decided_by ?? 0, decided.step_s);
-    const [{ decided_by: _, ...whole }] = this.judged([design], [beyond]);
-    const names = decided.reason === "overturns" ? DECIDED : [...DECIDED, ...ERRORS];
-    for (const name of names) whole[name] = decided[name];
-    // A few designs that are decided at the limit are refused beyond it.
-    const judged = whole.end_time_s === null ? decided : whole;
-    const times = refusal === "" ? this.times : new Float64Array(0);
-    return { judged, motion: this.kernel.history(this.kernelDesign(inputs), beyond, times), inputs };
+    const [{ decided_by, ...judged }] = this.rows([design]);
+    const [settings, end] = [this.beyond(decided_by ?? 0, judged.step_s), judged.end_time_s ?? 0];
+    const drawn = Math.max(this.horizon, judged.time_to_limit_s === null ? end : end + SEEN_AFTER * this.horizon);
+    settings[this.at("horizon")] = drawn;
+    const last = Math.max(Math.round((SAMPLES * drawn) / this.horizon), 1);
+    const at = (/** @type {unknown} */ _, /** @type {number} */ k) => ((drawn * k) / last) * BEFORE_THE_END;
+    const times = Float64Array.from({ length: refusal === "" ? last + 1 : 0 }, at);
+    return { judged, motion: this.kernel.history(this.kernelDesign(inputs), settings, times), inputs };
   }
 
   /**
