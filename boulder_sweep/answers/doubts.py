@@ -215,7 +215,7 @@ def doubts(sweep: Sweep, *, design: int = 0, seed: int = 0, jobs: int | None = N
     margins = np.empty((2 ** len(SWITCHES), 2, DRAWN))
     for reading, variant in enumerate(every_reading(sweep)):
         for law, resistance in enumerate(COMPARED):
-            judges = judges_of(replace(variant, model=replace(variant.model, resistance=resistance)), compared=True)
+            judges = judges_of(replace(variant, model=replace(variant.model, resistance=resistance)))
             margins[reading, law] = Draws(rows, spread, judges, Pool(jobs)).distance(index, z)
     return [*parted(margins), Doubt(NUMERICAL, *(2 * [_numerical(sweep, spread, rows, z, judges_of(sweep), margins)]))]
 

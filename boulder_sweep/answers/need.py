@@ -226,7 +226,7 @@ def need(
         raise QuestionError("--open-readings needs --probability")
     variants: tuple[Judges, ...] = ()
     if open_readings:
-        variants = tuple(judges_of(one, least_margin, compared=True) for one in every_reading(sweep))
+        variants = tuple(judges_of(one, least_margin) for one in every_reading(sweep))
     if robust and not can_be_asked(sweep):
         raise QuestionError(
             "--robust: second opinions know boxes of rock of given density, elastic, dry, level, uniform soil without "
@@ -237,7 +237,7 @@ def need(
             "--robust and --probability cannot be used together: second opinions are not asked of the designs drawn"
         )
     sweeps = [sweep, other_readings(sweep)] if both_readings and not open_readings and not robust else [sweep]
-    judges = [judges_of(one, least_margin, compared=drawn and one is not sweep, robust=robust) for one in sweeps]
+    judges = [judges_of(one, least_margin, robust=robust) for one in sweeps]
     pairs = zip(sweeps, judges, strict=True)
     asked = [_question(one, key, between, judge, probability, seed, variants) for one, judge in pairs]
     asked[0].judges.final.warm_up()

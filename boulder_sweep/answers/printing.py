@@ -119,7 +119,9 @@ def foot_lines(model: Model, reasons: Iterable[str | None] = (), units: str = "s
     if model.rock_assumed:
         words.append(f"rock: {quantity_text('kg/m^3', units, ROCK_KG_M3)} assumed (boulder.density); no pass is robust")
     occurring = set(reasons)
-    words += [f"undecided ({reason}): {advice}" for reason, advice in WAY_OUT.items() if reason in occurring]
+    for reason, advice in WAY_OUT.items():
+        if reason in occurring:
+            words.append(f"{'fail' if reason == 'slower_truck' else 'undecided'} ({reason}): {advice}")
     return wrapped(words)
 
 

@@ -166,10 +166,11 @@ class ValueSearch:
     ) -> Search:
         """Search some rows again, those whose boulders slide by smaller steps, too, each value before its own truck.
 
-        Slower trucks have been, or are, tried at the wide steps: what they change is not as narrow.
+        Slower trucks are tried at the wide steps of the range, and of what is left of it: they take long.
         """
+        whole = trial.coarse if quick else trial.final
         if not quick:
-            result = searched_again(trial.final, result, rows, first, last, self.cells)
+            result = searched_again(whole, result, rows, first, last, self.cells)
         if not self.key.is_steady:
             return result
         some = rows[trial.slides[rows]]
@@ -177,7 +178,9 @@ class ValueSearch:
         def alone(index: np.ndarray, positions: np.ndarray) -> np.ndarray:
             return trial.alone(index, positions, quick=quick)
 
-        return shorter(steady(result), steady(searched_again(alone, result, some, first, last, FINE_CELLS)), last)
+        result = shorter(steady(result), steady(searched_again(alone, result, some, first, last, FINE_CELLS)), last)
+        some = some[result.has_holds[some]]
+        return shorter(result, steady(searched_again(whole, result, some, result.holds, last, self.cells)), last)
 
     def _kinds(
         self, rows: InputRows, result: Search, judged: Judged, chances: Sampled | None, end: np.ndarray

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_kernels._jit import plain
-from boulder_kernels.settling import proof_is_possible
 from boulder_sweep.designs import REASONS, DesignBlock, Label, block_of, input_of, some
 from boulder_sweep.judge.accuracy import Accuracy, accuracy_of, steps_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
@@ -155,7 +153,7 @@ class Remembered:
         return joined([self._judged[0].rows(np.array(indices, dtype=np.int64))])
 
 
-def judges_of(sweep: Sweep, least_margin: float = 0.0, *, compared: bool = False, robust: bool = False) -> Judges:
+def judges_of(sweep: Sweep, least_margin: float = 0.0, *, robust: bool = False) -> Judges:
     """Return the evaluations of a sweep.
 
     Parameters
@@ -164,9 +162,6 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0, *, compared: bool = False
         The sweep.
     least_margin
         As of `Judges`.
-    compared
-        Whether thousands of designs are drawn of a sweep that another one is only compared with. Where no proof is
-        possible a design then passes that stands to the horizon: to go on costs fifteen times as much and more.
     robust
         As of `Judges`.
     """
@@ -177,10 +172,6 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0, *, compared: bool = False
     # A late row is found by the quick solution, too, and confirmed by the other.
     control = coarse.control._replace(longest_horizon=final.control.longest_horizon)
     coarse = dataclasses.replace(coarse, only=SEARCHED, least_margin=least_margin, limits=searched, control=control)
-    if compared and not plain(proof_is_possible)(final.readings):
-        final, coarse = (
-            dataclasses.replace(each, control=each.control._replace(longest_horizon=0.0)) for each in (final, coarse)
-        )
     if robust:
         final, coarse = final.asked(), dataclasses.replace(coarse.asked(), only=(*SEARCHED, *GRADED))
     else:  # asked of the answers alone

@@ -94,7 +94,7 @@ def foot_lines(boulder: Mapping[str, Any], reasons: Mapping[str, int]) -> list[s
     if boulder.get("rock_assumed"):
         lines.append(f"rock   {ROCK_KG_M3:g} kg/m^3 assumed (boulder.density); no pass is robust")
     for reason, advice in WAY_OUT.items():
-        if f"undecided/{reason}" in reasons:
+        if f"undecided/{reason}" in reasons or f"fail/{reason}" in reasons:
             lines += _indent(f"{reason}: {advice}", "       ")
     return lines
 

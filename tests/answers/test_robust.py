@@ -22,7 +22,7 @@ from tests.answers.designs import site
 
 
 def test_the_least_robust_depth_is_robust_and_the_next_one_is_not() -> None:
-    sweep = site(height="[3, 3.4] m")
+    sweep = site(height="[2.8, 3] m", width="2.4 m")
     found = need(sweep, robust=True)
     evaluation = evaluation_of(sweep, accuracy_of(sweep)).asked()
     rows = [row for row in found.arrow.to_pylist() if row["passes_at"] is not None]

@@ -54,7 +54,7 @@ def between_the_peaks_of_the_first_two_solutions() -> boulder_sweep.Sweep:
     )
 
 
-def test_error_is_infinite_where_only_one_solution_reaches_the_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_error_is_unknown_where_only_one_solution_reaches_the_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither says by how much it is wrong, and where no finer steps are left nothing is decided."""
     for module in (evaluation, simulation):
         monkeypatch.setattr(module, "finer_controls", lambda control: iter(()))
@@ -62,8 +62,8 @@ def test_error_is_infinite_where_only_one_solution_reaches_the_limit(monkeypatch
     row = evaluation_of(between, accuracy_of(between))(between.block(0, 1))
     found = simulate(between)
     assert found.verdict == VERDICTS[row.verdict[0]] == "undecided"
-    assert np.isinf(row["displacement_error_m"][0])
-    assert np.isinf(found.judged["displacement_error_m"][0])
+    assert np.isnan(row["displacement_error_m"][0])
+    assert found.row["displacement_error_m"] is None
     assert row["step_s"][0] == 0.002
 
 

@@ -14,19 +14,29 @@ import boulder_sweep
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.firmness import CHANGES, firmness_of
-from boulder_sweep.judge.judged import PASS
+from boulder_sweep.judge.judged import FAIL, PASS
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.settings.model import ReadingChoice
 from boulder_sweep.store.manifest import load as load_manifest
 from tests.runner.grids import grid
 
 
-def passes(sweep: boulder_sweep.Sweep) -> np.ndarray:
-    """Which designs of a small sweep pass, by the fast steps."""
+def verdicts(sweep: boulder_sweep.Sweep) -> np.ndarray:
+    """Verdicts of a small sweep, by the fast steps."""
     fast = replace(sweep, solver=replace(sweep.solver, accuracy="fast", step_s=None))
     evaluation = evaluation_of(fast, accuracy_of(fast))
     control = evaluation.control._replace(longest_horizon=0.0)
-    return replace(evaluation, control=control)(fast.block(0, fast.n_designs)).verdict == PASS
+    return replace(evaluation, control=control)(fast.block(0, fast.n_designs)).verdict
+
+
+def passes(sweep: boulder_sweep.Sweep) -> np.ndarray:
+    """Which designs of a small sweep pass."""
+    return verdicts(sweep) == PASS
+
+
+def fails(sweep: boulder_sweep.Sweep) -> np.ndarray:
+    """Which designs of a small sweep fail."""
+    return verdicts(sweep) == FAIL
 
 
 def test_shares_are_those_of_the_changed_sweeps() -> None:
@@ -35,10 +45,10 @@ def test_shares_are_those_of_the_changed_sweeps() -> None:
     assert found.designs == sweep.n_designs  # all of them: the sample is the grid
     own = passes(sweep)
     printed = replace(sweep, model=replace(sweep.model, readings=ReadingChoice.of_preset("as_printed")))
-    assert found.lost["reading"] == pytest.approx(np.mean(~passes(printed)[own]))
+    assert found.lost["reading"] == pytest.approx(np.mean(fails(printed)[own]))
     speed = sweep.constants["impact_speed_m_s"] * 1.05
     faster = replace(sweep, constants=sweep.constants | {"impact_speed_m_s": speed})
-    assert found.lost["speed"] == pytest.approx(np.mean(~passes(faster)[own]))
+    assert found.lost["speed"] == pytest.approx(np.mean(fails(faster)[own]))
     assert found.passes == own.sum()
     assert set(found.lost) == set(CHANGES) - {"kp_squared"}
     assert all(0.0 < found.lost[name] <= 1.0 for name in ("reading", "speed", "broms", "width_capped"))
@@ -62,7 +72,7 @@ def test_stones_are_sampled_with_their_shape() -> None:
     found, own = firmness_of(stone), passes(stone)
     assert found.passes == own.sum() < passes(box).sum()
     by_broms = replace(stone, model=replace(stone.model, resistance="broms"))
-    assert found.lost["broms"] == pytest.approx(np.mean(~passes(by_broms)[own]))
+    assert found.lost["broms"] == pytest.approx(np.mean(fails(by_broms)[own]))
 
 
 def test_soil_that_stays_pressed_is_sampled_as_elastic() -> None:

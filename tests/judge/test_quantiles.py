@@ -229,10 +229,10 @@ def test_the_python_functions_take_the_unfavourable_values(tmp_path: Path) -> No
 
 @pytest.mark.parametrize(
     "site",
-    ["{embedment_depth: {from: 0.7 m, to: 1.5 m, count: 5}}", "{embedment_ratio: {mean: [0.35, 0.5], sd: 0.02}}"],
+    ["{embedment_depth: {from: 0.7 m, to: 1.5 m, count: 5}}", "{embedment_ratio: {mean: [0.35, 0.7], sd: 0.02}}"],
 )
 def test_a_row_of_a_table_is_judged_again_in_all_its_cases(site: str, tmp_path: Path) -> None:
     text = WIDE.replace("{embedment_depth: 0.84 m}", site)
-    assert len({row["verdict"] for row in rows(text, tmp_path)}) == 2
+    assert len({row["verdict"] for row in rows(text, tmp_path)}) >= 2
     for number in range(load(tmp_path / "site.yaml").n_designs):
         assert explain(tmp_path / "table", number).unequal == ()

@@ -50,7 +50,7 @@ def test_all_of_a_report_in_us_units_is_in_them_and_says_what_uncertain_inputs_w
         "boulder_length_ft: 5.413",
     ):
         assert said in text
-    assert "Each uncertain input is taken at one value: φ′ = 40° (mean)." in text
+    assert "Uncertain inputs are taken at φ′ = 40° (mean)." in text
 
 
 @pytest.mark.nightly

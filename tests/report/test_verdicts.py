@@ -76,10 +76,11 @@ def test_rows_that_go_on_past_the_horizon_are_confirmed_alike(tmp_path, opened):
     table, judged, _ = judged_by_both(tmp_path, (), opened)
     assert_alike(judged, table)
     late = table.end_time_s > 1.0
-    assert (late & (table.verdict == "pass")).sum() >= 150
-    assert (late & (table.reason == "overturns")).sum() >= 10
-    assert (late & (table.step_s < 0.004)).sum() >= 5, "some are decided by finer steps"
-    assert judged.step_s[late].tolist() == table.step_s[late].tolist()
+    for verdict, reason, least in (("pass", "", 15), ("undecided", "validity", 150), ("fail", "overturns", 10)):
+        assert (late & (table.verdict == verdict) & (table.reason == reason)).sum() >= least
+    assert (late & (table.step_s < 0.004)).sum() >= 3, "some are decided by finer steps"
+    # Rocking amplifies last bits: of a few, one of two solutions that hardly differ confirms the other by one alone.
+    assert (judged.step_s[late] != table.step_s[late]).sum() <= 0.005 * late.sum()
 
 
 def test_what_needs_the_last_resort_has_it_in_the_page_too(tmp_path, opened):

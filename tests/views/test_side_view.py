@@ -135,7 +135,7 @@ def test_page_holds_everything_itself(short: Trajectory, tmp_path: Path) -> None
     assert not re.search(r"(src|href)\s*=|https?://|@import|fetch\(", text)
     data = json.loads(re.search(r"const data = (.*);\n", text)[1].replace("<\\/", "</"))
     assert len(data["frames"]) == len(data["captions"]) == 4
-    assert data["title"].startswith("rwg: PASS, ")
+    assert data["title"].startswith("rwg: UNDECIDED, ")
     used = {shape["s"] for frame in data["frames"] for shape in frame} | {shape["s"] for shape in data["ground"]}
     assert used <= set(data["styles"])
 
