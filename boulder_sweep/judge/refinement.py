@@ -20,6 +20,7 @@ import numpy as np
 
 from boulder_kernels import Control
 from boulder_kernels._jit import plain
+from boulder_kernels.control import EVENT_TOLERANCE
 from boulder_kernels.rules import (
     AGREEING,
     FIRST_FACTOR,
@@ -42,9 +43,6 @@ LAST_RESORT_STEPS = 2_000
 """Steps to the horizon of the last attempt, where nothing asks for shorter ones."""
 MOST_STEPS = 20_000
 """It ends with at least so many steps to the horizon, with the soil in closed form; fewer with many soil elements."""
-EVENT_TOLERANCE = 1e-5
-"""Finer solutions locate events to this fraction of a step. Boulders that rock amplify what the time of the first kink
-was off by, whatever the step: located as in other solutions, late ones need steps 10 times as short to agree."""
 
 
 def finer_controls(control: Control) -> Iterator[Control]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from boulder_kernels import Control, Design, DesignTable, OutcomeTable, Readings, SecondSpring
 from boulder_kernels._jit import function_of, inlined
+from boulder_kernels.control import EVENT_TOLERANCE
 from boulder_kernels.ground import Ground
 from boulder_kernels.layered import SoilElements, SoilLayers, SoilSums
 from boulder_kernels.outlined import OutlinedElements, OutlinedPieces
@@ -96,7 +97,7 @@ first_control = changing_control(
     paired="False",
 )
 """Control of a solution, with its step or a third of it."""
-halved_control = changing_control("c", h="0.5 * c.h", locate_yield="True")
+halved_control = changing_control("c", h="0.5 * c.h", locate_yield="True", event_tolerance=repr(EVENT_TOLERANCE))
 """Control of a second solution, `boulder_kernels.table.halved`."""
 
 

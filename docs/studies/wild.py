@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Status, corrected, simulate_table
+from boulder_kernels.control import EVENT_TOLERANCE
 from boulder_kernels.table import finer_step, some_rows
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.designs import impact_height_of_face
 from boulder_sweep.judge.accuracy import LONGEST_HORIZON, STEPS, Steps, accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.inputs import Designs
-from boulder_sweep.judge.refinement import EVENT_TOLERANCE
 from boulder_sweep.settings import load
 from docs.studies.coverage import (
     HORIZON_S,

@@ -78,6 +78,10 @@ class Control(NamedTuple):
     """Whether designs that may go through lanes side by side do, or one after another. The two round differently."""
 
 
+EVENT_TOLERANCE = 1e-5
+"""Second and finer solutions locate events to this fraction of a step. Boulders that rock, or are barely lifted,
+amplify what the time of the first kink was off by, whatever the step: located as in first solutions, late ones need
+steps 10 times as short to agree."""
 STABLE_OSCILLATION = 1.5
 """Largest step times angular frequency. On the imaginary axis the method amplifies by 0.3 % a step there (its limit
 for none is 1.0), which the damping of the soil and the length of an impact more than cover."""

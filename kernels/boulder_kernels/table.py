@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ._jit import array_kernel, kernel, plain, unless_none
-from .control import STEP_RATIO, Control
+from .control import EVENT_TOLERANCE, STEP_RATIO, Control
 from .design import DesignTable, Readings, design_at, design_in
 from .dynamics import State
 from .error_estimates import (
@@ -319,8 +319,8 @@ def is_paired(readings: Readings, control: Control, *, layered: bool) -> bool:
 
 
 def halved(control: Control) -> Control:
-    """Return how a doubtful design is simulated a second time: by half the step, and steps that end at yield."""
-    return control._replace(h=0.5 * control.h, locate_yield=True)
+    """Return how a doubtful design is simulated a second time: by half the step, and steps that end close to events."""
+    return control._replace(h=0.5 * control.h, locate_yield=True, event_tolerance=EVENT_TOLERANCE)
 
 
 def some_rows(table: Any, rows: np.ndarray) -> Any:

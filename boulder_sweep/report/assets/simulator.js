@@ -208,6 +208,7 @@ class Simulator {
     if (step_s === exact(this.data.steps_s[number] / 2)) {
       settings[h] /= 2;
       settings[this.at("locate_yield")] = 1;
+      settings[this.at("event_tolerance")] = this.data.controls.at(-1)[this.at("event_tolerance")];  // of all but the first
     }
     return settings;
   }
