@@ -24,7 +24,7 @@ from boulder_sweep.crash_tests.rigid_wall import RigidWall
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import FitError
 from boulder_sweep.settings.fields import BY_NAME
-from boulder_sweep.settings.values import range_words
+from boulder_sweep.settings.values import is_unusual, range_words
 
 if TYPE_CHECKING:
     from scipy.optimize import OptimizeResult
@@ -38,8 +38,6 @@ NOT_NEAR = 0.25
 """The same misfit from which on the fit is refused."""
 UNSURE = 0.5
 """Error of a constant as a share of it from which on the user is warned; from 1 on it is refused."""
-FAR = 30.0
-"""Factor beyond the usual range from which on a result is refused."""
 MOST_CRUSH_M = 10.0
 """Crush of a front that is longer than any vehicle's."""
 GAUGE_SHARE = 0.01
@@ -394,8 +392,7 @@ def _far_out(name: str, value: float) -> str:
     usual, admitted = field.usual, field.admitted
     assert usual is not None
     assert admitted is not None
-    low, high = max(admitted.low, usual.low / FAR), min(admitted.high, usual.high * FAR)
-    if low <= value <= high:
+    if admitted.low <= value <= admitted.high and not is_unusual(np.array([value]), field)[0]:
         return ""
     unit = {"N/m": "kN/m", "N*s/m": "kN*s/m"}.get(field.unit, field.unit)
     ends = range_words(usual.low, usual.high, field.unit, unit)
