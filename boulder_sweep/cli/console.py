@@ -84,7 +84,8 @@ def robustness_lines(reasons: Mapping[str, int]) -> list[str]:
         return []
     lines = [f"pass   is {NOT_A_RATING}", *_indent(f"robust: {IN_WORDS}", "       ")]
     if "pass/open" in reasons:
-        lines.append("       open: not asked; --second-opinion asks")
+        words = "open: not asked (--second-opinion asks), or outside the ranges of their study (docs/forms.md)"
+        lines += _indent(words, "       ")
     return lines
 
 

@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
 
 ROBUST, SENSITIVE, OPEN = range(len(GRADES))
+STANDS_UNDER_ALL = (1 << len(SECOND_OPINIONS)) - 1
+"""Code of the column ``stands_under`` of a pass that stands under every second opinion."""
 IN_WORDS = (
     "stands with friction and vertical motion under three laws; not tested: soil on one side only, rounded stones"
 )
