@@ -14,6 +14,7 @@ import struct
 from array import array
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from operator import index
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,7 @@ HARMLESS = re.compile(
     r"KHR_(materials_\w+|texture_\w+|lights_punctual|mesh_quantization|xmp\w*|node_visibility)"
     r"|EXT_(texture_\w+|lights_\w+|mesh_features|structural_metadata)|FB_ngon_encoding|MSFT_texture_dds"
 )
-"""Extensions of glTF that move no point of a mesh: how it looks, what it is called, and whole numbers as coordinates."""
+"""Extensions of glTF that move no point of a mesh: looks, names, and coordinates as whole numbers."""
 MOVING = {
     "KHR_draco_mesh_compression",
     "KHR_meshopt_compression",
@@ -120,24 +121,35 @@ def _polygons(corners: np.ndarray, counts: np.ndarray) -> np.ndarray:
     return _fans(corners.astype(np.int64), counts)
 
 
-def _rows(text: bytes, first: int = 1) -> Iterator[tuple[int, list[bytes]]]:
-    """Yield the number and the words of every line that has words.
+def _rows(text: bytes, start: int = 0, first: int = 1) -> Iterator[tuple[int, list[bytes]]]:
+    """Yield the number and the words of every line that has words, without comments, from a byte on.
 
     Raises
     ------
     ScanError
         It is no text, or has too many or too long lines.
     """
-    if b"\x00" in text:
+    if text.find(b"\x00", start) >= 0:
         raise ScanError("is damaged, or the file is no text")
-    text = text.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    if (count := text.count(b"\n")) > MAX_LINES:
+    if text.find(b"\n", start) < 0:
+        text = text.replace(b"\r", b"\n")
+    if (count := text.count(b"\n", start)) > MAX_LINES:
         raise ScanError(f"has {count:,} lines; at most {MAX_LINES:,} are read: {DECIMATE}")
     file = io.BytesIO(text)
-    for number, line in enumerate(iter(lambda: file.readline(MAX_LINE_BYTES + 1), b""), first):
-        if len(line) > MAX_LINE_BYTES:
+    file.seek(start or 3 * text.startswith(b"\xef\xbb\xbf"))
+    lines = enumerate(iter(lambda: file.readline(MAX_LINE_BYTES + 1), b""), first)
+    for number, line in lines:
+        pieces, size = [line.partition(b"#")[0]], len(line)
+        while pieces[-1].rstrip()[-1:] == b"\\" and line.lstrip()[:1] in (b"v", b"f"):
+            pieces[-1] = pieces[-1].rstrip()[:-1]  # the next line goes on with this one
+            more = next(lines, (0, b""))[1]
+            pieces.append(more.partition(b"#")[0])
+            size += len(more)
+            if size > MAX_LINE_BYTES:
+                break
+        if size > MAX_LINE_BYTES:
             raise ScanError(f"line {number}: is longer than {MAX_LINE_BYTES:,} bytes; {AS_PLY}")
-        if words := line.split():
+        if words := b" ".join(pieces).split():
             yield number, words
 
 
@@ -179,7 +191,7 @@ class _Element:
 def _ply(data: bytes) -> list[Part]:
     """Read a PLY file: Turk, The PLY Polygon File Format, 1994."""
     order, elements, start, line = _ply_header(data)
-    rows = _rows(data[start:], line) if not order else iter(())
+    rows = _rows(data, start, line) if not order else iter(())
     points, faces = np.empty((0, 3)), np.empty((0, 3), np.int64)
     for element in elements:
         if order:
@@ -353,16 +365,14 @@ def _stl_text(data: bytes) -> np.ndarray:
 
 # --- OBJ ---
 
-_PASSED = set(
-    "vt vn vp g o s mg l p usemtl mtllib usemap maplib bevel c_interp d_interp lod shadow_obj trace_obj".split()
-)
+_PASSED = re.compile(r"v[tnp]|[goslp]|mg|usemtl|mtllib|usemap|maplib|bevel|[cd]_interp|lod|shadow_obj|trace_obj")
 """Words that begin lines of an OBJ file without points or faces of the surface."""
 
 
 def _obj(data: bytes) -> list[Part]:
     """Read an OBJ file: Wavefront, Advanced Visualizer, appendix B1; polygons only."""
     points, corners, counts = array("d"), array("q"), array("q")
-    for number, words in _rows(re.sub(rb"(?m)^([ \t]*[vf][^#\r\n]*)\\[ \t]*\r?\n", rb"\1 ", data)):
+    for number, words in _rows(data):
         word = words[0].decode("latin-1")
         if word == "v":
             points.extend(_numbers(words[1:], 3, number, more=True))
@@ -378,7 +388,7 @@ def _obj(data: bytes) -> list[Part]:
             corners.extend(name - 1 if name > 0 else here + name for name in named)
             counts.append(len(named))
             check_count(len(corners) - 2 * len(counts))
-        elif word not in _PASSED and not word.startswith("#"):
+        elif not _PASSED.fullmatch(word):
             raise ScanError(f"line {number}: holds {_shown(words)}, which is not read; {AS_PLY}")
     return _one(
         np.frombuffer(points, np.float64).reshape(-1, 3),
@@ -519,7 +529,7 @@ def _accessor(header: dict[str, Any], buffer: memoryview, number: int, shape: st
     view = header["bufferViews"][accessor["bufferView"]]
     if view["buffer"] != 0:
         raise ScanError("keeps its points in other files; export it as one file")
-    start, length, count = view.get("byteOffset", 0), view["byteLength"], accessor["count"]
+    start, length, count = view.get("byteOffset", 0), view["byteLength"], index(accessor["count"])
     kind, width = np.dtype(_COMPONENTS[accessor["componentType"]]), _WIDTHS[shape]
     stride = view.get("byteStride", width * kind.itemsize)
     if accessor["type"] != shape or min(start, count, stride) < 0 or start + length > len(buffer):
