@@ -14,6 +14,7 @@ import struct
 from array import array
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from operator import index
 from typing import Any
 
@@ -137,19 +138,16 @@ def _rows(text: bytes, start: int = 0, first: int = 1) -> Iterator[tuple[int, li
         raise ScanError(f"has {count:,} lines; at most {MAX_LINES:,} are read: {DECIMATE}")
     file = io.BytesIO(text)
     file.seek(start or 3 * text.startswith(b"\xef\xbb\xbf"))
-    lines = enumerate(iter(lambda: file.readline(MAX_LINE_BYTES + 1), b""), first)
+    lines = enumerate(iter(partial(file.readline, MAX_LINE_BYTES + 1), b""), first)
     for number, line in lines:
-        pieces, size = [line.partition(b"#")[0]], len(line)
-        while pieces[-1].rstrip()[-1:] == b"\\" and line.lstrip()[:1] in (b"v", b"f"):
-            pieces[-1] = pieces[-1].rstrip()[:-1]  # the next line goes on with this one
-            more = next(lines, (0, b""))[1]
-            pieces.append(more.partition(b"#")[0])
+        words, size = line.partition(b"#")[0].split(), len(line)
+        while words and words[-1][-1:] == b"\\" and words[0][:1] in (b"v", b"f") and size <= MAX_LINE_BYTES:
+            more = next(lines, (0, b""))[1]  # goes on with this one
+            words[-1:] = words[-1][:-1].split() + more.partition(b"#")[0].split()
             size += len(more)
-            if size > MAX_LINE_BYTES:
-                break
         if size > MAX_LINE_BYTES:
             raise ScanError(f"line {number}: is longer than {MAX_LINE_BYTES:,} bytes; {AS_PLY}")
-        if words := b" ".join(pieces).split():
+        if words:
             yield number, words
 
 
@@ -236,7 +234,7 @@ def _ply_header(data: bytes) -> tuple[str, list[_Element], int, int]:
     for element in elements:
         check_count(abs(element.count))
         _check_element(element)
-    check_count(sum(element.count * len(element.properties) for element in elements), 50)
+    check_count(sum(element.count * len(element.properties) for element in elements), 20)
     return order, elements, end.end(), len(lines) + 1
 
 
@@ -339,33 +337,35 @@ def _stl(data: bytes) -> list[Part]:
     return _one(points, np.arange(len(points)).reshape(-1, 3))
 
 
-_STL_WORDS = {"solid", "facet", "outer", "vertex", "endloop", "endfacet", "endsolid"}
+_STL_WORDS = {b"solid", b"facet", b"outer", b"vertex", b"endloop", b"endfacet", b"endsolid"}
 
 
 def _stl_text(data: bytes) -> np.ndarray:
     """Return the corners of the facets of a text, each of three."""
     if not re.match(rb"\s*solid\b", data, re.IGNORECASE):
         raise ScanError("is damaged: it ends early, or is no STL file")
-    points, facets, word = array("d"), 0, ""
+    points, facets, word = array("d"), 0, b""
     for number, words in _rows(data):
-        word = words[0].decode("latin-1").lower()
-        if word == "vertex":
-            points.extend(_numbers(words[1:], 3, number))
-        elif word == "endfacet":
+        word = words[0].lower()
+        if word == b"vertex":
+            points.extend(_point(words, number))
+        elif word == b"endfacet":
             facets += 1
             check_count(facets)
+            if len(points) != 9 * facets:
+                raise ScanError(f"line {number}: is damaged: a facet has three corners")
         elif word not in _STL_WORDS:
             raise ScanError(f"line {number}: is damaged: {_shown(words)} is no line of an STL file")
-        if not 9 * facets <= len(points) <= 9 * facets + 9 or (word == "endfacet" and len(points) != 9 * facets):
-            raise ScanError(f"line {number}: is damaged: a facet has three corners")
-    if word != "endsolid" or len(points) != 9 * facets:
+    if word != b"endsolid" or len(points) != 9 * facets:
         raise ScanError("is damaged: it ends early, without endsolid")
     return np.frombuffer(points, np.float64).reshape(-1, 3)
 
 
 # --- OBJ ---
 
-_PASSED = re.compile(r"v[tnp]|[goslp]|mg|usemtl|mtllib|usemap|maplib|bevel|[cd]_interp|lod|shadow_obj|trace_obj")
+_PASSED = frozenset(
+    b"vt vn vp g o s mg l p usemtl mtllib usemap maplib bevel c_interp d_interp lod shadow_obj trace_obj".split()
+)
 """Words that begin lines of an OBJ file without points or faces of the surface."""
 
 
@@ -373,11 +373,11 @@ def _obj(data: bytes) -> list[Part]:
     """Read an OBJ file: Wavefront, Advanced Visualizer, appendix B1; polygons only."""
     points, corners, counts = array("d"), array("q"), array("q")
     for number, words in _rows(data):
-        word = words[0].decode("latin-1")
-        if word == "v":
-            points.extend(_numbers(words[1:], 3, number, more=True))
+        word = words[0]
+        if word == b"v":
+            points.extend(_point(words, number))
             check_count(len(points) // 3)
-        elif word in ("f", "fo"):
+        elif word in (b"f", b"fo"):
             here = len(points) // 3
             try:
                 named = [int(corner.partition(b"/")[0]) for corner in words[1:]]
@@ -388,7 +388,7 @@ def _obj(data: bytes) -> list[Part]:
             corners.extend(name - 1 if name > 0 else here + name for name in named)
             counts.append(len(named))
             check_count(len(corners) - 2 * len(counts))
-        elif not _PASSED.fullmatch(word):
+        elif word not in _PASSED:
             raise ScanError(f"line {number}: holds {_shown(words)}, which is not read; {AS_PLY}")
     return _one(
         np.frombuffer(points, np.float64).reshape(-1, 3),
@@ -396,15 +396,13 @@ def _obj(data: bytes) -> list[Part]:
     )
 
 
-def _numbers(words: list[bytes], count: int, line: int, *, more: bool = False) -> list[float]:
-    """Return the first numbers of a line."""
+def _point(words: list[bytes], line: int) -> tuple[float, float, float]:
+    """Return the coordinates in a line; a weight or a colour may follow."""
     try:
-        numbers = [float(word) for word in words[:count]]
+        x, y, z = map(float, words[1:4])
     except ValueError:
-        numbers = []
-    if len(numbers) < count or (len(words) > count and not more):
-        raise ScanError(f"line {line}: is damaged: {_shown(words)} is no point")
-    return numbers
+        raise ScanError(f"line {line}: is damaged: {_shown(words)} is no point") from None
+    return x, y, z
 
 
 def _shown(words: list[bytes]) -> str:
