@@ -285,9 +285,9 @@ def _binary_columns(element: _Element, order: str, data: bytes, start: int) -> t
         raise ScanError("is damaged: it ends before what its header counts")
     check_count(int(many_each.sum()), 3)
     octets, columns = np.frombuffer(data, np.uint8), []
-    for name, first, many in zip(element.wanted, places, many_each, strict=True):
-        within = np.arange(many.sum()) - np.repeat(np.cumsum(many) - many, many)
-        at = np.repeat(first, many) + sizes[name] * within
+    for name, starts_at, each in zip(element.wanted, places, many_each, strict=True):
+        within = np.arange(each.sum()) - np.repeat(np.cumsum(each) - each, each)
+        at = np.repeat(starts_at, each) + sizes[name] * within
         values = octets[at[:, None] + np.arange(sizes[name])].view(order + element.properties[name][1])
         columns.append(values.reshape(-1))
     return columns, many_each[-1] if len(many_each) else np.empty(0, np.int64), start
@@ -309,7 +309,8 @@ def _text_columns(element: _Element, rows: Iterator[tuple[int, list[bytes]]]) ->
                     many = int(words[at])
                     at += 1
                 if name in columns:
-                    columns[name].extend(map(int if count else float, words[at : at + many]))
+                    convert: Callable[[bytes], float] = int if count else float
+                    columns[name].extend(map(convert, words[at : at + many]))
                     counts.append(many)
                 at += many
         except (ValueError, LookupError, OverflowError):
