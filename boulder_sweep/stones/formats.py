@@ -295,7 +295,7 @@ def _binary_columns(element: _Element, order: str, data: bytes, start: int) -> t
 
 def _text_columns(element: _Element, rows: Iterator[tuple[int, list[bytes]]]) -> tuple[list[np.ndarray], np.ndarray]:
     """Return the values of the properties that are wanted, and how many the last has each time, from lines."""
-    columns = {name: array("q" if element.properties[name][0] else "d") for name in element.wanted}
+    columns: dict[str, Any] = {name: array("q" if element.properties[name][0] else "d") for name in element.wanted}
     counts = array("q")
     for _ in range(element.count):
         number, words = next(rows, (0, []))
@@ -309,8 +309,7 @@ def _text_columns(element: _Element, rows: Iterator[tuple[int, list[bytes]]]) ->
                     many = int(words[at])
                     at += 1
                 if name in columns:
-                    convert: Callable[[bytes], float] = int if count else float
-                    columns[name].extend(map(convert, words[at : at + many]))
+                    columns[name].extend([(int if count else float)(word) for word in words[at : at + many]])
                     counts.append(many)
                 at += many
         except (ValueError, LookupError, OverflowError):

@@ -59,8 +59,8 @@ def ply(
     head += [f"element face {len(polygons)}", *extra]
     head += [f"property list {TYPES[count]} {TYPES[number]} {'vertex_index' if more else 'vertex_indices'}", *after]
     head += ["element edge 1", "property int vertex1", "end_header"] if more else ["end_header"]
-    rows: list[list[tuple[str, list[float]]]] = []
-    first = [(kind, [value]) for kind, value in extra.values()]
+    rows: list[list[tuple[str, Sequence[float]]]] = []
+    first: list[tuple[str, Sequence[float]]] = [(kind, [value]) for kind, value in extra.values()]
     rows += [[*first, (real, list(point))] for point in points]
     rows += [
         [*first, (count, [len(one)]), (number, list(one)), *([("u1", [6]), (real, [0.5] * 6)] if more else [])]
