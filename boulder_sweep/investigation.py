@@ -34,6 +34,10 @@ class OutsideError(ValueError):
     """A reading lies outside of what a correlation holds for; the message says so."""
 
 
+class AboveError(OutsideError):
+    """A reading lies above what a correlation holds for: the soil is at least as strong as at the end of the range."""
+
+
 class Range(NamedTuple):
     """What a correlation admits, ends included."""
 
@@ -41,10 +45,11 @@ class Range(NamedTuple):
     high: float
 
     def check(self, value: float, what: str, unit: str = "") -> None:
-        """Raise `OutsideError` where a value is outside by more than rounding, or is NaN."""
+        """Raise `OutsideError` where a value is outside by more than rounding, or is NaN; `AboveError` above."""
         if not self.low * (1.0 - 1e-9) <= value <= self.high * (1.0 + 1e-9):
             ends = f"{self.low:.4g} to {self.high:.4g}{unit}"
-            raise OutsideError(f"{what} is {value:.4g}{unit}; the correlation holds from {ends}")
+            kind = AboveError if value > self.high else OutsideError
+            raise kind(f"{what} is {value:.4g}{unit}; the correlation holds from {ends}")
 
 
 BLOW_COUNTS = Range(3.5 * HAMMERS / 0.6, 30.0 * HAMMERS / 0.6)
@@ -100,7 +105,7 @@ def vertical_stress(depth_m: float, density_kg_m3: float | None) -> float:
 
 def stress_factor(stress_kPa: float) -> float:
     """Return C_N = sqrt(p_a / sigma'), at most 1.7 (Liao and Whitman 1986; Youd et al. 2001); also for cones."""
-    return min(math.sqrt(ATMOSPHERE_KPA / stress_kPa), LARGEST_FACTOR)
+    return min(math.sqrt(ATMOSPHERE_KPA / stress_kPa), LARGEST_FACTOR) if stress_kPa > 0.0 else LARGEST_FACTOR
 
 
 def rod_factor(length_m: float) -> float:
@@ -174,7 +179,7 @@ def angles_by_blow_count(n1_60: float) -> dict[str, float]:
     Raises
     ------
     OutsideError
-        Outside `BLOW_COUNTS`.
+        Outside `BLOW_COUNTS`; `AboveError` above it.
     """
     BLOW_COUNTS.check(n1_60, "(N1)60")
     return {source: angle(n1_60) for source, angle in BY_BLOW_COUNT.items()}
@@ -186,11 +191,20 @@ def angles_by_cone(resistance_MPa: float, stress_kPa: float) -> dict[str, float]
     Raises
     ------
     OutsideError
-        The lowest angle is outside `CONE_ANGLES`.
+        The lowest angle is outside `CONE_ANGLES`, or nothing resists the cone; `AboveError` above the range.
     """
+    if resistance_MPa <= 0.0:
+        raise OutsideError(f"the resistance of the cone is {resistance_MPa:g} MPa; the correlation needs more than 0")
     angles = {source: angle(resistance_MPa, stress_kPa) for source, angle in BY_CONE.items()}
     CONE_ANGLES.check(min(angles.values()), f"the friction angle by {resistance_MPa:g} MPa", " deg")
     return angles
+
+
+STRONGEST = {
+    "spt": angles_by_blow_count(BLOW_COUNTS.high),
+    "cpt": dict.fromkeys(BY_CONE, CONE_ANGLES.high),
+}
+"""Friction angles [deg] at the upper end of the range of each kind of test, by their sources."""
 
 
 def angle_by_relative_density(ratio: float) -> float:

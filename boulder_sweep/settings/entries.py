@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -15,7 +16,7 @@ from boulder_sweep.settings.choices import SIDES, read_setting, shares_of, sides
 from boulder_sweep.settings.distributions import Distribution, Input, SetDistributions, read_input
 from boulder_sweep.settings.problems import Mistakes, Position, ProblemList, shorten, unknown_word, wrong
 from boulder_sweep.settings.shape import ProfilePoint
-from boulder_sweep.settings.soil_readings import CORRELATION, METHODS, SOIL_KEYS, unfold_soils
+from boulder_sweep.settings.soil_readings import CORRELATION, METHODS, SOIL_KEYS, TOPSOIL, unfold_soils
 from boulder_sweep.settings.sweep import SECTION, DesignList
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
 from boulder_sweep.settings.values import meant_by, read_single
@@ -28,8 +29,11 @@ NAME = re.compile(r"\w[\w .+-]{0,79}")
 NAME_RULE = "must be at most 80 letters, digits, spaces and - _ . +, as in m30-sizing"
 """The same in words."""
 TOP_KEYS = ("name", *fields.SECTIONS, "table", SECTION, fields.ALLOW_UNUSUAL)
-SITE_KEYS = {"soil": METHODS, "vehicle": (APPROACH,)}
+SITE_KEYS = {"soil": (*METHODS, TOPSOIL.key), "vehicle": (APPROACH,)}
 """Keys of a block that stand for others, as the site gives them."""
+DRAWN_SD = 5.0
+"""Standard deviations above its mean up to which values of an uncertain input are drawn, but for one in three million.
+"""
 
 
 class Entries:
@@ -77,14 +81,14 @@ class Entries:
         self._read_table()
         self._unfold()
         for section in fields.SECTIONS:
+            if section == "soil":  # which of its readings count depends on the boulder and the site
+                self._unfold_soils()
             self._read_block(section)
+            if section == "boulder":
+                self._read_profile()
         both = {"friction_angle_deg", "subgrade_reaction_MN_m3"}
         if any(both <= set(soil) for soil in self.derived.get("soil", ())):
             self.settings.setdefault("correlation", CORRELATION)
-        if "profile" in self.settings:
-            self._take_sides(self.settings["profile"])
-        elif "boulder.profile" in self.given:  # its mistakes are reported, and its sides are not missing
-            self.given |= {f"boulder.{key}" for key in SIDES}
 
     @contextmanager
     def reporting(self, path: str, stands_for: Iterable[str] = ()) -> Iterator[Mistakes]:
@@ -102,16 +106,45 @@ class Entries:
             unfold_springs(self.root, mistakes)
         with self.reporting(f"vehicle.{APPROACH}", ["vehicle.speed"]) as mistakes:
             approaches = unfold_approaches(self.root, mistakes)
-        listed = [key for key in SOIL_KEYS if fields.BY_PATH[f"soil.{key}"].name in self.listed]
-        with self.reporting("soil", [f"soil.{key}" for key in SOIL_KEYS]) as mistakes:
-            soils = unfold_soils(self.root, listed, mistakes)
-        self.derived |= {key: data for key, data in ((APPROACH, approaches), ("soil", soils)) if data}
+        self.derived |= {APPROACH: approaches} if approaches else {}
         boulder = self.root.get("boulder")
         if isinstance(boulder, Mapping) and "scan" in boulder.entries:
             self.given.add("boulder.scan")
             folder = self._folder_of(boulder.entries["scan"].position)
             with self.reporting("boulder.scan", [f"boulder.{key}" for key in (*SIDES, "density")]):
                 self.settings["scan"] = unfold_scan(boulder, folder)
+
+    def _unfold_soils(self) -> None:
+        """Replace the readings of an investigation by soil constants."""
+        listed = [key for key in SOIL_KEYS if fields.BY_PATH[f"soil.{key}"].name in self.listed]
+        with self.reporting("soil", [f"soil.{key}" for key in SOIL_KEYS]) as mistakes:
+            soils = unfold_soils(self.root, listed, self._deepest_foot(), mistakes)
+        self.derived |= {"soil": soils} if soils else {}
+
+    def _deepest_foot(self) -> float:
+        """Return the deepest foot of all designs [m]; infinity where mistakes leave it unknown."""
+        height, depth, ratio = (self._largest(name) for name in ("boulder_height_m", *reversed(fields.EMBEDMENT)))
+        if depth.size:
+            return float(depth.max())
+        if not height.size or not ratio.size:
+            return math.inf
+        in_rows = {"boulder_height_m", fields.EMBEDMENT[0]} <= self.listed
+        return float((height * ratio).max() if in_rows else height.max() * ratio.max())
+
+    def _largest(self, name: str) -> np.ndarray:
+        """Return the values of an input that is no input of named sets, the largest that are drawn where uncertain."""
+        values, leaf = self.values(name), self.leaves.get(name)
+        spread = None if leaf is None else leaf.distribution
+        if not isinstance(spread, Distribution):
+            return values
+        return np.minimum(spread.high, values + DRAWN_SD * spread.deviation(values))
+
+    def _read_profile(self) -> None:
+        """Take the sides of the boulder from its profile, if it has one."""
+        if "profile" in self.settings:
+            self._take_sides(self.settings["profile"])
+        elif "boulder.profile" in self.given:  # its mistakes are reported, and its sides are not missing
+            self.given |= {f"boulder.{key}" for key in SIDES}
 
     def _take_sides(self, points: tuple[ProfilePoint, ...]) -> None:
         """Take the sides of the boulder from its profile, which must not be given beside it."""

@@ -7,8 +7,9 @@ that it can be printed, stored and reported.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection
-from typing import Any, TypeVar
+import re
+from collections.abc import Collection
+from typing import Any
 
 import numpy as np
 
@@ -16,44 +17,70 @@ from boulder_sweep import investigation as sand
 from boulder_sweep.settings.distributions import FRACTILE_5
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import Bound, Field
-from boulder_sweep.settings.problems import LeafError, Mistakes, wrong
+from boulder_sweep.settings.problems import LeafError, Mistake, Mistakes, Position, wrong
 from boulder_sweep.settings.shown_units import quantity_text
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence, block_of
-from boulder_sweep.settings.values import read_block, read_single
+from boulder_sweep.settings.units import UnitError, factor
+from boulder_sweep.settings.values import NumberError, quoted, read_block, read_single, split_number
+from boulder_sweep.text import counted
 
-Angles = TypeVar("Angles", float, dict[str, float])
 SOIL_KEYS = ("friction_angle", "density", "subgrade_reaction")
 """What readings stand for, as far as a file does not give it."""
-_BLOWS, _SHARE = Bound(1.0, 200.0, "a blow count"), Bound(0.3, 1.0, "60 % is usual")
-_DEPTH = ("depth", "depth_m", "m", "depth of the reading below the ground", Bound(0.1, 30.0, "a depth"))
+_BLOWS, _SHARE = Bound(0.0, 1000.0, "a blow count"), Bound(0.3, 1.0, "60 % is usual")
+_DEPTH = ("depth", "depth_m", "m", "depth of the reading below the ground", Bound(0.0, 200.0, "a depth"))
 _READINGS = {
     "spt": (
         ("n", "n", "1", "blows for the last 300 mm (1 ft), as logged", _BLOWS),
         ("energy_ratio", "energy_ratio", "1", "energy of the hammer that reaches the rods", _SHARE),
         ("n60", "n60", "1", "in place of these two: blows at an energy ratio of 60 %", _BLOWS),
         _DEPTH,
-        ("n1_60", "n1_60", "1", "in place of the three: blow count corrected for energy and stress", _BLOWS),
+        ("n1_60", "n1_60", "1", "in place of n or n60: blow count corrected for energy and stress", _BLOWS),
     ),
-    "cpt": (("q_c", "q_c_MPa", "MPa", "resistance of the cone", Bound(0.01, 150.0, "a cone resistance")), _DEPTH),
+    "cpt": (("q_c", "q_c_MPa", "MPa", "resistance of the cone", Bound(0.0, 150.0, "a cone resistance")), _DEPTH),
 }
 READING_FIELDS = {
     method: {key: Field(f"soil.{method}", key, name, unit, meaning, bound) for key, name, unit, meaning, bound in rows}
     for method, rows in _READINGS.items()
 }
 """Entries of a reading by kind of test and key."""
+BLOW_KEYS = ("n", "n60")
+LEAST_KEYS = (*BLOW_KEYS, "n1_60", "q_c")
+"""Entries that may be ``>50`` or ``50+``, at least so much; blows may be a refusal, too: ``50/75mm`` or ``R``."""
+_AT_LEAST = re.compile(
+    r"(?:>=?|≥)\s*(?P<above>[\d.].*)|(?P<plus>\d[\d.]*)\s*\+(?P<unit>[^\d]*)"
+    r"|(?P<blows>\d+)\s*(?:/|\b(?:blows?\s+)?(?:for|in)\b)\s*(?P<driven>[\d.].*)|(?P<refusal>R|ref\.?|refusal)",
+    re.IGNORECASE | re.ASCII,
+)
+REFUSAL_BLOWS = 50
+"""Blows at which a test is given up where the log has no count: within 150 mm, by ASTM D1586."""
+_DRIVEN_M = 0.3048
+"""What the blows of a count drive the sampler, 300 mm or 1 ft."""
 _LOOSENESS = Bound(0.0, 1.0, "a share, 0.65 or 65 %")
 RELATIVE_DENSITY = Field(
     "soil", "relative_density", "relative_density", "1", "relative density of the sand", _LOOSENESS
+)
+TOPSOIL = Field(
+    "soil",
+    "topsoil",
+    "topsoil_m",
+    "m",
+    "depth of the topsoil: readings in it are left out",
+    Bound(0.0, 0.5, "what lies deeper bears; give soil.layers"),
 )
 METHODS = (*READING_FIELDS, RELATIVE_DENSITY.key)
 SOURCE_OF_DENSITY = "EM 1110-2-2504, Table 3-1"
 _SCATTER_DEG = {"spt": sand.SPT_SD_DEG, "cpt": sand.CPT_SD_DEG, RELATIVE_DENSITY.key: sand.DENSITY_SD_DEG}
 CORRELATION = 0.99
 """Of friction angle and subgrade reaction where the second follows from the first; 1 is not admitted."""
+IN_TOPSOIL, BELOW_FOOT = "topsoil", "below the foot"
+"""Why a reading is left out."""
+
+Located = list[tuple[Position, dict[str, Any]]]
+"""Readings as plain data, each with its position in the file."""
 
 
-def readings_of(node: Node, method: str, density_kg_m3: float | None) -> list[dict[str, Any]]:
-    """Return the readings of a test as plain data, each with the friction angles that follow, by their sources.
+def readings_of(node: Node, method: str, density_kg_m3: float | None) -> Located:
+    """Return the readings of a test as plain data.
 
     Parameters
     ----------
@@ -68,83 +95,218 @@ def readings_of(node: Node, method: str, density_kg_m3: float | None) -> list[di
     Raises
     ------
     LeafError
-        With every mistake; a reading outside of what its correlation holds for is one.
+        With every mistake, the same one in many readings once.
     """
     if method == RELATIVE_DENSITY.key:
-        ratio = read_single(node, RELATIVE_DENSITY)
-        angle = _inside(node, lambda: sand.angle_by_relative_density(ratio))
-        return [{method: ratio, **_by_lowest({SOURCE_OF_DENSITY: angle})}]
+        return [(node.position, {method: read_single(node, RELATIVE_DENSITY)})]
     items = node.items if isinstance(node, Sequence) and node.unit is None else [node]
     if not items:
         raise wrong(node.position, "the list is empty; give at least one reading")
     readings, mistakes = [], Mistakes()
     for item in items:
         with mistakes:
-            readings.append(_reading(item, method, density_kg_m3))
-    mistakes.raise_if_any()
+            readings.append((item.position, _reading(item, method, density_kg_m3)))
+    unlike: dict[str, Mistake] = {}
+    for mistake in mistakes:
+        unlike.setdefault(mistake.message, mistake)
+    Mistakes(unlike.values()).raise_if_any()
     return readings
 
 
 def _reading(node: Node, method: str, density_kg_m3: float | None) -> dict[str, Any]:
     """Return one reading of a penetration test."""
-    values = read_block(node, READING_FIELDS[method], "a reading")
+    plain, is_least = _without_signs(node)
+    values: dict[str, Any] = read_block(plain, READING_FIELDS[method], "a reading")
+    position = node.position
     if "n60" in values:
         if {"n", "energy_ratio"} & set(values):
-            raise wrong(node.position, "n60 is at an energy ratio of 60 %; give it, or n and energy_ratio, not both")
+            raise wrong(position, "n60 is at an energy ratio of 60 %; give it, or n and energy_ratio, not both")
         values |= {"n": values.pop("n60"), "energy_ratio": 0.6}
-    position, raw = node.position, {"n", "energy_ratio", "depth_m"}
     if method == "spt":
-        if "n1_60" in values and raw & set(values):
-            raise wrong(position, "give n, energy_ratio and depth, or n1_60, not both")
-        if "n1_60" not in values and not raw <= set(values):
+        if "n1_60" in values and {"n", "energy_ratio"} & set(values):
+            raise wrong(position, "give n or n60, or n1_60, which is corrected already, not both")
+        if "n1_60" not in values and not {"n", "energy_ratio", "depth_m"} <= set(values):
             message = "a reading is n, the blows as logged, with energy_ratio and depth; n60, the blows at an energy "
             message += "ratio of 60 %, with depth; or n1_60, which is corrected for the stress, too"
             raise wrong(position, message)
     elif len(values) < 2:
         raise wrong(position, "a reading of a cone has q_c and depth")
-    if "depth_m" in values:
+    if "n1_60" not in values:
         stress = sand.vertical_stress(values["depth_m"], density_kg_m3)
         values |= {"stress_kPa": stress, "stress_factor": sand.stress_factor(stress)}
         if method == "spt":
             values["rod_factor"] = sand.rod_factor(values["depth_m"])
             values["n1_60"] = sand.normalized_blow_count(values["n"], values["energy_ratio"], values["depth_m"], stress)
-    if method == "spt":
-        angles = _inside(node, lambda: sand.angles_by_blow_count(values["n1_60"]))
-    else:
-        angles = _inside(node, lambda: sand.angles_by_cone(values["q_c_MPa"], values["stress_kPa"]))
-    return {**values, **_by_lowest(angles)}
+    return values | ({"at_least": True} if is_least else {})
 
 
-def _by_lowest(angles: dict[str, float]) -> dict[str, Any]:
-    """Return the lowest of the angles by several correlations, and all of them, as a reading keeps them."""
-    return {"friction_angle_deg": min(angles.values()), "friction_angles_deg": angles}
-
-
-def _inside(node: Node, of_correlation: Callable[[], Angles]) -> Angles:
-    """Return what a correlation gives, or say that it does not hold here."""
-    try:
-        return of_correlation()
-    except sand.OutsideError as error:
-        raise wrong(node.position, f"{error}; give soil.friction_angle as measured") from None
-
-
-def soil_of(node: Node, method: str, lacking: Collection[str], density_kg_m3: float | None) -> dict[str, Any]:
-    """Return the soil constants by readings as plain data: the readings, and what is taken of them.
-
-    Of several readings the weakest counts, and of several correlations the lowest. The standard deviation is the
-    scatter about it, or what keeps the highest correlation within the 95 % fractile, if that is more.
+def _without_signs(node: Node) -> tuple[Node, bool]:
+    """Return a reading with plain numbers in place of ``>50``, ``50+``, ``50/75mm`` and ``R``, and whether it had one.
 
     Raises
     ------
     LeafError
-        With every mistake.
+        Blows over a penetration without a unit, or over more than the last 300 mm.
     """
-    readings = readings_of(node, method, density_kg_m3)
+    if not isinstance(node, Mapping):
+        return node, False
+    entries, is_least = dict(node.entries), False
+    for key in LEAST_KEYS:
+        value = node.get(key)
+        match = _AT_LEAST.fullmatch(value.text.strip()) if isinstance(value, Scalar) else None
+        if value is None or match is None or (key not in BLOW_KEYS and not (match["above"] or match["plus"])):
+            continue
+        is_least = True
+        if match["blows"]:
+            is_least = _driven(value, match["driven"]) < 0.3
+        text = match["above"] or match["blows"] or (match["plus"] and match["plus"] + match["unit"])
+        entries[key] = Entry(key, entries[key].position, Scalar(value.position, text or str(REFUSAL_BLOWS)))
+    return Mapping(node.position, entries, node.unit), is_least
+
+
+def _driven(node: Node, text: str) -> float:
+    """Return over how many metres blows were counted, by what stands behind their stroke."""
+    try:
+        number, unit = split_number(text, "m")
+        driven = float(number * factor(unit, "m")) if unit else 0.0
+    except (NumberError, UnitError) as error:
+        raise wrong(node.position, f"{quoted(node)}: {error}") from None
+    if not unit:
+        raise wrong(node.position, f"{quoted(node)} lacks the unit of the penetration; write it as in 50/75mm")
+    if not 0.0 <= driven <= _DRIVEN_M:
+        raise wrong(node.position, f"{quoted(node)} is no count of the last 300 mm (1 ft); give the blows of these")
+    return driven
+
+
+def _leave_out(readings: Located, foot_m: float, topsoil_m: float) -> None:
+    """Mark the readings that say nothing of the soil which bears: in the topsoil, or below the first under the foot."""
+    depths = [reading["depth_m"] for _, reading in readings if "depth_m" in reading]
+    last = min((depth for depth in depths if depth > foot_m), default=math.inf)
+    for _, reading in readings:
+        if reading.get("depth_m", topsoil_m) < topsoil_m:
+            reading["left_out"] = IN_TOPSOIL
+        elif reading.get("depth_m", 0.0) > last:
+            reading["left_out"] = BELOW_FOOT
+
+
+def _take_angles(node: Node, method: str, readings: Located, lacking: Collection[str]) -> None:
+    """Give every reading that counts its friction angles, by the sources of the correlations.
+
+    One above the range of the correlations gets the angles at its end.
+
+    Raises
+    ------
+    LeafError
+        Readings that are too weak for the correlations, in one mistake; or no reading counts.
+    """
+    counting = [(position, reading) for position, reading in readings if "left_out" not in reading]
+    if not counting:
+        message = f"every reading lies in the topsoil (soil.topsoil); {_as_measured(lacking)}"
+        raise wrong(node.position, message)
+    weak: list[tuple[Position, dict[str, Any], str]] = []
+    for position, reading in counting:
+        try:
+            angles = _angles(method, reading)
+        except sand.AboveError as error:
+            if method not in sand.STRONGEST:
+                raise wrong(position, f"{error}; {_as_measured(lacking)}") from None
+            angles = sand.STRONGEST[method]
+            reading["above_range"] = True
+        except sand.OutsideError as error:
+            weak.append((position, reading, str(error)))
+            continue
+        reading |= {"friction_angle_deg": min(angles.values()), "friction_angles_deg": angles}
+    if not weak:
+        return
+    position, _, message = weak[0]
+    depths = sorted(reading["depth_m"] for _, reading, _ in weak if "depth_m" in reading)
+    if len(weak) > 1:
+        where = f", at {_span(depths)}" if depths else ""
+        message += f"; {len(weak)} of the {len(counting)} readings that count are too weak for it{where}"
+    message += f"; {_as_measured(lacking)}"
+    firm = [reading["depth_m"] for _, reading in counting if "friction_angle_deg" in reading and "depth_m" in reading]
+    assert TOPSOIL.admitted is not None
+    if len(depths) == len(weak) and depths[-1] < min(firm, default=0.0) <= TOPSOIL.admitted.high:
+        message += f"; or, where this is topsoil, soil.topsoil: {min(firm):g} m"
+    raise wrong(position, message)
+
+
+def _angles(method: str, reading: dict[str, Any]) -> dict[str, float]:
+    """Return the friction angles [deg] by a reading, by their sources."""
+    if method == "spt":
+        return sand.angles_by_blow_count(reading["n1_60"])
+    if method == "cpt":
+        return sand.angles_by_cone(reading["q_c_MPa"], reading["stress_kPa"])
+    return {SOURCE_OF_DENSITY: sand.angle_by_relative_density(reading[method])}
+
+
+def _as_measured(lacking: Collection[str]) -> str:
+    """Return which constants a file must give where readings cannot stand for them."""
+    *others, last = (f"soil.{key}" for key in lacking)
+    return f"give {' and '.join([', '.join(others), last] if others else [last])} as measured"
+
+
+def _span(depths: list[float], units: str = "si") -> str:
+    """Return sorted depths [m] in words, by their ends."""
+    return quantity_text("m", units, *dict.fromkeys((depths[0], depths[-1])))
+
+
+def covered_depth(derived: dict[str, Any]) -> float:
+    """Return how deep a foot may be so that no other readings count for it [m]; by `Sweep.derived`.
+
+    It must be less than this. Infinity where no reading below the foot was left out.
+    """
+    ends = [math.inf]
+    for data in derived.get("soil", ()):
+        if any(reading.get("left_out") == BELOW_FOOT for reading in data["readings"]):
+            ends.append(max(reading.get("depth_m", 0.0) for reading in _counting(data["readings"])))
+    return min(ends)
+
+
+def soil_of(
+    node: Node,
+    method: str,
+    lacking: Collection[str],
+    density_kg_m3: float | None,
+    foot_m: float = math.inf,
+    topsoil_m: float = 0.0,
+) -> dict[str, Any]:
+    """Return the soil constants by readings as plain data: the readings, and what is taken of them.
+
+    Of several readings the weakest counts, from the topsoil down to the first below the deepest foot, and of several
+    correlations the lowest. The standard deviation is the scatter about it, or what keeps the highest correlation
+    within the 95 % fractile, if that is more.
+
+    Parameters
+    ----------
+    node, method, density_kg_m3
+        As of `readings_of`.
+    lacking : collection of str
+        Those of `SOIL_KEYS` that the file does not give; with none, the readings are kept as they are.
+    foot_m : float
+        The deepest foot of all designs [m].
+    topsoil_m : float
+        Depth of the topsoil [m].
+
+    Raises
+    ------
+    LeafError
+        With every mistake; a reading that counts and is too weak for its correlation is one.
+    """
+    located = readings_of(node, method, density_kg_m3)
+    readings = [reading for _, reading in located]
+    data: dict[str, Any] = {"method": method, "readings": readings}
+    if not lacking:
+        return data
+    _leave_out(located, foot_m, topsoil_m)
+    _take_angles(node, method, located, lacking)
+    if any(reading.get("left_out") == BELOW_FOOT for reading in readings):
+        data["foot_m"] = foot_m
     angles = _weakest(readings)["friction_angles_deg"]
     source = min(angles, key=angles.__getitem__)
     angle, highest = angles[source], max(angles.values())
     sd = max(_SCATTER_DEG[method], math.ceil(100.0 * (highest - angle) / FRACTILE_5) / 100.0)
-    data: dict[str, Any] = {"method": method, "source": source, "readings": readings}
+    data["source"] = source
     if "friction_angle" in lacking:
         data |= {"friction_angle_deg": angle, "friction_angle_sd_deg": sd}
     if "density" in lacking:
@@ -152,7 +314,7 @@ def soil_of(node: Node, method: str, lacking: Collection[str], density_kg_m3: fl
     if "subgrade_reaction" in lacking:
         if angle < sand.API_ANGLES[0]:
             message = f"the API curve begins at {sand.API_ANGLES[0]:g} deg, and these readings give {angle:.4g} deg"
-            raise wrong(node.position, f"{message}; give soil.subgrade_reaction as measured")
+            raise wrong(node.position, f"{message}; {_as_measured(['subgrade_reaction'])}")
         # The curve as it is; what the angle may be off by is carried along it, at the slope of its logarithm.
         curve = sand.api_curve(np.array([angle, *sand.API_ANGLES]))
         spread = sd * math.log(curve[2] / curve[1]) / float(sand.API_ANGLES[1] - sand.API_ANGLES[0])
@@ -160,14 +322,20 @@ def soil_of(node: Node, method: str, lacking: Collection[str], density_kg_m3: fl
     return data
 
 
+def _counting(readings: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    return [reading for reading in readings if "left_out" not in reading]
+
+
 def _weakest(readings: list[dict[str, Any]]) -> dict[str, Any]:
-    return min(readings, key=lambda reading: reading["friction_angle_deg"])
+    return min(_counting(readings), key=lambda reading: reading["friction_angle_deg"])
 
 
 def soil_words(data: dict[str, Any], units: str = "si") -> str:
     """Return in one line what is taken of readings, by what `soil_of` returned."""
+    if not data.keys() & {"friction_angle_deg", "density_low_kg_m3", "subgrade_reaction_MN_m3"}:
+        return "the readings are kept for the record: the file gives every constant"
     weakest = _weakest(data["readings"])
-    count = len(data["readings"])
+    count = len(_counting(data["readings"]))
     of = f", the weakest of {count} readings" if count > 1 else ""
     parts = []
     if "friction_angle_deg" in data:
@@ -189,7 +357,25 @@ def soil_words(data: dict[str, Any], units: str = "si") -> str:
         beta = quantity_text("MN/m^3", units, data["subgrade_reaction_MN_m3"], digits=".3g")
         cov = data["subgrade_reaction_cov"]
         parts.append(f"subgrade reaction {beta}, cov {100.0 * cov:.0f} %, which follows the angle (API)")
-    return "; ".join(parts) or "the readings are not used: the file gives every constant"
+    return "; ".join([*parts, *_remarks(data, units)])
+
+
+def _remarks(data: dict[str, Any], units: str) -> list[str]:
+    """Return which readings are left out, and which are taken at the end of a range."""
+    foot = quantity_text("m", units, data.get("foot_m", 0.0))
+    kinds = (
+        ("above_range", True, "above the range of the correlation, taken as its end"),
+        ("left_out", IN_TOPSOIL, "left out, in the topsoil"),
+        ("left_out", BELOW_FOOT, f"left out, below the first one under the deepest foot ({foot})"),
+    )
+    remarks = []
+    for key, value, words in kinds:
+        some = [reading for reading in data["readings"] if reading.get(key) == value]
+        if some:
+            depths = sorted(reading["depth_m"] for reading in some if "depth_m" in reading)
+            where = f" at {_span(depths, units)}" if depths else ""
+            remarks.append(f"{counted(len(some), 'reading')}{where} {words}")
+    return remarks
 
 
 def _reading_words(reading: dict[str, Any], units: str) -> str:
@@ -200,13 +386,14 @@ def _reading_words(reading: dict[str, Any], units: str) -> str:
         return f"relative density {100.0 * reading['relative_density']:g} %"
     corrected = f"(N1)60 {reading['n1_60']:.4g}"
     if "n" not in reading:
-        return corrected
+        return corrected + (f" at {depth}" if "depth_m" in reading else "")
     energy = f"{100.0 * reading['energy_ratio']:g} %"
     factors = f"C_N {reading['stress_factor']:.3g}, rods {reading['rod_factor']:g}"
-    return f"N {reading['n']:g} ({energy}) at {depth}, {corrected} with {factors}"
+    least = "at least " if "at_least" in reading else ""
+    return f"N {least}{reading['n']:g} ({energy}) at {depth}, {corrected} with {factors}"
 
 
-def unfold_soils(root: Mapping, listed: Collection[str], mistakes: Mistakes) -> list[dict[str, Any]]:
+def unfold_soils(root: Mapping, listed: Collection[str], foot_m: float, mistakes: Mistakes) -> list[dict[str, Any]]:
     """Replace the readings of every soil by distributions of the constants that it does not give.
 
     Parameters
@@ -215,6 +402,8 @@ def unfold_soils(root: Mapping, listed: Collection[str], mistakes: Mistakes) -> 
         The tree of the file, changed in place.
     listed : collection of str
         Keys of the soil that a table of designs gives.
+    foot_m : float
+        The deepest foot of all designs [m].
     mistakes : Mistakes
         Receives what is wrong with them.
 
@@ -226,6 +415,12 @@ def unfold_soils(root: Mapping, listed: Collection[str], mistakes: Mistakes) -> 
     data: list[dict[str, Any]] = []
     for soil in root.blocks("soil"):
         given = [key for key in METHODS if key in soil.entries]
+        topsoil_m, topsoil = 0.0, soil.entries.pop(TOPSOIL.key, None)
+        if topsoil is not None:
+            with mistakes:
+                topsoil_m = read_single(topsoil.value, TOPSOIL)
+                if not set(given) & set(READING_FIELDS):
+                    raise wrong(topsoil.position, "topsoil says which readings are left out; give it with spt or cpt")
         if not given:
             continue
         entry = soil.entries[given[0]]
@@ -237,7 +432,7 @@ def unfold_soils(root: Mapping, listed: Collection[str], mistakes: Mistakes) -> 
             if "water_table" in soil.entries and "subgrade_reaction" in lacking:
                 message = "the API curve is that of dry sand; with a water table give soil.subgrade_reaction"
                 raise wrong(entry.position, message)
-            constants = soil_of(entry.value, given[0], lacking, _plain_density(soil))
+            constants = soil_of(entry.value, given[0], lacking, _plain_density(soil), foot_m, topsoil_m)
             data.append(soil.label | constants)
         for key in given[1:]:
             del soil.entries[key]
