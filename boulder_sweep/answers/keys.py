@@ -13,6 +13,7 @@ from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.fields import BOULDER_MASS, UnknownNameError, named
 from boulder_sweep.settings.problems import LeafError, Position
+from boulder_sweep.settings.soil_readings import covered_depth
 from boulder_sweep.settings.tree import Scalar
 from boulder_sweep.settings.values import NumberError, outside, read_quantity, read_single, refuse_bare
 
@@ -325,6 +326,35 @@ def refuse_coarse(sweep: Sweep, key: Key, pieces: Iterable[Mapping[str, np.ndarr
             most, widest = held[row], (low[row], high[row])
     if chosen and most == 1:
         raise _unsearchable(key, *widest, "only one multiple")
+
+
+def refuse_deep(sweep: Sweep, foot_m: float, ranged: str) -> None:
+    """Refuse a search that reaches deeper than the readings of the soil that count.
+
+    Parameters
+    ----------
+    sweep
+        The sweep.
+    foot_m
+        The deepest foot of the search [m].
+    ranged
+        What the file must give so that deeper readings count.
+
+    Raises
+    ------
+    QuestionError
+        Readings were left out that count for such a foot.
+    """
+    covered = covered_depth(sweep.derived)
+    if foot_m < covered:
+        return
+    remedy = f"they count where the file gives {ranged}"
+    if sweep.table is not None:
+        remedy = "search less deep (--between); or they count where the table has a design with such a foot"
+    raise QuestionError(
+        f"the search goes down to a foot at {foot_m:.4g} m, and the readings of the soil below {covered:.4g} m were "
+        f"left out, since no foot in the file is so deep; {remedy}"
+    )
 
 
 def reach_of(key: Key, given: Mapping[str, np.ndarray]) -> np.ndarray | float:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_sweep.answers.keys import Key, sweep_ranges
+from boulder_sweep.answers.keys import Key, refuse_deep, sweep_ranges
 from boulder_sweep.answers.questions import Answers, Brackets
 from boulder_sweep.answers.search import (
     ALWAYS,
@@ -98,6 +98,9 @@ class LightestQuestion:
         self.bounds |= {name: (value, value) for name, value in sweep.constants.items()}
         self.free = [side for side in SIDES if self.bounds[side][0] < self.bounds[side][1]]
         self.open = Open(sweep, (*SIDES, DEPTH))
+        if not self.free and RATIO in self.bounds:  # else every boulder stands between those of the file
+            foot = self.bounds[RATIO][1] * self.bounds[HEIGHT][1] * SCALES[1]
+            refuse_deep(sweep, foot, "boulder.height a range, which bounds the search")
 
     @property
     def count(self) -> int:

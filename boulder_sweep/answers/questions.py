@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_sweep.answers.keys import Ends, Key, range_of, refuse_coarse
+from boulder_sweep.answers.keys import Ends, Key, range_of, refuse_coarse, refuse_deep
 from boulder_sweep.answers.search import (
     BEYOND,
     BLOCKED,
@@ -37,6 +38,8 @@ from boulder_sweep.answers.trials import (
     uncertain_rows,
 )
 from boulder_sweep.judge.judged import UNDECIDED, with_rows
+from boulder_sweep.settings.fields import EMBEDMENT
+from boulder_sweep.settings.soil_readings import covered_depth
 
 CHECKED_AT_ONCE = 65_536
 """Rows whose ranges are checked together, before any row is searched."""
@@ -230,6 +233,28 @@ class Question(ValueSearch):
         self.open = Open(sweep, (key.name,))
         pieces = (self.open.rows(start, stop) for start, stop in ranges(self.count, CHECKED_AT_ONCE))
         refuse_coarse(sweep, key, pieces, between)  # also refuses a wrong range, before anything is computed
+        if covered_depth(sweep.derived) < math.inf:
+            self._refuse_deep()
+
+    def _refuse_deep(self) -> None:
+        """Refuse a range in which a foot is deeper than the readings of the soil that count.
+
+        Raises
+        ------
+        QuestionError
+            There is such a foot.
+        """
+        low, high, foot = math.inf, 0.0, 0.0
+        for start, stop in ranges(self.count, CHECKED_AT_ONCE):
+            rows = self.open.rows(start, stop)
+            first, last = range_of(self.sweep, self.key, rows, self.between)
+            columns = block_at(rows, np.arange(stop - start), **{self.key.name: last}).columns
+            low, high = min(low, float(first.min())), max(high, float(last.max()))
+            foot = max(foot, float(columns["embedment_depth_m"].to_numpy().max()))
+        field = self.key.field
+        unit = "" if field.unit == "1" else f" {field.unit}"
+        of = "embedment" if field.name in EMBEDMENT else field.key
+        refuse_deep(self.sweep, foot, f"{field.path}: [{low:.6g}, {high:.6g}]{unit}, in place of its {of}")
 
     @property
     def count(self) -> int:

@@ -380,16 +380,17 @@ def _remarks(data: dict[str, Any], units: str) -> list[str]:
 
 def _reading_words(reading: dict[str, Any], units: str) -> str:
     depth = quantity_text("m", units, reading.get("depth_m", 0.0))
+    least = "at least " if "at_least" in reading else ""
     if "q_c_MPa" in reading:
-        return f"q_c {quantity_text('MPa', units, reading['q_c_MPa'])} at {depth}, C_N {reading['stress_factor']:.3g}"
+        resistance = quantity_text("MPa", units, reading["q_c_MPa"])
+        return f"q_c {least}{resistance} at {depth}, C_N {reading['stress_factor']:.3g}"
     if "relative_density" in reading:
         return f"relative density {100.0 * reading['relative_density']:g} %"
-    corrected = f"(N1)60 {reading['n1_60']:.4g}"
     if "n" not in reading:
-        return corrected + (f" at {depth}" if "depth_m" in reading else "")
+        return f"(N1)60 {least}{reading['n1_60']:.4g}{f' at {depth}' if 'depth_m' in reading else ''}"
     energy = f"{100.0 * reading['energy_ratio']:g} %"
     factors = f"C_N {reading['stress_factor']:.3g}, rods {reading['rod_factor']:g}"
-    least = "at least " if "at_least" in reading else ""
+    corrected = f"(N1)60 {reading['n1_60']:.4g}"
     return f"N {least}{reading['n']:g} ({energy}) at {depth}, {corrected} with {factors}"
 
 

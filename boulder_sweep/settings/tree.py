@@ -41,6 +41,8 @@ _PLAIN_WORDS = (
         "expected '<document start>'",
         "a key is needed here; check quotation marks and indentation",
     ),
+    ("expected chomping or indentation indicators", "'>' begins a text of several lines; put it in quotation marks"),
+    ("expected a comment or a line break", "'>' begins a text of several lines; put it in quotation marks"),
     ("cannot start any token", "unexpected character; put the text in quotation marks"),
     (
         "mapping values are not allowed here",

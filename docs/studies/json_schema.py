@@ -30,7 +30,15 @@ from boulder_sweep.settings.model import (
     SECOND_OPINIONS,
     SWITCHES,
 )
-from boulder_sweep.settings.soil_readings import METHODS, READING_FIELDS, RELATIVE_DENSITY, SOIL_KEYS
+from boulder_sweep.settings.soil_readings import (
+    BLOW_KEYS,
+    LEAST_KEYS,
+    METHODS,
+    READING_FIELDS,
+    RELATIVE_DENSITY,
+    SOIL_KEYS,
+    TOPSOIL,
+)
 from boulder_sweep.settings.sweep import SECTION, Heading
 from boulder_sweep.settings.units import EXPECTED
 from boulder_sweep.settings.values import MAX_AXIS
@@ -40,6 +48,9 @@ FILE = Path("docs/sweep.schema.json")
 _NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
 _QUANTITY = rf"^\s*{_NUMBER}\s*([^\d\s.,;\[\]][^,;\[\]]*)?$"
 """A number and perhaps a unit. Which units fit is left to the program: their products are too many to list."""
+_AT_LEAST = rf"^\s*((>=?|≥)\s*{_NUMBER}.*|{_NUMBER}\s*\+[^\d]*)$"
+_REFUSAL = r"^\s*(\d+\s*(/|(blows? )?(for|in)\s)\s*[\d.].*|[Rr]|[Rr]ef(\.|usal)?)\s*$"
+"""Readings beyond the range of a test: ``>50`` and ``50+``; ``50/75mm`` and ``R``."""
 
 Schema = dict[str, Any]
 
@@ -239,17 +250,24 @@ _FORMS: dict[str, Schema] = {
 """Entries that are more than a quantity."""
 
 
+def _reading(field: Field) -> Schema:
+    """Return what an entry of a reading may be."""
+    patterns = [_AT_LEAST] * (field.key in LEAST_KEYS) + [_REFUSAL] * (field.key in BLOW_KEYS)
+    value = _value(field)
+    return {"anyOf": [*value["anyOf"], *({"type": "string", "pattern": pattern} for pattern in patterns)]}
+
+
 _BY_TEST = {
     method: {"anyOf": [reading, {"type": "array", "minItems": 1, "items": reading}]}
     for method, reading in (
-        (method, _object({key: _value(field) for key, field in known.items()}, ()))
+        (method, _object({key: _reading(field) for key, field in known.items()}, ()))
         for method, known in READING_FIELDS.items()
     )
 }
 _SITE_DATA: dict[str, Schema] = {
     "soil": {
         **{method: {**form, "description": f"readings ({method})"} for method, form in _BY_TEST.items()},
-        RELATIVE_DENSITY.key: {**_value(RELATIVE_DENSITY), "description": RELATIVE_DENSITY.meaning},
+        **{field.key: {**_value(field), "description": field.meaning} for field in (RELATIVE_DENSITY, TOPSOIL)},
     },
     "vehicle": {
         APPROACH: {
