@@ -79,6 +79,11 @@ def test_the_examples_of_the_tests_are_valid(example, minimal):
             "soil:\n  density: 1859.9\n  friction_angle: 43.2\n  subgrade_reaction: 95\n",
             "soil: [{name: a, density: 1700, friction_angle: 30 deg, subgrade_reaction: 10}]\n",
         ),
+        *(
+            ("soil:\n", f"soil:\n  topsoil: 0.2 m\n  spt: {{{reading}, depth: 1.5 m}}\n")
+            for reading in ("n60: 50/75mm", "n: R, energy_ratio: 60 %", "n60: '>50'", "n60: 50+", "n1_60: '> 39'")
+        ),
+        ("soil:\n", "soil:\n  cpt: [{q_c: 14 MPa, depth: 0}, {q_c: '>40 MPa', depth: 30 m}]\n"),
     ],
 )
 def test_what_the_program_takes_is_valid(load_it, minimal, old, new):
@@ -116,6 +121,7 @@ def test_what_the_program_takes_is_valid(load_it, minimal, old, new):
             "$.soil[0]",
         ),
         ("site:", "site:\n  embedment_ratio: 0.5", "$.site"),
+        ("soil:\n", "soil:\n  cpt: {q_c: R, depth: 1 m}\n", "$.soil.cpt"),
         ("vehicle:", "vehicel:", "$"),
         ("vehicle:", "criterion: {rating: P4}\nvehicle:", "$.criterion.rating"),
         ("vehicle:", "model: {readings: {inertia: round}}\nvehicle:", "$.model.readings"),

@@ -110,7 +110,7 @@ def test_the_table_is_below_the_rule_of_bowles():
 def test_stress_normalization():
     assert sand.stress_factor(101.325) == 1.0
     assert sand.stress_factor(4.0 * 101.325) == 0.5
-    assert sand.stress_factor(25.0) == 1.7  # 2.01 without the limit
+    assert sand.stress_factor(25.0) == sand.stress_factor(0.0) == 1.7  # 2.01 and infinite without the limit
     assert sand.vertical_stress(2.0, 2000.0) == pytest.approx(39.2266)
     assert sand.vertical_stress(2.0, None) > sand.vertical_stress(2.0, 2240.0)
 
@@ -130,6 +130,7 @@ def test_a_raw_blow_count_by_hand():
         (sand.angles_by_blow_count, (4.5,), r"\(N1\)60 is 4\.5; the correlation holds from 4\.55 to 39"),
         (sand.angles_by_blow_count, (39.1,), "holds from"),
         (sand.angles_by_blow_count, (math.nan,), "holds from"),
+        (sand.angles_by_cone, (0.0, 20.0), "needs more than 0"),
         (sand.angles_by_cone, (0.7, 20.0), "is 29.* deg; the correlation holds from 30 to 46 deg"),
         (sand.angles_by_cone, (60.0, 20.0), "holds from 30 to 46"),
         (sand.angles_by_cone, (3.0, 230.0), "is 27.* deg; the correlation holds from 30 to 46 deg"),
@@ -140,6 +141,28 @@ def test_a_raw_blow_count_by_hand():
 def test_outside_the_range_is_refused(correlation, values, words):
     with pytest.raises(OutsideError, match=words):
         correlation(*values)
+
+
+@pytest.mark.parametrize(
+    ("correlation", "above", "below"),
+    [
+        (sand.angles_by_blow_count, (39.1,), (4.5,)),
+        (sand.angles_by_cone, (60.0, 20.0), (0.7, 20.0)),
+        (sand.angle_by_relative_density, (0.9,), (0.1,)),
+    ],
+)
+def test_too_strong_is_told_from_too_weak(correlation, above, below):
+    with pytest.raises(sand.AboveError):
+        correlation(*above)
+    with pytest.raises(OutsideError) as caught:
+        correlation(*below)
+    assert not isinstance(caught.value, sand.AboveError)
+
+
+def test_the_ends_of_the_ranges_are_the_strongest_angles():
+    assert sand.STRONGEST["spt"] == pytest.approx(sand.angles_by_blow_count(39.0))
+    assert set(sand.STRONGEST["cpt"].values()) == {46.0}
+    assert sand.STRONGEST["cpt"].keys() == sand.BY_CONE.keys()
 
 
 def test_more_stress_and_shorter_rods_never_make_stronger_sand():
