@@ -81,7 +81,8 @@ class LightestQuestion:
     Raises
     ------
     QuestionError
-        The sweep is a list of designs, which has no bounds.
+        The sweep is a list of designs, which has no bounds, or a boulder reaches below the readings of the soil that
+        count.
     """
 
     rows_at_once = 16

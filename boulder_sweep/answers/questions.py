@@ -219,7 +219,8 @@ class Question(ValueSearch):
     Raises
     ------
     QuestionError
-        The search range is empty or not admitted, or the tolerance does not suit it.
+        The search range is empty or not admitted, the tolerance does not suit it, or it reaches below the readings of
+        the soil that count.
     """
 
     rows_at_once = 2048

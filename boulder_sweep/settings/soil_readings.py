@@ -165,7 +165,7 @@ def _without_signs(node: Node) -> tuple[Node, bool]:
 
 
 def _driven(node: Node, text: str) -> float:
-    """Return over how many metres blows were counted, by what stands behind their stroke."""
+    """Return over how many metres blows were counted, by the text behind them."""
     try:
         number, unit = split_number(text, "m")
         driven = float(number * factor(unit, "m")) if unit else 0.0

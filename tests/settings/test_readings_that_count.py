@@ -273,6 +273,16 @@ def test_a_search_below_the_readings_that_count_is_refused(site, embedment, leas
         assert covered_depth(site(LOG, *instead, f"{key}={values}").derived) > 1.5
 
 
+def test_beside_a_table_a_deeper_design_makes_more_readings_count(load_it, tmp_path):
+    table = tmp_path / "designs.csv"
+    text = f"table: {table}\n{SITE.replace('site: {embedment_depth: 2.2 m}', '')}  {LOG}\n"
+    table.write_text("embedment_depth_m\n1.2\n")
+    with pytest.raises(QuestionError, match=r"or they count where the table has a design with such a foot"):
+        need(load_it(text))
+    table.write_text("embedment_depth_m\n1.2\n2.9\n")
+    assert covered_depth(load_it(text).derived) == 3.0
+
+
 def test_a_search_within_them_is_answered(site):
     answers = need(site(LOG), "embedment_depth", between=("2.2 m", "2.9 m"))
     assert answers.counts()
