@@ -11,6 +11,7 @@ import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any, NoReturn
 
 import click
@@ -139,7 +140,16 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and end the process with its exit code."""
     start_light()
     ready_streams()
+    _have_home()
     sys.exit(execute(arguments))
+
+
+def _have_home() -> None:
+    """Name a home that does not exist where there is none, as for some service accounts: libraries ask on import."""
+    try:
+        Path.home()
+    except RuntimeError:
+        os.environ["HOME"] = "/nonexistent"
 
 
 def execute(arguments: Sequence[str] | None = None) -> int:
@@ -162,7 +172,7 @@ def execute(arguments: Sequence[str] | None = None) -> int:
 
         return shell_complete(cli, {}, "sweep", COMPLETION, completion)
     try:
-        with noted_signals() as signals, _report_older_rules():
+        with noted_signals() as signals, _report_warnings():
             code = signals.call(lambda: _invoke(words))
         sys.stdout.flush()
         return code
@@ -186,14 +196,19 @@ def execute(arguments: Sequence[str] | None = None) -> int:
 
 
 @contextmanager
-def _report_older_rules() -> Iterator[None]:
-    """Say by whose rules a table was judged in one line, however often it is read; other warnings stay as they are."""
+def _report_warnings() -> Iterator[None]:
+    """Say by whose rules a table was judged in one line, however often it is read.
+
+    Warnings of libraries about numbers, or to programmers, tell a user nothing; others stay as they are.
+    """
     said: set[str] = set()
     with warnings.catch_warnings():
         warnings.simplefilter("always", OlderRulesWarning)
         usual = warnings.showwarning
 
         def showwarning(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+            if issubclass(category, RuntimeWarning | DeprecationWarning | FutureWarning):
+                return
             if not issubclass(category, OlderRulesWarning):
                 usual(message, category, *where, **more)
             elif str(message) not in said:

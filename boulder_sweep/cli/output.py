@@ -131,7 +131,7 @@ def _seconds_file(kernel: str) -> Path:
     """Return the file with the seconds that a compilation took which began with this kernel."""
     from boulder_kernels._cache import CACHE_FOLDER
 
-    return Path(CACHE_FOLDER or "").parent / f"{kernel}-and-more-in-seconds"
+    return Path(CACHE_FOLDER or "").parent.parent / f"{kernel}-and-more-in-seconds"
 
 
 @contextmanager

@@ -138,7 +138,7 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
         sweep = one_design(settings, inputs, control, values["step_s"] or reported_step_s(control))
         stated = (there["settings"], there["readings"], there["control"], there.get("accuracy"))
     except (LookupError, TypeError, ValueError) as unfamiliar:
-        why = f"its settings are not those of this version: {type(unfamiliar).__name__}: {unfamiliar}"
+        why = f"its settings are not those of this version ({unfamiliar})"
         return Explanation(name=folder.name, recomputed={}, changed=(), trajectory=None, unfamiliar=why, **common)
     limits = limits_of(sweep)._replace(rotation=control.theta_limit)
     block = sweep.block(0, 1)

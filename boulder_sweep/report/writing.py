@@ -5,9 +5,11 @@ from __future__ import annotations
 import dataclasses
 import os
 import shutil
+import signal
 import subprocess
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -49,10 +51,12 @@ PLAYWRIGHT = (
 )
 """Where Playwright keeps its browser, within its folder."""
 PLAYWRIGHT_FOLDERS = (".cache/ms-playwright", "Library/Caches/ms-playwright", "AppData/Local/ms-playwright")
-HELP = "install Chromium or Chrome, or write the page as .html and print it from a browser"
-MOST_SECONDS = 600
+HELP = "write the page as .html and print it from a browser"
+MOST_SECONDS = 300
 """After so long a browser that has not printed the page hangs and is ended; it works for five seconds, of which a busy
 machine makes minutes."""
+_LAST_WORDS = 300
+"""Characters of what a browser said last that are shown."""
 SETTLED_MS = 30_000
 """Time of the page that passes before it is printed; the browser skips it while nothing happens."""
 
@@ -305,10 +309,12 @@ def browser() -> str:
     named = next(filter(None, map(shutil.which, BROWSERS)), None)
     if named:
         return named
-    folders = [Path.home() / folder for folder in PLAYWRIGHT_FOLDERS]
+    folders: list[Path] = []
+    with suppress(RuntimeError):  # a user without a home
+        folders += [Path.home() / folder for folder in PLAYWRIGHT_FOLDERS]
     executables = [path for folder in folders for pattern in PLAYWRIGHT for path in sorted(folder.glob(pattern))]
     if not executables:
-        raise ReportError(f"a PDF is printed by Chromium, which was not found: {HELP}")
+        raise ReportError(f"a PDF is printed by Chromium, which was not found: install Chromium or Chrome, or {HELP}")
     return str(executables[-1])
 
 
@@ -343,12 +349,38 @@ def printed(html: str) -> bytes:
             f"--print-to-pdf={target}",
             page.as_uri(),
         ]
-        try:
-            ended = subprocess.run(words, capture_output=True, timeout=MOST_SECONDS, check=False)
-        except subprocess.TimeoutExpired:
-            raise ReportError(f"{program} did not print the page within {MOST_SECONDS} s: {HELP}") from None
-        except OSError as problem:
-            raise ReportError(f"{program} does not start ({why(problem)}): {HELP}") from problem
+        code, said = _ended(program, words, Path(folder, "said"))
         if not target.exists() or not target.stat().st_size:
-            raise ReportError(f"{program} did not print the page (it ended with code {ended.returncode}): {HELP}")
+            shown = f": {said}" if said else ""
+            raise ReportError(f"{program} did not print the page (it ended with code {code}{shown}); {HELP}")
         return target.read_bytes()
+
+
+def _ended(program: str, words: Sequence[str], said: Path) -> tuple[int, str]:
+    """Run a browser to its end; return its exit code, and the end of what it said, which goes into a file.
+
+    No process is left behind.
+
+    Raises
+    ------
+    ReportError
+        It does not start, or not end in time.
+    """
+    with said.open("wb") as file:
+        try:
+            # In a group of its own: a browser is many processes, which outlive the first where that alone is ended.
+            running = subprocess.Popen(words, stdout=file, stderr=file, start_new_session=True)
+        except OSError as problem:
+            raise ReportError(f"{program} does not start ({why(problem)}); {HELP}") from problem
+        try:
+            code = running.wait(MOST_SECONDS)
+        except subprocess.TimeoutExpired:
+            raise ReportError(f"{program} did not print the page within {MOST_SECONDS} s; {HELP}") from None
+        finally:
+            with suppress(OSError):
+                os.killpg(running.pid, signal.SIGKILL) if hasattr(os, "killpg") else running.kill()
+            running.wait()
+    with said.open("rb") as file:
+        file.seek(max(said.stat().st_size - 4 * _LAST_WORDS, 0))
+        last = " ".join(file.read(4 * _LAST_WORDS).decode(errors="replace").split())
+    return code, printable(last[-_LAST_WORDS:])

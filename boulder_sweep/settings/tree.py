@@ -176,10 +176,10 @@ def _events(yaml: YAML, text: str) -> Iterator[Any]:
         yield from yaml.parse(text)
     except YAMLError:
         raise
-    except Exception as error:
+    except Exception:
         # On some malformed input (bad escapes, directives, a text that ends within a token) ruamel.yaml
         # lets a bare IndexError, ValueError or AttributeError through.
-        raise YAMLError(f"the text cannot be read as YAML ({type(error).__name__})") from None
+        raise YAMLError("the text cannot be read as YAML") from None
 
 
 class _TreeReader:

@@ -256,6 +256,4 @@ def native_of(function: Any, library: Any, kept: dict[str, Any]) -> Native:
 
 def folder() -> Path | None:
     """Return the folder for this processor and compiler; None where compiled code is not kept."""
-    if _cache.CACHE_FOLDER is None:
-        return None
-    return Path(_cache.CACHE_FOLDER) / f"native-{_cache.machine_hash()[:16]}"
+    return None if _cache.CACHE_FOLDER is None else Path(_cache.CACHE_FOLDER)

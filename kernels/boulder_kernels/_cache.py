@@ -34,7 +34,7 @@ def source_hash() -> str:
 
 
 def _cache_folder() -> str | None:
-    """Return a folder for this version of the kernels that only this user can write, or None with a warning.
+    """Return a folder for these kernels on this processor that only this user can write, or None with a warning.
 
     Libraries run as the user who loads them.
     """
@@ -47,7 +47,7 @@ def _cache_folder() -> str | None:
     refused = []
     for candidate in candidates:
         try:
-            folder = _make_private_folder(candidate / f"kernels-{source_hash()[:16]}")
+            folder = _make_private_folder(candidate / f"kernels-{source_hash()[:16]}" / f"native-{machine_hash()[:16]}")
             with tempfile.TemporaryFile(dir=folder):
                 pass
         except OSError as problem:
@@ -65,7 +65,7 @@ def _cache_folder() -> str | None:
 
 
 def _make_private_folder(folder: Path) -> Path:
-    """Make a folder with access for this user only, and check that nobody else can put files into it.
+    """Make a folder with access for this user only, and check that nobody else can put files into it, or has.
 
     Returns
     -------
@@ -75,7 +75,7 @@ def _make_private_folder(folder: Path) -> Path:
     Raises
     ------
     OSError
-        It cannot be made, or others can change it or a folder above it.
+        It cannot be made, others can change it or a folder above it, or a file in it is another user's.
     """
     folder = Path(os.path.realpath(folder))
     missing = [path for path in (folder, *folder.parents) if not path.exists()]
@@ -93,10 +93,11 @@ def _make_private_folder(folder: Path) -> Path:
         open_to_others = status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
         if open_to_others and (path == folder or not status.st_mode & stat.S_ISVTX):
             raise PermissionError(errno.EPERM, f"other users can write into {path}")
+    for path in folder.iterdir():
+        status = path.lstat()
+        if status.st_uid not in (os.getuid(), 0) or status.st_mode & stat.S_IWOTH:
+            raise PermissionError(errno.EPERM, f"{path} is another user's, or open to others")
     return folder
-
-
-CACHE_FOLDER = _cache_folder()
 
 
 def target() -> str:
@@ -167,3 +168,6 @@ def machine_hash() -> str:
             version = Path(spec.origin).with_name("_version.py").stat()
             parts.append(f"{package} {version.st_size} {version.st_mtime_ns}")
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+CACHE_FOLDER = _cache_folder()

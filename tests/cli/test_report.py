@@ -2,13 +2,14 @@
 
 import json
 import re
-import shutil
 import webbrowser
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 import boulder_sweep
+from tests.waiting import wait_until
 
 
 @pytest.fixture
@@ -220,10 +221,50 @@ def test_without_a_browser_a_pdf_is_refused_with_what_to_do(sweep, possible_grid
     assert not Path("page.pdf").exists()
 
 
-def test_a_browser_that_prints_nothing_is_an_error(sweep, possible_grid, monkeypatch, tmp_path):
+BROWSER = """#!/bin/sh
+echo "FATAL: memory is
+short" >&2
+{more}
+exit 5
+"""
+
+
+@pytest.fixture
+def browser(monkeypatch, tmp_path) -> Callable[[str], None]:
+    """Take a script for the browser, with some lines of its own."""
+
+    def take(more: str) -> None:
+        script = tmp_path / "browser"
+        script.write_text(BROWSER.format(more=more))
+        script.chmod(0o755)
+        monkeypatch.setattr("boulder_sweep.report.writing.browser", lambda: str(script))
+
+    return take
+
+
+def test_a_browser_that_prints_nothing_is_an_error(sweep, possible_grid, browser):
+    browser("")
     assert sweep("run", possible_grid, "-q")[0] == 0
-    monkeypatch.setattr("boulder_sweep.report.writing.browser", lambda: shutil.which("true"))
     code, _, err = sweep("report", "small-grid.sweep", "-o", "page.pdf")
     assert code == 2
-    assert "did not print the page (it ended with code 0)" in err
+    assert "browser did not print the page (it ended with code 5: FATAL: memory is short); write the page as" in err
+    assert "install" not in err
     assert not Path("page.pdf").exists()
+
+
+@pytest.mark.parametrize("more", ["sleep 1000 & echo $! > child", "sleep 1000 & echo $! > child; sleep 1000"])
+def test_no_process_of_a_browser_is_left(sweep, possible_grid, browser, monkeypatch, more):
+    """Neither where it ends before its children, nor where it is ended because it takes too long."""
+    browser(more)
+    monkeypatch.setattr("boulder_sweep.report.writing.MOST_SECONDS", 2)
+    assert sweep("run", possible_grid, "-q")[0] == 0
+    assert sweep("report", "small-grid.sweep", "-o", "page.pdf")[0] == 2
+    wait_until(lambda: not is_running(int(Path("child").read_text())), "the child of the browser ends")
+
+
+def is_running(pid: int) -> bool:
+    """Whether a process exists that has not ended; one that nobody waits for is a zombie."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False

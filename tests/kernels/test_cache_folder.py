@@ -78,6 +78,28 @@ def test_a_folder_of_another_user_is_refused(place: Path, monkeypatch: pytest.Mo
         assert _cache._cache_folder() is None
 
 
+@pytest.mark.parametrize("mode", [0o666, 0o777])
+def test_a_file_that_others_can_write_is_refused(place: Path, monkeypatch: pytest.MonkeyPatch, mode: int) -> None:
+    named_only(monkeypatch, place)
+    folder = _cache._cache_folder()
+    assert folder is not None
+    (Path(folder) / "kernel.so").touch()
+    (Path(folder) / "kernel.so").chmod(mode)
+    with pytest.warns(UserWarning, match="is another user's, or open to others"):
+        assert _cache._cache_folder() is None
+
+
+def test_a_file_of_another_user_is_refused(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    named_only(monkeypatch, place)
+    folder = _cache._cache_folder()
+    assert folder is not None
+    (Path(folder) / "kernel.so").touch()
+    if os.getuid() == 0:
+        os.chown(Path(folder) / "kernel.so", OTHER_USER, OTHER_USER)
+        with pytest.warns(UserWarning, match="is another user's"):
+            assert _cache._cache_folder() is None
+
+
 def test_a_link_is_followed_once(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is checked is what is used, though the link may be changed afterwards."""
     (place / "real").mkdir()
@@ -85,7 +107,7 @@ def test_a_link_is_followed_once(place: Path, monkeypatch: pytest.MonkeyPatch) -
     named_only(monkeypatch, place / "link")
     folder = _cache._cache_folder()
     assert folder is not None
-    assert Path(folder).parent == place / "real"
+    assert Path(folder).parents[1] == place / "real"
 
 
 TINY = """
