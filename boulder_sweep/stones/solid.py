@@ -112,7 +112,10 @@ def solid_of(scan: ScannedSurface) -> Solid:
 
 
 def _merge_points(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return a surface whose points are single and whose faces have an area, each once."""
+    """Return a surface whose points are single and whose faces have an area, each once.
+
+    Both are sorted, so that no sum depends on the order in which a file holds them.
+    """
     import trimesh
 
     low = vertices[faces].reshape(-1, 3).min(axis=0)
@@ -122,7 +125,12 @@ def _merge_points(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, 
     mesh.update_faces(mesh.unique_faces())
     corners = mesh.faces
     mesh.update_faces((corners != corners[:, [1, 2, 0]]).all(axis=1))
-    return np.asarray(mesh.vertices) * size + low, np.asarray(mesh.faces, dtype=np.int64)
+    points, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64)
+    order = np.lexsort(points.T)
+    faces = np.argsort(order)[faces]
+    first = faces.argmin(axis=1)[:, None]
+    faces = np.take_along_axis(faces, (first + np.arange(3)) % 3, axis=1)
+    return points[order] * size + low, faces[np.lexsort(faces.T)]
 
 
 def _edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
