@@ -3,7 +3,7 @@
 The volume of a box that just holds the stone has a kink wherever another point of the stone comes to touch it, and is
 least at such kinks, with edges of the stone in faces of the box (J. O'Rourke, Finding minimal enclosing boxes, 1985).
 So no gradient leads there. For small rotations, though, the sides of the box follow from a linear programme, and its
-solutions lie at the kinks. Rotations all over the sphere are screened, the best are refined, and the best of these wins.
+solutions lie at the kinks. Rotations in all directions are screened, the best are refined, and the best of these wins.
 """
 
 from __future__ import annotations
@@ -80,7 +80,9 @@ def _touching(points: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]
     rows, least = [], []
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
-        outwards = points[:, k] + (shares[:, None, None] * points[:, i] + shares[:, None] * points[:, j]).reshape(25, -1)
+        outwards = points[:, k] + (shares[:, None, None] * points[:, i] + shares[:, None] * points[:, j]).reshape(
+            25, -1
+        )
         for side, sign, chosen in ((3 + k, 1.0, outwards.argmax(axis=1)), (6 + k, -1.0, outwards.argmin(axis=1))):
             near = points[np.unique(chosen)]
             asked = np.zeros((len(near), 9))

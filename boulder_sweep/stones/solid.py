@@ -23,7 +23,7 @@ MOST_CLOSED = 0.25
 MOST_ADDED = 0.45
 """Largest part of the surface that may be added, the base included; the base of a slab is a third of it and more."""
 PLANE_WITHIN = 0.02
-"""What lies within this distance is a plane, as a share of the largest side of the rim."""
+"""Distance of the rim from a plane up to which it counts as plane, as a share of its largest side."""
 LEAST_BASE = 0.02
 """Part of the surface from which a plane hole is a base: one missing triangle is plane too."""
 MOST_CRUMBS = 0.02
@@ -108,7 +108,8 @@ def solid_of(scan: ScannedSurface) -> Solid:
     if closed > MOST_CLOSED or closed + base > MOST_ADDED:
         raise ScanError(
             f"{scan.file}: is open: {closed + base:.0%} of its surface would be added to close it; at most "
-            f"{MOST_CLOSED:.0%} is, and {MOST_ADDED:.0%} with a base inside a plane rim; scan the stone from all sides"
+            f"{MOST_CLOSED:.0%} is, or {MOST_ADDED:.0%} with a base inside a plane rim; scan the stone from all sides, "
+            "or trim the scan to a plane just above the ground"
         )
     faces = np.concatenate([faces, lids])
     volume = float(_cones(vertices, faces, vertices[np.unique(faces)].mean(axis=0)).sum())
@@ -272,10 +273,9 @@ def _is_base(
     largest = areas.argmax()
     rim = vertices[lids[hole == largest, 0]]
     along = np.linalg.svd(rim - rim.mean(axis=0), full_matrices=False)[2]
-    sides = np.ptp(rim @ along.T, axis=0)
-    within = PLANE_WITHIN * sides[0]
-    height = (vertices[np.unique(faces)] - rim.mean(axis=0)) @ along[2]
-    is_base[largest] = sides[2] <= within and (height.min() >= -within or height.max() <= within)
+    within = PLANE_WITHIN * np.ptp(rim @ along[0])
+    height, above = ((points - rim.mean(axis=0)) @ along[2] for points in (rim, vertices[np.unique(faces)]))
+    is_base[largest] = np.abs(height).max() <= within and (above.min() >= -within or above.max() <= within)
     return is_base
 
 

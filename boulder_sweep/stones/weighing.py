@@ -80,8 +80,8 @@ class ScannedStone:
             )
         if solid.over > MUCH_OVER:
             cautions.append(
-                f"{solid.over:.0%} of its volume lies over what was added to close it: what the stone has beyond, in the "
-                "ground for example, is missing from volume and sides"
+                f"{solid.over:.0%} of its volume lies over what was added to close it: what the stone has beyond, in "
+                "the ground for example, is missing from volume and sides"
             )
         if self.step_m > COARSE_M:
             cautions.append(f"{_coarse(self.step_m)}: volume and sides are rounded; {NEARER}")
