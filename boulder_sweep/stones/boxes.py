@@ -12,10 +12,12 @@ import numpy as np
 
 SCREENED = 4096
 """Rotations that are tried first: from each box to the next, some 5 degrees."""
-FEW = 1024
-"""Directions whose farthest points stand for the stone while rotations are screened."""
+FEW = 4096
+"""Most points that stand for the stone until the last refinements: beyond, those farthest out in so many directions."""
 REFINED = 24
 """Rotations that are refined, the best first."""
+LAST = 3
+"""Boxes of different volume that are refined around all points at last."""
 REACH = 0.1
 """Largest step of a refinement at first [rad]."""
 LEAST_GAIN = 1e-9
@@ -40,10 +42,18 @@ def smallest_box(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     from scipy.spatial.transform import Rotation
 
     turns = Rotation.from_quat(np.random.default_rng(0).standard_normal((SCREENED, 4))).as_matrix()
-    few = points[np.unique((points @ turns[:FEW, 0].T).argmax(axis=0))]
-    volumes = np.prod([np.ptp(few @ turns[:, k].T, axis=0) for k in range(3)], axis=0)
-    boxes = [_refined(points, turns[k]) for k in np.argsort(volumes, kind="stable")[:REFINED]]
-    return min(boxes, key=lambda box: float(box[1].prod()))
+    few = points if len(points) <= FEW else _farthest(points, turns[:FEW, 0])
+    volumes = np.prod([np.ptp(turns[:, k] @ few.T, axis=1) for k in range(3)], axis=0)
+    boxes = [_refined(few, turns[k]) for k in np.argsort(volumes, kind="stable")[:REFINED]]
+    different = np.unique([np.round(np.log(sides.prod()), 6) for _, sides in boxes], return_index=True)[1]
+    last = [_refined(points, boxes[k][0]) for k in different[:LAST]]
+    return min(last, key=lambda box: float(box[1].prod()))
+
+
+def _farthest(points: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """Return the points that are farthest out in some directions."""
+    parts = np.array_split(directions, len(directions) // 64)
+    return points[np.unique(np.concatenate([(part @ points.T).argmax(axis=1) for part in parts]))]
 
 
 def _refined(points: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -140,12 +140,11 @@ class Stone:
         axes, sides = axes[order], sides[order]
         placed = points @ axes.T
         middle = 0.5 * (placed.min(axis=0) + placed.max(axis=0))
-        for k in range(2):
-            lean = middle[k]
-            if abs(lean) < 1e-6 * sides[k]:
-                lean = axes[k][np.abs(axes[k]).argmax()]
-            axes[k] *= np.sign(lean) or 1.0
-        axes[2] = np.cross(axes[0], axes[1])
+        # An end of a stone that is the same on both has no name of its own: it takes what makes the axes right-handed.
+        same = np.abs(middle) < 1e-6 * sides
+        axes *= np.sign(np.where(same, axes[range(3), np.abs(axes).argmax(axis=1)], middle))[:, None]
+        if np.linalg.det(axes) < 0.0:
+            axes[1 if same[1] else 0 if same[0] else 2] *= -1.0
         return axes, sides
 
     @cached_property
