@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ruamel.yaml import YAML
+from scipy.spatial.transform import Rotation
 
 from boulder_sweep import load, need
 from boulder_sweep.answers.placing import boulder_block, placed
@@ -206,6 +207,20 @@ def test_a_stone_at_a_site_is_asked_for_its_least_depth(placed_at_a_site):
     for way in found.passing:
         sweep = load(SITE_FILE, [boulder_block(found.found, way.standing), "soil.friction_angle=40 deg"])
         assert need(sweep).arrow["least_embedment_depth_m"].to_pylist() == [way.depth_m]
+
+
+def test_the_order_and_the_turn_of_a_scan_change_no_depth(placed_at_a_site, tmp_path):
+    found = scanned(ROCK).stone.solid
+    turn = Rotation.random(random_state=5).as_matrix()
+    scan = written(
+        (found.vertices[::-1] @ turn.T, len(found.vertices) - 1 - found.faces[::-1]), tmp_path / "turned.stl"
+    )
+    turned = scanned(scan, mass_kg=23_500.0)
+    ways = tuple(turned.stone.standing(way.standing.up, way.standing.facing) for way in placed_at_a_site.passing)
+    again = placed(turned, lambda boulder: load(SITE_FILE, [boulder, "soil.friction_angle=40 deg"]), ways)
+    known = {(way.standing.up, way.standing.facing): way.depth_m for way in placed_at_a_site.passing}
+    depths = {(way.standing.up, way.standing.facing): way.depth_m for way in again.passing}
+    assert depths == pytest.approx(known, rel=1e-3)
 
 
 def test_the_block_of_the_best_way_is_taken(placed_at_a_site, sweep, tmp_path, monkeypatch):
