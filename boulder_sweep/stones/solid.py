@@ -1,7 +1,8 @@
 """From a surface to a solid: what is wrong with it is repaired, and what was done is said.
 
 A surface encloses a volume if its oriented edges cancel, each run through as often in one direction as in the other.
-Holes are closed by fans from the middle of their rims, which always reaches that.
+Holes are closed by fans from the middle of their rims, which always reaches that. The fan of a plane rim is a flat lid:
+so a stone is closed exactly that was scanned where it lies, without the side on the ground.
 """
 
 from __future__ import annotations
@@ -18,7 +19,13 @@ if TYPE_CHECKING:
     from boulder_sweep.stones.reading import ScannedSurface
 
 MOST_CLOSED = 0.25
-"""Largest part of the surface of a stone that may be a hole; the side on which a block lies is a fifth of it."""
+"""Largest part of the surface that may be added to close holes without a plane rim."""
+MOST_ADDED = 0.45
+"""Largest part of the surface that may be added, the base included; the base of a slab is a third of it and more."""
+PLANE_WITHIN = 0.02
+"""Distance of the rim from a plane up to which it counts as plane, as a share of its largest side."""
+LEAST_BASE = 0.02
+"""Part of the surface from which a plane hole is a base: one missing triangle is plane too."""
 MOST_CRUMBS = 0.02
 """Largest part of its volume that bodies beside the stone may have, to be left out."""
 LEAST_VOLUME = 1e-3
@@ -48,7 +55,11 @@ class Solid:
     repairs : tuple of str
         What was done to the surface, in words; nothing where it was closed.
     closed : float
-        Part of the surface that was added to close it.
+        Part of the surface that was added to close holes, without the base.
+    base : float
+        Part of the surface that is a flat lid on a plane rim, the base on which the stone lay; 0 where it has none.
+    over : float
+        Part of the volume between all that was added and the centre of mass.
     """
 
     vertices: np.ndarray
@@ -58,6 +69,8 @@ class Solid:
     inertia: np.ndarray
     repairs: tuple[str, ...] = ()
     closed: float = 0.0
+    base: float = 0.0
+    over: float = 0.0
 
     def moment(self, axis: np.ndarray) -> float:
         """Return the moment of inertia about an axis (unit vector) through the centre, for 1 kg/m^3 [m^5]."""
@@ -87,14 +100,19 @@ def solid_of(scan: ScannedSurface) -> Solid:
     faces, turned = _orient_faces(faces)
     if turned:
         repairs.append(f"{counted(turned, 'face')} turned to the side of the others")
-    open_volume = abs(_volume(vertices, faces))
-    vertices, faces, closed, holes = _close_holes(vertices, faces)
-    if closed > MOST_CLOSED:
+    vertices, lids, hole = _lids(vertices, faces)
+    added = _areas(vertices, lids)
+    areas = np.bincount(hole, added) / (added.sum() + _areas(vertices, faces).sum())
+    is_base = _is_base(vertices, faces, lids, hole, areas)
+    closed, base = float(areas[~is_base].sum()), float(areas[is_base].sum())
+    if closed > MOST_CLOSED or closed + base > MOST_ADDED:
         raise ScanError(
-            f"{scan.file}: is open: {closed:.0%} of its surface would be added to close it, at most {MOST_CLOSED:.0%} "
-            "is; scan the stone from all sides"
+            f"{scan.file}: is open: {closed + base:.0%} of its surface would be added to close it; at most "
+            f"{MOST_CLOSED:.0%} is, or {MOST_ADDED:.0%} with a base inside a plane rim; scan the stone from all sides, "
+            "or trim the scan to a plane just above the ground"
         )
-    volume = _volume(vertices, faces)
+    faces = np.concatenate([faces, lids])
+    volume = float(_cones(vertices, faces, vertices[np.unique(faces)].mean(axis=0)).sum())
     if volume < 0.0:
         faces, volume = faces[:, ::-1], -volume
         repairs.append("its inside was outside; turned")
@@ -103,16 +121,25 @@ def solid_of(scan: ScannedSurface) -> Solid:
         raise ScanError(
             f"{scan.file}: encloses no volume to speak of ({volume:.2g} m³); it is flat, or no closed surface"
         )
-    if holes:
-        words = f"{counted(holes, 'hole')} closed, {100 * closed:.2g} % of the surface"
-        repairs.append(f"{words}, over {100 * abs(volume - open_volume) / volume:.2g} % of the volume")
+    moments = _moments(vertices, faces)
+    cones = np.abs(np.bincount(hole, _cones(vertices, lids, moments[1]))) / volume
+    for which, words in (
+        (is_base, "base closed by a flat lid"),
+        (~is_base, f"{counted(int((~is_base).sum()), 'hole')} closed"),
+    ):
+        if which.any():
+            surface, inside = 100 * areas[which].sum(), 100 * cones[which].sum()
+            repairs.append(f"{words}, {surface:.2g} % of the surface, over {inside:.2g} % of the volume")
     used, inverse = np.unique(faces, return_inverse=True)
     vertices, faces = np.ascontiguousarray(vertices[used]), np.ascontiguousarray(inverse.reshape(-1, 3))
-    return Solid(vertices, faces, *_moments(vertices, faces), tuple(repairs), closed)
+    return Solid(vertices, faces, *moments, tuple(repairs), closed, base, float(cones.sum()))
 
 
 def _merge_points(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return a surface whose points are single and whose faces have an area, each once."""
+    """Return a surface whose points are single and whose faces have an area, each once.
+
+    Both are sorted, so that no sum depends on the order in which a file holds them.
+    """
     import trimesh
 
     low = vertices[faces].reshape(-1, 3).min(axis=0)
@@ -122,7 +149,12 @@ def _merge_points(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, 
     mesh.update_faces(mesh.unique_faces())
     corners = mesh.faces
     mesh.update_faces((corners != corners[:, [1, 2, 0]]).all(axis=1))
-    return np.asarray(mesh.vertices) * size + low, np.asarray(mesh.faces, dtype=np.int64)
+    points, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64)
+    order = np.lexsort(points.T)
+    faces = np.argsort(order)[faces]
+    first = faces.argmin(axis=1)[:, None]
+    faces = np.take_along_axis(faces, (first + np.arange(3)) % 3, axis=1)
+    return points[order] * size + low, faces[np.lexsort(faces.T)]
 
 
 def _edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -198,8 +230,8 @@ def _largest_body(vertices: np.ndarray, faces: np.ndarray, file: str) -> tuple[n
     return faces[body == names[largest]], len(names) - 1
 
 
-def _close_holes(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, int]:
-    """Return a surface without holes, the part of it that was added, and how many holes there were."""
+def _lids(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return points with the middles of all holes, faces that close these, and which hole each closes."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -209,7 +241,7 @@ def _close_holes(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, n
     balance = np.bincount(inverse, np.where(up, 1, -1)).astype(np.int64)
     rims = np.flatnonzero(balance)
     if not len(rims):
-        return vertices, faces, 0.0, 0
+        return vertices, np.empty((0, 3), dtype=np.int64), np.empty(0, dtype=np.int64)
     # A face added along a rim runs through it the other way, as often as the edge lacks it.
     lacking = np.repeat(rims, np.abs(balance[rims]))
     start, end = edges[lacking] // len(vertices), edges[lacking] % len(vertices)
@@ -217,7 +249,6 @@ def _close_holes(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, n
     size = len(vertices)
     graph = coo_array((np.ones(len(start), dtype=np.int8), (start, end)), shape=(size, size))
     hole = np.unique(connected_components(graph, directed=False)[1][start], return_inverse=True)[1]
-    holes = int(hole.max()) + 1
     length = np.linalg.norm(vertices[end] - vertices[start], axis=1)
     middles = np.stack(
         [
@@ -226,31 +257,49 @@ def _close_holes(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, n
         ],
         axis=1,
     )
-    fans = np.stack([start, end, size + hole], axis=1)
-    vertices = np.concatenate([vertices, middles])
-    added = _area(vertices, fans)
-    return vertices, np.concatenate([faces, fans]), added / (added + _area(vertices, faces)), holes
+    return np.concatenate([vertices, middles]), np.stack([start, end, size + hole], axis=1), hole
+
+
+def _is_base(
+    vertices: np.ndarray, faces: np.ndarray, lids: np.ndarray, hole: np.ndarray, areas: np.ndarray
+) -> np.ndarray:
+    """Return which hole is the base of the stone, bool, for each hole.
+
+    It is the largest, if its rim is plane and all of the stone lies on one side.
+    """
+    is_base = np.zeros(len(areas), dtype=bool)
+    if not len(areas) or areas.max() < LEAST_BASE:
+        return is_base
+    largest = areas.argmax()
+    rim = vertices[lids[hole == largest, 0]]
+    along = np.linalg.svd(rim - rim.mean(axis=0), full_matrices=False)[2]
+    within = PLANE_WITHIN * np.ptp(rim @ along[0])
+    height, above = ((points - rim.mean(axis=0)) @ along[2] for points in (rim, vertices[np.unique(faces)]))
+    is_base[largest] = np.abs(height).max() <= within and (above.min() >= -within or above.max() <= within)
+    return is_base
 
 
 def _bodies(count: int) -> str:
     return "1 body" if count == 1 else f"{count:,} bodies"
 
 
-def _area(vertices: np.ndarray, faces: np.ndarray) -> float:
-    """Return the area of a surface."""
+def _areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Return the areas of faces."""
     corner = vertices[faces]
-    return 0.5 * float(np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum())
+    return 0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
 
 
-def _volume(vertices: np.ndarray, faces: np.ndarray) -> float:
-    """Return the volume between a surface and the middle of its points, negative where it is inside out."""
-    corner = vertices[faces] - vertices[np.unique(faces)].mean(axis=0)
-    return float(np.einsum("ij,ij->i", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])).sum()) / 6.0
+def _cones(vertices: np.ndarray, faces: np.ndarray, middle: np.ndarray) -> np.ndarray:
+    """Return the volumes between faces and a point, negative where it is before their outer side."""
+    corner = vertices[faces] - middle
+    return np.einsum("ij,ij->i", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) / 6.0
 
 
 def _moments(vertices: np.ndarray, faces: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
     """Return volume, centre of mass, and moments of inertia about it for a density of 1 kg/m^3."""
     from trimesh.triangles import mass_properties
 
-    properties = mass_properties(vertices[faces], density=1.0)
-    return float(properties.volume), np.asarray(properties.center_mass), np.asarray(properties.inertia)
+    # About a point of the stone: in map coordinates, third powers of the distance from the origin keep no digit.
+    near = vertices[faces[0, 0]]
+    properties = mass_properties((vertices - near)[faces], density=1.0)
+    return float(properties.volume), near + np.asarray(properties.center_mass), np.asarray(properties.inertia)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from boulder_sweep.errors import ScanError
+from boulder_sweep.stones.boxes import smallest_box
 from boulder_sweep.stones.profiles import Profile, Sections, doubled_share, fitted, sections_of, sides_of
 from boulder_sweep.stones.rock import LEAST_FOOT, is_flat
 
@@ -30,8 +31,6 @@ CANDIDATES = 8
 """Parts of the surface near an end that are tried, the largest first."""
 RESTS_WITHIN = 0.02
 """What is this near to the plane below the stone rests on it, as a share of the height."""
-FINE_HULL = 1500
-"""Faces of a convex hull up to which all are tried as sides of the box; beyond, one in every direction."""
 SECTIONS = 128
 """Sections over the height to which a profile is fitted."""
 MOST_CUT = 0.25
@@ -135,19 +134,18 @@ class Stone:
     @cached_property
     def _box(self) -> tuple[np.ndarray, np.ndarray]:
         """Axes a, b and c as rows, and the sides of the box along them [m]."""
-        from trimesh.bounds import oriented_bounds
-
-        placing, extents = oriented_bounds(self._hull, angle_digits=6 if len(self._hull.faces) <= FINE_HULL else 1)
-        order = np.argsort(-np.round(extents, 9), kind="stable")
-        axes = np.asarray(placing)[:3, :3][order]
-        offset = np.asarray(placing)[:3, :3] @ self.solid.centre + np.asarray(placing)[:3, 3]
-        for k in range(2):
-            lean = -offset[order[k]]
-            if abs(lean) < 1e-6 * extents[order[k]]:
-                lean = axes[k][np.abs(axes[k]).argmax()]
-            axes[k] *= np.sign(lean) or 1.0
-        axes[2] = np.cross(axes[0], axes[1])
-        return axes, np.asarray(extents)[order]
+        points = self._hull.vertices - self.solid.centre
+        axes, sides = smallest_box(points)
+        order = np.argsort(-np.round(sides, 9), kind="stable")
+        axes, sides = axes[order], sides[order]
+        placed = points @ axes.T
+        middle = 0.5 * (placed.min(axis=0) + placed.max(axis=0))
+        # An end of a stone that is the same on both has no name of its own: it takes what makes the axes right-handed.
+        same = np.abs(middle) < 1e-6 * sides
+        axes *= np.sign(np.where(same, axes[range(3), np.abs(axes).argmax(axis=1)], middle))[:, None]
+        if np.linalg.det(axes) < 0.0:
+            axes[1 if same[1] else 0 if same[0] else 2] *= -1.0
+        return axes, sides
 
     @cached_property
     def _hull(self) -> Any:

@@ -20,6 +20,8 @@ POINT = ("height_m", "width_m", "near_m", "far_m")
 USUAL_ROCK_KG_M3 = (2000.0, 3300.0)
 MUCH_CLOSED = 0.02
 """Part of the surface in holes from which the file may have been misread."""
+MUCH_OVER = 0.1
+"""Part of the volume over what was added from which this is said."""
 COARSE_M = 1e-3
 """Spacing of coordinates from which their rounding is said [m]."""
 NEARER = "subtract a point near the stone from all coordinates before you export them"
@@ -70,10 +72,16 @@ class ScannedStone:
                 f"its density is {self.density_kg_m3:,.0f} kg/m³, and rock has {low:,.0f} to {high:,.0f}: the mass, "
                 "the scale of the scan or its unit is wrong"
             )
-        if self.stone.solid.closed > MUCH_CLOSED:
+        solid = self.stone.solid
+        if solid.closed > MUCH_CLOSED:
             cautions.append(
-                f"{self.stone.solid.closed:.0%} of its surface was added to close holes: if the scan has no such "
+                f"{solid.closed:.0%} of its surface was added to close holes: if the scan has no such "
                 "holes, its file may have been misread; export it as binary PLY and compare the volumes"
+            )
+        if solid.over > MUCH_OVER:
+            cautions.append(
+                f"{solid.over:.0%} of its volume lies over what was added to close it: what the stone has beyond, in "
+                "the ground for example, is missing from volume and sides"
             )
         if self.step_m > COARSE_M:
             cautions.append(f"{_coarse(self.step_m)}: volume and sides are rounded; {NEARER}")
@@ -99,6 +107,7 @@ class ScannedStone:
             "faces": len(solid.faces),
             "repairs": list(solid.repairs),
             "closed_share": solid.closed,
+            "base_share": solid.base,
             "volume_m3": solid.volume,
             "mass_kg": self.mass_kg,
             "density_kg_m3": self.density_kg_m3,

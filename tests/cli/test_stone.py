@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ruamel.yaml import YAML
+from scipy.spatial.transform import Rotation
 
 from boulder_sweep import load, need
 from boulder_sweep.answers.placing import boulder_block, placed
@@ -47,9 +48,28 @@ def test_what_was_repaired(sweep, block):
     code, out, _ = sweep("stone", "open.ply")
     assert code == 0
     assert out.splitlines()[0] == "open.ply: 14 faces"
-    assert re.search(r"^  repaired    1 hole closed, 11 % of the surface, over \d+ % of the volume$", out, re.MULTILINE)
+    base = r"^  repaired    base closed by a flat lid, 11 % of the surface, over 17 % of the volume$"
+    assert re.search(base, out, re.MULTILINE)
     assert "  repaired    its inside was outside; turned\n" in out
     assert "volume      4.800 m³" in out
+
+
+def test_a_slab_scanned_where_it_lies(sweep, block):
+    """Its base is more than a quarter of the surface, and the flat foot on which it stands."""
+    points, faces = box(3.0, 2.2, 1.1)
+    points = points * np.where(points[:, 2:] > 0.0, (0.94, 0.95, 1.0), 1.0)
+    below = (points[faces][:, :, 2] < 0.0).all(axis=1)
+    whole, found = (
+        sweep("stone", written((points, kept), Path(name)), "--mass", "18 t")
+        for name, kept in (("whole.ply", faces), ("slab.ply", faces[~below]))
+    )
+    assert "  repaired    base closed by a flat lid, 28 % of the surface, over 17 % of the volume\n" in found[1]
+    assert found[1].split("\n", 2)[2] == whole[1].split("\n", 1)[1]
+    assert re.search(r"^ c +±a +1\.10 +3\.00 +2\.20 +3\.00 × 2\.20 +0\.00 +0\.0% +100%", found[1], re.MULTILINE)
+    assert (whole[0], whole[2], found[0]) == (0, "", 0)
+    assert found[2].startswith("caution: 17% of its volume lies over what was added to close it: what the stone has")
+    assert found[2].count("caution") == 1
+    assert json.loads(sweep("stone", "slab.ply", "--json")[1])["base_share"] == pytest.approx(0.28, abs=0.005)
 
 
 def test_without_a_mass_its_density_is_assumed(sweep, block):
@@ -96,7 +116,7 @@ vehicle: {mass: 15000 lb, speed: 25 mph, spring: 3103.3 kN/m, damper: 138.91 kN*
 """
 
 
-@pytest.mark.parametrize(("mass", "solidity"), [(("--mass", "23.5 t"), 0.812), ((), 0.812)])
+@pytest.mark.parametrize(("mass", "solidity"), [(("--mass", "23.5 t"), 0.825), ((), 0.825)])
 def test_a_block_of_settings_is_taken_by_the_other_commands(sweep, tmp_path, mass, solidity):
     """From a scan to the deepest rotation of the stone, with the stone drawn: it leans, and is weighed or not."""
     _, out, _ = sweep("stone", ROCK, *mass, "--up", "a", "--facing", "b")
@@ -187,6 +207,20 @@ def test_a_stone_at_a_site_is_asked_for_its_least_depth(placed_at_a_site):
     for way in found.passing:
         sweep = load(SITE_FILE, [boulder_block(found.found, way.standing), "soil.friction_angle=40 deg"])
         assert need(sweep).arrow["least_embedment_depth_m"].to_pylist() == [way.depth_m]
+
+
+def test_the_order_and_the_turn_of_a_scan_change_no_depth(placed_at_a_site, tmp_path):
+    found = scanned(ROCK).stone.solid
+    turn = Rotation.random(random_state=5).as_matrix()
+    scan = written(
+        (found.vertices[::-1] @ turn.T, len(found.vertices) - 1 - found.faces[::-1]), tmp_path / "turned.stl"
+    )
+    turned = scanned(scan, mass_kg=23_500.0)
+    ways = tuple(turned.stone.standing(way.standing.up, way.standing.facing) for way in placed_at_a_site.passing)
+    again = placed(turned, lambda boulder: load(SITE_FILE, [boulder, "soil.friction_angle=40 deg"]), ways)
+    known = {(way.standing.up, way.standing.facing): way.depth_m for way in placed_at_a_site.passing}
+    depths = {(way.standing.up, way.standing.facing): way.depth_m for way in again.passing}
+    assert depths == pytest.approx(known, rel=1e-3)
 
 
 def test_the_block_of_the_best_way_is_taken(placed_at_a_site, sweep, tmp_path, monkeypatch):

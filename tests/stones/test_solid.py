@@ -1,13 +1,21 @@
 """Volume, centre and inertia of exact solids, and what is repaired."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from boulder_sweep.errors import ScanError
 from tests.stones.shapes import box, cylinder, frustum, rock, scan, solid, sphere
 
 ASKEW = np.array([[2.0, -1.0, 2.0], [2.0, 2.0, -1.0], [-1.0, 2.0, 2.0]]) / 3.0
 """A rotation."""
+
+
+def turns(seed):
+    """Return a rotation, none for 0."""
+    return Rotation.random(random_state=seed).as_matrix() if seed else np.eye(3)
 
 
 def moved(surface):
@@ -87,19 +95,121 @@ def test_holes_are_closed_and_said():
     assert 0.95 * whole.volume < own.volume < whole.volume
 
 
-def test_a_block_scanned_without_the_side_on_which_it_lies():
-    points, faces = box(1.0, 1.0, 1.0)
+@pytest.mark.parametrize("turn", range(4))
+@pytest.mark.parametrize(
+    ("sides", "base"), [((1.0, 1.0, 1.0), 1.0 / 6.0), ((3.0, 2.2, 0.6), 0.340), ((3.0, 3.0, 0.2), 0.441)]
+)
+def test_a_block_scanned_where_it_lies(sides, base, turn):
+    """Any of its sides may be below; the wide ones are more than any other hole may be."""
+    points, faces = box(*sides)
     below = (points[faces][:, :, 2] < 0.0).all(axis=1)
-    own = solid((points, faces[~below]))
-    assert own.volume == pytest.approx(1.0, rel=1e-12)
-    assert own.closed == pytest.approx(1.0 / 6.0)
+    own = solid((points @ turns(turn).T, faces[~below]))
+    assert own.volume == pytest.approx(np.prod(sides), rel=1e-12)
+    assert (own.closed, own.base) == (0.0, pytest.approx(base, abs=5e-4))
+    assert own.over == pytest.approx(1.0 / 6.0)
+    assert (
+        own.repairs[0] == f"base closed by a flat lid, {100 * own.base:.2g} % of the surface, over 17 % of the volume"
+    )
+
+
+def cut(triangles, up, height):
+    """Return the part of a surface above a plane, open there."""
+    kept = []
+    for triangle in triangles:
+        z = triangle @ up - height
+        part = []
+        for k in range(3):
+            (p, q), (low, high) = (triangle[k], triangle[k - 2]), (z[k], z[k - 2])
+            part += [p] if low >= 0.0 else []
+            part += [p + low / (low - high) * (q - p)] if (low >= 0.0) != (high >= 0.0) else []
+        kept += [(part[0], *pair) for pair in pairwise(part[1:])]
+    return np.reshape(kept, (-1, 3)), np.arange(3 * len(kept)).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.7])
+@pytest.mark.parametrize("turn", range(12))
+def test_a_rock_cut_by_a_plane(share, turn):
+    """The volume of a surface about a point of the plane in which it is open needs no lid."""
+    points, faces = rock(2, finer=4)
+    up = turns(turn)[0]
+    heights = points @ up
+    height = heights.max() - share * np.ptp(heights)
+    left, rest = cut(points[faces], up, height), cut(points[faces], -up, -height)
+    corners = left[0][left[1]] - height * up
+    wanted = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
+    own = solid(left)
+    assert own.volume == pytest.approx(wanted, rel=1e-6)
+    assert own.closed == 0.0
+    assert 0.1 < own.base < 0.4
+    assert own.volume + solid(rest).volume == pytest.approx(solid((points, faces)).volume, rel=1e-6)
+
+
+def dome(jagged, below=0.0):
+    """A frustum without a base: its rim up and down by a share of its size, its shoulder drawn out and down past it."""
+    points, faces = frustum(1.0, 0.8, 0.7, sides=48)
+    faces = faces[(faces != 96).all(axis=1)]
+    points = points.copy()
+    points[:48, 2] += 2.0 * jagged * (-1.0) ** np.arange(48)
+    points[48:96, :2] *= 1.0 + below
+    points[48:96, 2] -= 4.0 * below
+    return points, faces
+
+
+@pytest.mark.parametrize(
+    ("surface", "is_base"),
+    [
+        (dome(0.0), True),
+        (dome(0.018), True),
+        (dome(0.022), False),
+        (dome(0.0, below=0.25), False),
+    ],
+    ids=["plane", "nearly plane", "jagged", "with a part of the stone below its rim"],
+)
+def test_which_hole_is_a_base(surface, is_base):
+    """What is no base may be a quarter of the surface only, and this is more."""
+    if is_base:
+        own = solid(surface)
+        assert own.base > 0.25
+        assert own.volume == pytest.approx(solid(dome(0.0)).volume, rel=0.02)
+        return
+    with pytest.raises(
+        ScanError, match=r"is open: \d+% of its surface would be added to close it; at most 25% is, or 45%"
+    ):
+        solid(surface)
+
+
+def test_holes_beside_a_base_are_counted_by_themselves():
+    points, faces = frustum(1.0, 0.6, 1.5)
+    own, whole = solid((points, faces[(faces < 192).all(axis=1)])), solid((points, faces))
+    assert own.volume == pytest.approx(whole.volume, rel=1e-12)
+    assert own.closed == pytest.approx(0.36 * own.base, rel=1e-9)
+    assert [words.split(",")[0] for words in own.repairs] == ["base closed by a flat lid", "1 hole closed"]
+
+
+def test_a_missing_triangle_is_no_base():
+    points, faces = sphere(1.0, 3)
+    own = solid((points, faces[1:]))
+    assert own.base == 0.0
+    assert own.repairs[0].startswith("1 hole closed, ")
 
 
 def test_half_a_surface_is_refused():
-    points, faces = sphere(1.0, 4)
+    """Its rim runs up and down with the triangles."""
+    points, faces = sphere(1.0, 3)
     half = faces[points[faces].mean(axis=1)[:, 2] > 0.0]
-    with pytest.raises(ScanError, match=r"is open: 3\d% of its surface would be added to close it, at most 25% is"):
+    with pytest.raises(
+        ScanError, match=r"is open: 3\d% of its surface would be added to close it; at most 25% is, or 45%"
+    ):
         solid((points, half))
+
+
+@pytest.mark.parametrize("far", [0.0, 1e3, 1e7])
+def test_a_stone_in_map_coordinates(far):
+    points, faces = rock(1)
+    moved_by = np.array([0.1 * far, far, 0.0])
+    here, there = solid((points, faces)), solid((points + moved_by, faces))
+    np.testing.assert_allclose(there.centre - moved_by, here.centre, atol=1e-7)
+    np.testing.assert_allclose(there.inertia, here.inertia, rtol=1e-6, atol=1e-6)
 
 
 def test_crumbs_are_left_out():
