@@ -111,7 +111,7 @@ def test_an_island_is_told_alike_and_never_recommended(tmp_path: Path) -> None:
     boulder_sweep.run(sweep, tmp_path / "table")
     row = boulder_sweep.read(tmp_path / "table").iloc[0]
     stated = simulate(sweep)
-    assert row.max_rotation_deg == stated.row["max_rotation_deg"] == pytest.approx(9.38, abs=0.01)
+    assert row.max_rotation_deg == stated.row["max_rotation_deg"] == pytest.approx(9.13, abs=0.01)
     assert row.verdict == stated.verdict != "pass"
     deeper = simulate(boulder_sweep.load(site, ["soil.friction_angle=40 deg", "site.embedment_depth=0.8 m"]))
     assert (deeper.verdict, deeper.reason) == ("fail", "overturns")
