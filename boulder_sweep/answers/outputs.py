@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from boulder_sweep.answers.keys import key_of
 from boulder_sweep.answers.lightest import DEPTH, SIDES
@@ -23,6 +22,7 @@ from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning
 from boulder_sweep.impact.explanation import model_of
 from boulder_sweep.judge.accuracy import known_control
 from boulder_sweep.locations import Location, RemotePath
+from boulder_sweep.parquet import ParquetError, TableFile
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import Criterion, completed
@@ -32,7 +32,7 @@ from boulder_sweep.store.files import MANIFEST_NAME
 from boulder_sweep.store.provenance import identity_in, judged_by, settings_sha256
 from boulder_sweep.store.reader import FinishedRows
 from boulder_sweep.store.schema import with_columns
-from boulder_sweep.text import counted, one_line
+from boulder_sweep.text import counted, one_line, why
 
 if TYPE_CHECKING:
     from boulder_sweep.answers.reserves import Reserves
@@ -84,7 +84,7 @@ class AnswerFile:
 
     def __init__(self, path: Path, refusal: type[BoulderSweepError], *, histories: bool = False) -> None:
         self.path = path
-        self.table, identity, self.judged_by = _read_parquet(path, refusal)
+        self.table, identity, self.judged_by = _identified(path, refusal)
         self._refusal = refusal
         try:
             self.question: dict[str, Any] = json.loads(identity.pop("question", "{}"))
@@ -164,11 +164,12 @@ class AnswerFile:
         tables = {}
         for name in ("indices", "samples"):
             file = self.path.with_suffix(f".{name}.parquet")
-            tables[name] = pq.read_table(file) if file.exists() else pa.table({"design_id": pa.array([], pa.int64())})
+            there = file.exists()
+            tables[name] = _rows(file, self._refusal) if there else pa.table({"design_id": pa.array([], pa.int64())})
         return Uncertainty(sweep, self.table, tables["indices"], tables["samples"], self.question["seed"])
 
 
-def _read_parquet(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[pa.Table, dict[str, Any], str]:
+def _identified(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[pa.Table, dict[str, Any], str]:
     """Read a Parquet file that a command wrote, and warn where other rules than those of this version judged it.
 
     Parameters
@@ -194,8 +195,8 @@ def _read_parquet(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[p
     """
     if advice := settings_file(path):
         raise refusal(advice)
+    table = _rows(Path(path), refusal)
     try:
-        table = pq.read_table(path, page_checksum_verification=True)
         table.validate(full=True)
         kinds = {field.name: field.type for field in table.schema}
         identity = identity_in(table.schema.metadata)
@@ -212,6 +213,17 @@ def _read_parquet(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[p
     if judged := judged_by(identity):
         warnings.warn(f"{path} was {judged}", OlderRulesWarning, stacklevel=3)
     return table, identity, judged
+
+
+def _rows(path: Path, refusal: type[BoulderSweepError]) -> pa.Table:
+    """Return all rows of a Parquet file, or refuse it."""
+    try:
+        with path.open("rb") as file:
+            return TableFile(file).read()
+    except ParquetError as problem:
+        raise refusal(f"{path}: {problem}") from problem
+    except OSError as problem:
+        raise refusal(f"{path} cannot be read: {why(problem)}") from problem
 
 
 def _is_of(type_: str, kind: pa.DataType) -> bool:
