@@ -74,6 +74,8 @@ class TableFile:
         Most rows that it may have.
     most_bytes
         Most bytes that the columns may take that are read, each number as eight.
+    most_text
+        Most bytes that their text may take where every row spells its words.
 
     Attributes
     ----------
@@ -91,11 +93,16 @@ class TableFile:
     """
 
     def __init__(
-        self, source: IO[bytes] | pa.NativeFile, most_rows: int = MOST_ROWS, most_bytes: int = MOST_BYTES
+        self,
+        source: IO[bytes] | pa.NativeFile,
+        most_rows: int = MOST_ROWS,
+        most_bytes: int = MOST_BYTES,
+        most_text: float = MOST_BYTES,
     ) -> None:
         import pyarrow.parquet as pq  # takes a third of a second to import: only where there is such a file
 
-        self._source, self._most_bytes, self._taken, self._pages = source, most_bytes, 0, 0
+        self._source, self._most_bytes, self._most_text = source, most_bytes, most_text
+        self._taken, self._text, self._pages = 0, 0, 0
         with _in_words():
             opened = partial(pq.ParquetFile, source, page_checksum_verification=True)
             self._file = opened()
@@ -138,7 +145,7 @@ class TableFile:
                 raise ParquetError(f"is damaged: it has {len(table):,} rows, and says {self.rows:,}")
             for name, column in zip(table.column_names, table.columns, strict=True):
                 if _is_text(column.type):
-                    _check_words(name, column)
+                    self._check_words(_shown(name), column)
             return table
 
     def _check_bytes(self, columns: Sequence[str] | None) -> None:
@@ -165,6 +172,24 @@ class TableFile:
                 if self._taken > self._most_bytes:
                     most = size_text(self._most_bytes)
                     raise ParquetLimitError(f"has more than {most} once unpacked, up to column {shown}")
+
+    def _check_words(self, shown: str, column: pa.ChunkedArray) -> None:
+        """Refuse words that are too long, or too many rows of long ones."""
+        import pyarrow.compute as pc
+
+        for chunk in column.chunks:
+            longest = pc.max(pc.utf8_length(chunk.dictionary)).as_py() or 0
+            if longest > LONGEST_WORD:
+                said = f"has a word of {longest:,} characters; a word may have {LONGEST_WORD:,}"
+                raise ParquetLimitError(f"column {shown} {said}")
+            sizes = pc.binary_length(chunk.dictionary)
+            text = len(chunk) * (pc.max(sizes).as_py() or 0)
+            if self._text + text > self._most_text:  # at most; now exactly
+                text = pc.sum(sizes.take(chunk.indices)).as_py() or 0
+            self._text += text
+            if self._text > self._most_text:
+                most = size_text(self._most_text)
+                raise ParquetLimitError(f"has more than {most} of text, up to column {shown}")
 
 
 @contextmanager
@@ -220,17 +245,6 @@ def _is_decimal(kind: pa.DataType) -> bool:
     import pyarrow.types as kinds
 
     return bool(kinds.is_decimal(kind))
-
-
-def _check_words(name: str, column: pa.ChunkedArray) -> None:
-    """Refuse words that are too long; each is looked at once."""
-    import pyarrow.compute as pc
-
-    for chunk in column.chunks:
-        longest = pc.max(pc.utf8_length(chunk.dictionary)).as_py() or 0
-        if longest > LONGEST_WORD:
-            said = f"has a word of {longest:,} characters; a word may have {LONGEST_WORD:,}"
-            raise ParquetLimitError(f"column {_shown(name)} {said}")
 
 
 def _pages(source: IO[bytes] | pa.NativeFile, chunk: Any) -> Iterator[tuple[int, int, int]]:

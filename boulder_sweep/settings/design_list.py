@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 import zipfile
 from collections.abc import Callable, Iterator
@@ -361,7 +362,7 @@ def _read_columns(path: Location, problems: ProblemList) -> DesignList:
     label = str(path)
     try:
         with path.open("rb") as source:
-            return _checked_columns(TableFile(source, MAX_TABLE_ROWS), path, problems)
+            return _checked_columns(TableFile(source, MAX_TABLE_ROWS, most_text=math.inf), path, problems)
     except ParquetError as problem:
         raise refuse(label, str(problem)) from None
     except OSError as error:
