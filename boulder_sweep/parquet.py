@@ -47,8 +47,10 @@ _USUAL_PAGE = re.compile(
     re.DOTALL,
 )
 """Header of nearly every page of a result, which `_struct` reads as well, but ten times slower."""
-_DELTA_BYTE_ARRAY = 7
-"""An encoding in which a word repeats the beginning of the word before: its size is known once it is unpacked."""
+_DELTA_LENGTH_BYTE_ARRAY = 6
+_CODED, _SPELLED = {-1, 0, 2, 3, 8}, {-1, 0, _DELTA_LENGTH_BYTE_ARRAY}
+"""Encodings of text that pyarrow reads as codes, and of words that take no more bytes than their pages; -1: of none.
+By DELTA_BYTE_ARRAY a word repeats the beginning of the word before, and may be of any length."""
 _LONGEST_REASON = 150
 _Fields = dict[tuple[int, ...], int]
 """Numbers in a header, by those of the field and of the structs around it."""
@@ -104,8 +106,8 @@ class TableFile:
         self._source, self._most_bytes, self._most_text = source, most_bytes, most_text
         self._taken, self._text, self._pages = 0, 0, 0
         with _in_words():
-            opened = partial(pq.ParquetFile, source, page_checksum_verification=True)
-            self._file = opened()
+            self._opened = partial(pq.ParquetFile, source, page_checksum_verification=True)
+            self._file = self._opened()
             footer, self.schema = self._file.metadata, self._file.schema_arrow
             self.rows: int = footer.num_rows
             if len(self.schema) > MOST_COLUMNS:
@@ -123,8 +125,9 @@ class TableFile:
             self._groups = [footer.row_group(number) for number in range(footer.num_row_groups)]
             if sum(group.num_rows for group in self._groups) != self.rows:
                 raise ParquetError("is damaged: it says two numbers of rows")
-            if text := [field.name for field in self.schema if _is_string(field.type)]:
-                self._file = opened(metadata=footer, read_dictionary=text)
+            self._strings = {field.name for field in self.schema if _is_string(field.type)}
+            if self._strings:
+                self._file = self._opened(metadata=footer, read_dictionary=[*self._strings])
                 self.schema = self._file.schema_arrow
 
     def read(self, columns: Sequence[str] | None = None) -> pa.Table:
@@ -138,9 +141,14 @@ class TableFile:
             The columns have too many bytes, or a word is too long.
         """
         with _in_words():
-            self._check_bytes(columns)
-            # Parts of a result are read in parallel already.
-            table = self._file.read(columns, use_threads=False)
+            spelled = self._check_bytes(columns)
+            file = self._file
+            if spelled:
+                file = self._opened(metadata=file.metadata, read_dictionary=[*(self._strings - spelled)])
+            table = file.read(columns, use_threads=False)  # parts of a result are read in parallel already
+            for index, name in enumerate(table.column_names):
+                if name in spelled:
+                    table = table.set_column(index, self.schema.field(name), table[name].dictionary_encode())
             if len(table) != self.rows:
                 raise ParquetError(f"is damaged: it has {len(table):,} rows, and says {self.rows:,}")
             for name, column in zip(table.column_names, table.columns, strict=True):
@@ -148,14 +156,16 @@ class TableFile:
                     self._check_words(_shown(name), column)
             return table
 
-    def _check_bytes(self, columns: Sequence[str] | None) -> None:
-        """Add up what columns take unpacked, before any is."""
+    def _check_bytes(self, columns: Sequence[str] | None) -> set[str]:
+        """Add up what columns take unpacked, before any is; return those of words that pyarrow cannot read as codes."""
+        spelled = set()
         wanted = self.schema.names if columns is None else set(columns)
         for index, field in enumerate(self.schema):
             if field.name not in wanted:
                 continue
             is_text, width = _is_text(field.type), _width(field.type) or _CODE
             shown = _shown(field.name)
+            encodings = set()
             for group in self._groups:
                 rows, unpacked = 0, 0
                 for size, held, encoding in _pages(self._source, group.column(index)):
@@ -163,8 +173,7 @@ class TableFile:
                     self._pages += 1
                     if self._pages > _MOST_PAGES:
                         raise ParquetLimitError(f"is cut into more than {_MOST_PAGES:,} pages; {_REMEDY}")
-                    if is_text and encoding == _DELTA_BYTE_ARRAY:
-                        raise ParquetLimitError(f"column {shown} is encoded by DELTA_BYTE_ARRAY; {_REMEDY}")
+                    encodings.add(encoding)
                 if rows != group.num_rows:
                     raise ParquetError(f"is damaged: column {shown} has {rows:,} rows, and says {group.num_rows:,}")
                 values = rows * width
@@ -172,6 +181,11 @@ class TableFile:
                 if self._taken > self._most_bytes:
                     most = size_text(self._most_bytes)
                     raise ParquetLimitError(f"has more than {most} once unpacked, up to column {shown}")
+            if is_text and _DELTA_LENGTH_BYTE_ARRAY in encodings:
+                spelled.add(field.name)
+            if is_text and not encodings <= (_SPELLED if field.name in spelled else _CODED):
+                raise ParquetLimitError(f"column {shown} is text in an encoding that is not read; {_REMEDY}")
+        return spelled
 
     def _check_words(self, shown: str, column: pa.ChunkedArray) -> None:
         """Refuse words that are too long, or too many rows of long ones."""
