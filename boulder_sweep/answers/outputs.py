@@ -98,6 +98,9 @@ class AnswerFile:
             raise refusal(f"{path} is {what}; `sweep export` takes it")
         if self.kind and not names >= {spec.name for spec in COLUMNS} - LATER:
             raise refusal(f"{path} is damaged; write it again with `sweep {self.kind}`")
+        designs = self.identity["settings"].get("n_designs")
+        if self.kind and isinstance(designs, int) and len(self.table) > designs:
+            raise refusal(f"{path} is damaged: it has {len(self.table):,} rows for {counted(designs, 'design')}")
         known = [spec.name for spec in COLUMNS] if self.kind else []
         self.columns = tuple(dict.fromkeys((*known, *self.table.column_names)))
         self.lacking = frozenset(self.columns) - frozenset(self.table.column_names)
