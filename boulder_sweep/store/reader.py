@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _THREADS = min(8, os.cpu_count() or 1)
-_MOST_PART_BYTES = 150_000_000
-"""Most bytes of a part, unpacked: three times as many as a full one has; several are read at once."""
+_MOST_PART_ROWS, _MOST_PART_BYTES = 1_000_000, 150_000_000
+"""Most rows of a part, and bytes unpacked: three times as many as a full one has; several are read at once."""
 
 
 def read(out: str | Path | RemotePath, columns: Sequence[str] | None = None, *, verify: bool = True) -> pd.DataFrame:
@@ -287,7 +287,7 @@ class FinishedRows:
                 if wrong := wrong_bytes(content, part):
                     raise self._damaged({name: wrong})
                 source = pa.BufferReader(content)
-            opened = TableFile(source, most_bytes=_MOST_PART_BYTES)
+            opened = TableFile(source, _MOST_PART_ROWS, _MOST_PART_BYTES)
             if set(opened.schema.names) != set(self._stored):
                 raise self._damaged({name: "its columns are not those of the manifest"})
             schema = self._schemas.setdefault("of all parts", opened.schema)  # one step, as of threads
