@@ -135,7 +135,7 @@ SAID = {
     nested: "column (stone|verdict) holds list<element: int8>; a table has plain columns",
     different: "MB once unpacked, up to column ",
     prefixes: "column (stone|verdict) is text in an encoding that is not read; write it again",
-    constant: "(has [0-9,]+ rows; at most (20|1),000,000 are read|has more than [0-9]+ MB once unpacked, up to column )",
+    constant: "(has [0-9,]+ rows; at most (20|1),000,000|has more than [0-9]+ MB once unpacked, up to column )",
     declared: "is damaged: ",
 }
 LISTS = {
