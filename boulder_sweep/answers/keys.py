@@ -39,10 +39,9 @@ LEAST_RATIO = 0.35
 """Smallest embedment tried where the file sets no range, as a share of the height. A boulder that is hardly embedded
 may slide a metre instead of turning, and pass; buried deeper, it is held at its foot and overturns."""
 MILDEST = {"impact_speed_m_s": 0.0, "vehicle_mass_kg": 100.0}
-"""Inputs of which a barrier must hold every smaller value, and where a search for the largest begins (units of the
-table),"""
+"""A barrier must hold every smaller value of these inputs; a search for the largest begins at these (table units)."""
 STRONGEST = ("friction_angle_deg", "embedment_depth_m", "embedment_ratio")
-"""and those of which it must pass at every greater value. A value that passes between two that fail is no answer."""
+"""A barrier must pass at every greater value of these inputs. What passes between two that fail is no answer."""
 MOST_PLACES = 2**53
 """Multiples of the tolerance up to which every one is a number of its own."""
 

@@ -258,7 +258,7 @@ def reserve_lines(result: Reserves, units: str = "si") -> list[str]:
 
 
 def _format_withstood(key: Key, column: str, found: str, units: str) -> Cell:
-    """Return a formatter for a value that is withstood and its distance from that of the design."""
+    """Return a formatter for a withstood value and its distance from the value of the design."""
     answer = answer_cell(key, column, found, units)
 
     def cell(row: Row) -> str:

@@ -158,7 +158,7 @@ def _table(sweep: Sweep, judges: Judges, start: int, stop: int) -> pa.Table:
         columns += [
             (column, key.field.unit, f"{meaning} at which the design passes, as at {safe}; simulated", answers.passes),
             (f"{word}_fails_at", key.field.unit, "value next to it that does not pass", answers.fails),
-            (f"{word}_found", "", "kind of the answer, as of the same question", word_array(answers.kind, WORDS)),
+            (f"{word}_found", "", "kind of the answer, in the words of sweep need", word_array(answers.kind, WORDS)),
             (f"{word}_passes_within", key.field.unit, "where not monotone: all stretches that pass", answers.stretches),
         ]
     speed, mass = withstood["withstands_speed_m_s"], rows["vehicle_mass_kg"]

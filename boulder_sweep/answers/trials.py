@@ -208,7 +208,7 @@ def uncertain_rows(sweep: Sweep, given: InputRows, start: int, stop: int) -> Inp
 
 
 def ungraded(judged: Judged) -> Judged:
-    """Return outcomes at the means of uncertain inputs without a grade, which would be that of the mean soil alone."""
+    """Return outcomes without a grade: at the means of uncertain inputs it would speak for the mean soil alone."""
     none = np.full(len(judged), -1, dtype=np.int32)
     return dataclasses.replace(judged, columns=judged.columns | dict.fromkeys(GRADED, none))
 

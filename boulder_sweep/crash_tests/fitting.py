@@ -1,9 +1,9 @@
 """Spring and damper of a vehicle from a rigid-wall crash pulse (Eqs 49 to 51).
 
 The measured displacement, velocity or acceleration, or several of them at once, is compared by least squares with the
-exact response of a Maxwell element (`boulder_sweep.crash_tests.rigid_wall`). First touch is fitted too, since the zero
-of a record's times is that of its trigger, and so is the speed unless it is given. The zero offset of an acceleration
-is its mean before first touch.
+exact response of a Maxwell element (`boulder_sweep.crash_tests.rigid_wall`). The time of first touch is fitted too,
+since the trigger sets the zero of the times of a record, and the speed unless it is given. The zero offset of an
+acceleration is its mean before first touch.
 
 How sure the result is follows from a jackknife: it is fitted again without each of some 20 stretches of the record in
 turn. Neighbouring samples share their noise, so whole stretches are left out (Kuensch 1989, Ann. Stat. 17, 1217-1241).
@@ -284,8 +284,8 @@ class _Problem:
     def errors(self, unknowns: np.ndarray) -> np.ndarray:
         """Half widths of the 95 % intervals of log k_v, log c_v, first touch and, where not given, v_0, shape (p,).
 
-        By a jackknife over stretches of the record, and at least those of white noise by the curvature, which see a
-        flat valley that the jackknife may not follow.
+        A jackknife over stretches of the record gives them. None is narrower than white noise and the curvature of the
+        misfit would make it: the curvature shows a flat valley that the jackknife may not follow.
         """
         from scipy.stats import t as student
 

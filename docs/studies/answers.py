@@ -81,9 +81,8 @@ def open_readings_words(root: Path) -> str:
     sweep = load(root / UNCERTAIN)
     closed = need(sweep, probability=0.95).frame.passes_at[0]
     open_ = need(sweep, probability=0.95, open_readings=True).frame.passes_at[0]
-    return (
-        f"A chance of 95 % needs {closed:.2f} m by the corrected readings, {open_:.2f} m with the readings left open."
-    )
+    words = f"{open_:.2f} m" if open_ == open_ else "and no depth gives it"
+    return f"A chance of 95 % needs {closed:.2f} m by the corrected readings, {words} with the readings left open."
 
 
 def partial_factors(root: Path) -> str:

@@ -63,7 +63,7 @@ def draw_all(root: Path) -> list[Path]:
     for test, (_, name) in FIGURES.items():
         draw_crash_test(test, {p: t for (own, p), t in found.trajectories.items() if own == test}, named(name))
     draw_readings(readings_study(root / GRID, EVERY), named("readings.png"))
-    need(load(root / SITE), both_readings=True).plot(named("design_chart.png"))
+    need(load(root / SITE)).plot(named("design_chart.png"))
     draw_knife_edge(named("knife_edge.png"))
     example_stone(root).plot(named("stone.png"))
     draw_shapes(named("shapes.png"))

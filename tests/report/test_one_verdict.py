@@ -95,7 +95,8 @@ def test_the_designs_are_of_every_kind(asked):
     _, table = asked
     assert len(table) == DESIGNS
     counts = table.reason.fillna("pass").value_counts()
-    assert counts[["overturns", "slower_truck", "validity"]].min() >= 3, counts
+    for reason, least in (("overturns", 30), ("validity", 20), ("override", 10), ("slower_truck", 1)):
+        assert counts[reason] >= least, counts
     assert (table.verdict == "pass").sum() >= 40
     assert (table.end_time_s > 1.0).sum() >= 40
 
