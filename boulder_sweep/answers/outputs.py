@@ -29,7 +29,7 @@ from boulder_sweep.settings.model import Criterion, completed
 from boulder_sweep.settings.sweep import Axis, DesignList, allowed_in
 from boulder_sweep.store.failures import settings_file
 from boulder_sweep.store.files import MANIFEST_NAME
-from boulder_sweep.store.provenance import identity_in, judged_by, settings_sha256
+from boulder_sweep.store.provenance import check_identity, identity_in, judged_by, settings_sha256
 from boulder_sweep.store.reader import FinishedRows
 from boulder_sweep.store.schema import with_columns
 from boulder_sweep.text import counted, one_line, why
@@ -213,6 +213,10 @@ def _identified(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[pa.
     except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError, RecursionError) as problem:
         # Of a damaged file, pyarrow raises almost anything; names and texts that are not Unicode are ValueErrors.
         raise refusal(f"{path} cannot be read as a Parquet file: {one_line(problem)}") from problem
+    try:
+        check_identity(identity)
+    except ValueError as problem:
+        raise refusal(f"{path} is damaged ({problem}); write it again") from None
     if judged := judged_by(identity):
         warnings.warn(f"{path} was {judged}", OlderRulesWarning, stacklevel=3)
     return table, identity, judged

@@ -20,8 +20,9 @@ from boulder_sweep.locations import Location, RemotePath, location_of
 from boulder_sweep.parquet import ParquetError, ParquetLimitError, TableFile
 from boulder_sweep.settings.problems import shorten
 from boulder_sweep.store.failures import DamagedError, ImpossibleRecordsError, StoreError, refuse_to_guess
+from boulder_sweep.store.files import MANIFEST_NAME
 from boulder_sweep.store.manifest import Manifest, Part, load
-from boulder_sweep.store.provenance import judged_by
+from boulder_sweep.store.provenance import check_identity, judged_by
 from boulder_sweep.store.verify import load_checked, wrong_bytes
 from boulder_sweep.text import counted
 
@@ -176,6 +177,10 @@ class FinishedRows:
 
     def __init__(self, folder: Location):
         manifest = load(folder)
+        try:
+            check_identity(manifest.identity)
+        except ValueError as problem:
+            raise ImpossibleRecordsError(folder / MANIFEST_NAME, str(problem)) from None
         self.rows, self.rows_done, self.identity = manifest.rows, manifest.rows_done, manifest.identity
         today = (*(spec.name for spec in COLUMNS), *manifest.more_columns)
         self.columns = tuple(dict.fromkeys((*today, *manifest.columns)))
