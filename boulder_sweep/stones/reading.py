@@ -1,29 +1,23 @@
-"""Read a scan, an untrusted file: its sizes are checked before anything is loaded.
+"""Read a scan, an untrusted file: its bytes, its surface, and whether a stone has its size.
 
-The formats are read by trimesh, without the materials and pictures that a scan names. Nothing that it names is opened.
+Nothing but the file itself is opened, whatever materials or pictures it names.
 """
 
 from __future__ import annotations
 
 import hashlib
-import io
-import json
 import stat
-import struct
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from boulder_sweep.errors import ScanError
-from boulder_sweep.text import one_line, why
+from boulder_sweep.stones.formats import DECIMATE, READERS, Part, check_count, parts_of
+from boulder_sweep.text import why
 
 MAX_BYTES = 400_000_000
 """Largest file that is read."""
-MAX_FACES = 1_000_000
-"""Most faces, and most vertices, of a scan. A phone makes some 100,000, and a profile needs a few thousand."""
-DECIMATE = "reduce it first, for example to 200,000 faces in MeshLab or CloudCompare"
 LEAST_SIZE_M, LARGEST_SIZE_M = 0.1, 20.0
 """Largest side of a stone that is taken for one [m]."""
 OTHER_UNITS = {"mm": 1e-3, "cm": 1e-2, "in": 0.0254, "ft": 0.3048}
@@ -44,12 +38,15 @@ class ScannedSurface:
         Points [m].
     faces : ndarray of int64, shape (m, 3)
         Triangles, as numbers of points.
+    step_m : float
+        Distance between neighbouring numbers at its largest coordinate, as the file stores them [m].
     """
 
     file: str
     sha256: str
     vertices: np.ndarray
     faces: np.ndarray
+    step_m: float = 0.0
 
 
 def require_trimesh() -> None:
@@ -83,21 +80,16 @@ def read_scan(path: str | Path, metres: float = 1.0) -> ScannedSurface:
     """
     path = Path(path)
     kind = path.suffix.lower()
-    if kind not in _FACES:
-        raise ScanError(f"{path}: is not a scan that can be read; use one of {', '.join(_FACES)}")
+    if kind not in READERS:
+        raise ScanError(f"{path}: is not a scan that can be read; use one of {', '.join(READERS)}")
     require_trimesh()
     data = _content(path)
-    _check_counts(path, _FACES[kind], data)
-    vertices, faces = _loaded(path, kind, data)
-    if not len(faces):
-        raise ScanError(f"{path}: holds no faces; export the scan as a mesh, not as points")
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        raise ScanError(f"{path}: is damaged: a face names a point that is not there")
-    used = vertices[np.unique(faces)]
-    if not np.isfinite(used).all():
-        raise ScanError(f"{path}: is damaged: it has coordinates that are no finite numbers")
-    _check_size(path, used, metres)
-    return ScannedSurface(path.name, hashlib.sha256(data).hexdigest(), vertices * metres, faces)
+    try:
+        vertices, faces, step = _placed(parts_of(kind, data))
+    except ScanError as problem:
+        raise ScanError(f"{path}: {problem}") from None
+    _check_size(path, vertices, metres)
+    return ScannedSurface(path.name, hashlib.sha256(data).hexdigest(), vertices * metres, faces, step * metres)
 
 
 def _content(path: Path) -> bytes:
@@ -123,45 +115,42 @@ def _content(path: Path) -> bytes:
     return data
 
 
-def _check_counts(path: Path, count: Callable[[bytes], int], data: bytes) -> None:
-    """Refuse a file that says that it holds too much, or does not say how much."""
-    try:
-        most = count(data)
-    except (
-        ValueError,
-        LookupError,
-        TypeError,
-        AttributeError,
-        ArithmeticError,
-        struct.error,
-        RecursionError,
-    ) as problem:
-        words = str(problem) if isinstance(problem, ValueError) else one_line(problem)
-        raise ScanError(f"{path}: is damaged or of another format ({words})") from None
-    if most > MAX_FACES:
-        raise ScanError(f"{path}: has {most:,} faces or points; at most {MAX_FACES:,} are read: {DECIMATE}")
+def _placed(parts: list[Part]) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return the points that faces use and the faces of all parts in their places, and the spacing of coordinates."""
+    vertices, faces, step, before = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int64)], 0.0, 0
+    for part in parts:
+        if not len(part.faces):
+            continue
+        if part.faces.min() < 0 or part.faces.max() >= len(part.points):
+            raise ScanError("is damaged: a face names a point that is not there")
+        used, numbers = np.unique(part.faces, return_inverse=True)
+        points, turn = part.points[used], part.placing[:3, :3]
+        with np.errstate(all="ignore"):  # what is no finite number is refused below
+            placed = points.astype(np.float64) @ turn.T + part.placing[:3, 3]
+            mirrored = np.linalg.det(turn) < 0.0
+        if not np.isfinite(placed).all():
+            raise ScanError("is damaged: it has coordinates that are no finite numbers")
+        vertices.append(placed)
+        faces.append(before + numbers.reshape(-1, 3)[:, :: -1 if mirrored else 1])
+        step = max(step, _spacing(points) * float(np.linalg.norm(turn, axis=0).max()))
+        before += len(used)
+        check_count(before, 3)
+    if not before:
+        raise ScanError("holds no faces; export the scan as a mesh, not as points")
+    return np.concatenate(vertices), np.concatenate(faces), step
 
 
-def _loaded(path: Path, kind: str, data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Return points and faces as trimesh reads them."""
-    import logging
+def _spacing(points: np.ndarray) -> float:
+    """Return the distance between neighbouring numbers at the largest coordinate, in the type that holds all.
 
-    import trimesh
-
-    logging.getLogger("trimesh").setLevel(logging.CRITICAL)
-    try:
-        # An open file without a name: trimesh then has no folder in which to look for what the scan names.
-        scene = trimesh.load_scene(io.BytesIO(data), file_type=kind[1:], process=False, skip_materials=True)
-        parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh)]
-        placed = np.cumsum([0, *(len(part.vertices) for part in parts)])
-        vertices = np.concatenate([np.empty((0, 3)), *(part.vertices for part in parts)])
-        numbers = (part.faces + before for part, before in zip(parts, placed[:-1], strict=True))
-        faces = np.concatenate([np.empty((0, 3), dtype=np.int64), *numbers])
-    except (KeyboardInterrupt, MemoryError):
-        raise
-    except Exception as problem:  # of a damaged file, the readers raise almost anything
-        raise ScanError(f"{path}: cannot be read as {kind[1:].upper()} ({one_line(problem)})") from None
-    return np.ascontiguousarray(vertices, dtype=np.float64), np.ascontiguousarray(faces, dtype=np.int64)
+    Coordinates in double precision or as text that are all numbers of single precision were so before.
+    """
+    if points.dtype.kind != "f":
+        return 1.0
+    largest = np.abs(points).max()
+    with np.errstate(over="ignore"):
+        single = points.astype(np.float32)
+    return float(np.spacing(np.float32(largest) if (single == points).all() else largest))
 
 
 def _check_size(path: Path, used: np.ndarray, metres: float) -> None:
@@ -175,65 +164,3 @@ def _check_size(path: Path, used: np.ndarray, metres: float) -> None:
         f"{path}: its largest side is {side * metres:.4g} m; stones of {LEAST_SIZE_M:g} to {LARGEST_SIZE_M:g} m are "
         f"taken{advice}"
     )
-
-
-def _faces_of_ply(data: bytes) -> int:
-    """Return the largest count in the header."""
-    end = data.find(b"end_header", 0, 100_000)
-    if not data[:3].lower() == b"ply" or end < 0:
-        raise ValueError("the header of a PLY file is missing")
-    lines = (line.split() for line in data[:end].splitlines())
-    return max((abs(int(words[2])) for words in lines if len(words) > 2 and words[0] == b"element"), default=0)
-
-
-def _faces_of_stl(data: bytes) -> int:
-    """Return the count that a binary file says and holds, or how many facets a text has."""
-    if len(data) >= 84:
-        count = struct.unpack_from("<I", data, 80)[0]
-        if len(data) == 84 + 50 * count:
-            return int(count)
-    if b"facet" not in data[:10_000].lower():
-        raise ValueError("the file ends early, or is no STL file")
-    return data.count(b"endfacet") + data.count(b"ENDFACET")
-
-
-def _faces_of_obj(data: bytes) -> int:
-    """Return how many faces or points a text has."""
-    if b"\x00" in data[:10_000]:
-        raise ValueError("the file is no text")
-    return max(data.count(b"\nf "), data.count(b"\nv "))
-
-
-def _faces_of_glb(data: bytes) -> int:
-    """Return how many faces or points all meshes have, each as often as it is placed."""
-    magic, _, _, length, chunk = struct.unpack_from("<4sIII4s", data, 0)
-    if magic != b"glTF" or chunk != b"JSON":
-        raise ValueError("the header of a GLB file is missing")
-    header = json.loads(data[20 : 20 + length])
-    if any("uri" in buffer for buffer in header.get("buffers", ())):
-        raise ValueError("it keeps its points in other files; export it as one file")
-    if "KHR_draco_mesh_compression" in header.get("extensionsUsed", ()):
-        raise ValueError("it is compressed; export it without compression")
-    nodes = header.get("nodes", [])
-    children = [child for node in nodes for child in node.get("children", ())]
-    if len(children) != len(set(children)):
-        raise ValueError("a node has two parents")
-    counts = [int(accessor["count"]) for accessor in header.get("accessors", ())]
-    if min(counts, default=0) < 0:
-        raise ValueError("a count is negative")
-    if sum(counts) > 20 * MAX_FACES:
-        return sum(counts)
-    faces = [
-        sum(counts[part.get("indices", part["attributes"]["POSITION"])] // 3 for part in mesh.get("primitives", ()))
-        for mesh in header.get("meshes", ())
-    ]
-    return max(sum(faces[node["mesh"]] for node in nodes if "mesh" in node), max(counts, default=0) // 3)
-
-
-_FACES: dict[str, Callable[[bytes], int]] = {
-    ".ply": _faces_of_ply,
-    ".stl": _faces_of_stl,
-    ".obj": _faces_of_obj,
-    ".glb": _faces_of_glb,
-}
-"""How much a file holds, by the end of its name, read from its bytes without loading it."""

@@ -178,17 +178,16 @@ def _largest_body(vertices: np.ndarray, faces: np.ndarray, file: str) -> tuple[n
     from scipy.sparse.csgraph import connected_components
 
     pairs = faces[:, [0, 1, 1, 2]].reshape(-1, 2)
-    size = len(vertices)
-    graph = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(size, size))
+    shape = len(vertices), len(vertices)
+    graph = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=shape)
     body = connected_components(graph, directed=False)[1][faces[:, 0]]
     names, counts = np.unique(body, return_counts=True)
     if len(names) == 1:
         return faces, 0
     # By the volume of the box around each: a body may be open, and its own volume then says nothing.
-    bulk = np.empty(len(names))
-    order = np.argsort(body, kind="stable")
-    for k, members in enumerate(np.split(order, np.cumsum(counts)[:-1])):
-        bulk[k] = np.prod(np.ptp(vertices[faces[members]].reshape(-1, 3), axis=0))
+    starts, corners = np.cumsum(counts) - counts, vertices[faces[np.argsort(body, kind="stable")]]
+    size = np.maximum.reduceat(corners.max(axis=1), starts) - np.minimum.reduceat(corners.min(axis=1), starts)
+    bulk = size.prod(axis=1)
     largest = int(bulk.argmax())
     others = float(np.delete(bulk, largest).sum() / max(bulk[largest], 1e-300))
     if others > MOST_CRUMBS:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from boulder_sweep.drawing import draw
+from boulder_sweep.errors import ScanError
 from boulder_sweep.stones.reading import read_scan
 from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.stones.solid import solid_of
@@ -17,6 +18,11 @@ from boulder_sweep.stones.standing import Standing, Stone
 POINT = ("height_m", "width_m", "near_m", "far_m")
 """Entries of a point of a profile."""
 USUAL_ROCK_KG_M3 = (2000.0, 3300.0)
+MUCH_CLOSED = 0.02
+"""Part of the surface in holes from which the file may have been misread."""
+COARSE_M = 1e-3
+"""Spacing of coordinates from which their rounding is said [m]."""
+NEARER = "subtract a point near the stone from all coordinates before you export them"
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +39,8 @@ class ScannedStone:
         Its density.
     density_from : str
         Where that comes from: ``mass``, ``density`` or ``assumed``.
+    step_m : float
+        Spacing of the coordinates in the scan [m].
     """
 
     file: str
@@ -40,6 +48,7 @@ class ScannedStone:
     stone: Stone
     density_kg_m3: float
     density_from: str
+    step_m: float
 
     @property
     def mass_kg(self) -> float:
@@ -61,6 +70,13 @@ class ScannedStone:
                 f"its density is {self.density_kg_m3:,.0f} kg/m³, and rock has {low:,.0f} to {high:,.0f}: the mass, "
                 "the scale of the scan or its unit is wrong"
             )
+        if self.stone.solid.closed > MUCH_CLOSED:
+            cautions.append(
+                f"{self.stone.solid.closed:.0%} of its surface was added to close holes: if the scan has no such "
+                "holes, its file may have been misread; export it as binary PLY and compare the volumes"
+            )
+        if self.step_m > COARSE_M:
+            cautions.append(f"{_coarse(self.step_m)}: volume and sides are rounded; {NEARER}")
         return cautions
 
     def plot(self, path: str | Path) -> None:
@@ -139,10 +155,21 @@ def scanned(
         The scan cannot be used.
     """
     scan = read_scan(path, metres)
-    solid = solid_of(scan)
+    try:
+        solid = solid_of(scan)
+    except ScanError:
+        if scan.step_m > COARSE_M:  # which makes holes and flat faces
+            raise ScanError(f"{scan.file}: {_coarse(scan.step_m)}, too far for a stone; {NEARER}") from None
+        raise
     stone = Stone(solid, scan.file)
     if mass_kg is not None:
-        return ScannedStone(scan.file, scan.sha256, stone, mass_kg / solid.volume, "mass")
-    if density_kg_m3 is not None:
-        return ScannedStone(scan.file, scan.sha256, stone, density_kg_m3, "density")
-    return ScannedStone(scan.file, scan.sha256, stone, ROCK_KG_M3, "assumed")
+        density, density_from = mass_kg / solid.volume, "mass"
+    elif density_kg_m3 is not None:
+        density, density_from = density_kg_m3, "density"
+    else:
+        density, density_from = ROCK_KG_M3, "assumed"
+    return ScannedStone(scan.file, scan.sha256, stone, density, density_from, scan.step_m)
+
+
+def _coarse(step_m: float) -> str:
+    return f"the numbers in which it keeps its coordinates lie {1e3 * step_m:,.3g} mm apart, so far from the origin"
