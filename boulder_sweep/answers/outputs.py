@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pyarrow as pa
@@ -26,6 +27,7 @@ from boulder_sweep.parquet import ParquetError, TableFile
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import Criterion, completed
+from boulder_sweep.settings.stored import check_entries
 from boulder_sweep.settings.sweep import Axis, DesignList, allowed_in
 from boulder_sweep.store.failures import settings_file
 from boulder_sweep.store.files import MANIFEST_NAME
@@ -52,6 +54,32 @@ OF_ONE_FILE = {"repeat", "commit", "cpu"}
 """Entries of the metadata by which equal files differ."""
 _IDENTITY = {"settings", "settings_sha256", "kernels_sha256", "readings", "control", "versions"}
 """Entries of the metadata that every such file has."""
+
+
+@dataclass
+class _Need:
+    """What `sweep need` is asked."""
+
+    asked: str
+    tolerance: float
+    margin: float
+    probability: float | None = None
+    robust: bool = False
+
+
+@dataclass
+class _Chances:
+    """What `sweep uncertainty` is asked."""
+
+    asked: Literal["p_pass"]
+    half_width: float
+    confidence: float
+    margin: float
+    seed: int
+    most: int
+
+
+_QUESTIONS = {NEED: _Need, UNCERTAINTY: _Chances}
 OF_ANSWERS = "`sweep need`, `capacity` or `uncertainty`"
 
 
@@ -98,13 +126,25 @@ class AnswerFile:
             raise refusal(f"{path} is {what}; `sweep export` takes it")
         if self.kind and not names >= {spec.name for spec in COLUMNS} - LATER:
             raise refusal(f"{path} is damaged; write it again with `sweep {self.kind}`")
-        designs = self.identity["settings"].get("n_designs")
-        if self.kind and isinstance(designs, int) and len(self.table) > designs:
-            raise refusal(f"{path} is damaged: it has {len(self.table):,} rows for {counted(designs, 'design')}")
+        self._check(names)
         known = [spec.name for spec in COLUMNS] if self.kind else []
         self.columns = tuple(dict.fromkeys((*known, *self.table.column_names)))
         self.lacking = frozenset(self.columns) - frozenset(self.table.column_names)
         self.rows = self.rows_done = len(self.table)
+
+    def _check(self, names: set[str]) -> None:
+        """Refuse a question that no command asks, and more answers than there are designs."""
+        designs = self.identity["settings"]["n_designs"]
+        if self.kind and len(self.table) > designs:
+            what = f"it has {len(self.table):,} rows for {counted(designs, 'design')}"
+            raise self._refusal(f"{self.path} is damaged: {what}")
+        try:
+            if self.kind in _QUESTIONS:
+                check_entries(self.question, _QUESTIONS[self.kind], "question")
+            if self.kind == NEED and not (self.question["asked"] in names and self.question["tolerance"] > 0.0):
+                raise ValueError("question.asked is no answer of the file")
+        except ValueError as problem:
+            raise self._refusal(f"{self.path} is damaged ({problem}); write it again") from None
 
     def tables(self, columns: Sequence[str] | None = None, *, verify: bool = True) -> Iterator[pa.Table]:
         """Yield all rows, or some of their columns, at once."""
@@ -137,17 +177,9 @@ class AnswerFile:
         Raises
         ------
         BoulderSweepError
-            Another version wrote them, with other settings.
+            The files beside them are those of other answers.
         """
-        try:
-            return self._answers(asked_sweep(self.identity, self.table))
-        except (LookupError, TypeError, ValueError) as unfamiliar:
-            raise self._refusal(
-                f"{self.path} was written by another version, whose settings are not those of this one ({unfamiliar}); "
-                "run it again"
-            ) from unfamiliar
-
-    def _answers(self, sweep: Sweep) -> Need | Reserves | Uncertainty:
+        sweep = asked_sweep(self.identity, self.table)
         if self.kind == CAPACITY:
             from boulder_sweep.answers.reserves import Reserves
 
@@ -167,8 +199,11 @@ class AnswerFile:
         tables = {}
         for name in ("indices", "samples"):
             file = self.path.with_suffix(f".{name}.parquet")
-            there = file.exists()
-            tables[name] = _rows(file, self._refusal) if there else pa.table({"design_id": pa.array([], pa.int64())})
+            tables[name] = pa.table({"design_id": pa.array([], pa.int64())})
+            if file.exists():
+                tables[name] = _rows(file, self._refusal)
+                if identity_in(tables[name].schema.metadata) != identity_in(self.table.schema.metadata):
+                    raise self._refusal(f"{file} belongs to other answers than {self.path}; write both again")
         return Uncertainty(sweep, self.table, tables["indices"], tables["samples"], self.question["seed"])
 
 

@@ -13,7 +13,7 @@ from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from boulder_sweep.settings.distributions import Distribution
-from boulder_sweep.settings.fields import BY_NAME, INPUTS, MAX_ELEMENTS
+from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT, INPUTS, MAX_ELEMENTS
 from boulder_sweep.settings.model import (
     ACCURACIES,
     PRESETS,
@@ -32,6 +32,8 @@ from boulder_sweep.settings.sweep import IMPACT_HEIGHT_RULE, Heading, derived_wo
 
 _USUAL = Model()
 _NAMES = {entry.name for entry in INPUTS}
+_ALWAYS = (EMBEDMENT, *((entry.name,) for entry in INPUTS if not (entry.optional or entry.name in EMBEDMENT)))
+"""Inputs of which all settings have one."""
 _WORDS = {
     **{switch: {PRINTED, corrected} for switch, corrected in SWITCHES.items()},
     "accuracy": {*ACCURACIES},
@@ -135,10 +137,21 @@ def check_stored(settings: Any) -> None:
     ValueError
         An entry is missing, unknown, of another kind, or no value that a settings file may hold; the text names it.
     """
-    if wrong := next(_mistakes(settings, _Settings, "settings"), ""):
-        raise ValueError(shorten(wrong, 200))
+    check_entries(settings, _Settings, "settings")
     if wrong := next(_inconsistencies(settings), ""):
         raise ValueError(shorten(f"settings.{wrong}", 200))
+
+
+def check_entries(entries: Any, kind: type[Any], path: str) -> None:
+    """Check plain data by a dataclass: which entries there are, and by their names what they may hold.
+
+    Raises
+    ------
+    ValueError
+        As of `check_stored`; `path` names the data.
+    """
+    if wrong := next(_mistakes(entries, kind, path), ""):
+        raise ValueError(shorten(wrong, 200))
 
 
 def check_control(control: dict[str, Any], readings: dict[str, Any]) -> None:
@@ -217,6 +230,12 @@ def _inconsistencies(settings: dict[str, Any]) -> Iterator[str]:
     inputs, labels, order, count = (settings.get(name, {}) for name in ("inputs", "labels", "order", "n_designs"))
     for name in [name for part in (inputs, settings.get("distributions", {})) for name in part if name not in _NAMES]:
         yield f"inputs.{name} is no input"
+    for name, value in inputs.items():
+        if isinstance(value, str) and name != "impact_height_m":
+            yield f"inputs.{name} is no number"
+    for names in _ALWAYS:
+        if not {*names} & inputs.keys():
+            yield f"inputs.{names[-1]} is missing"
     lengths = {name: _length(value) for name, value in inputs.items() if isinstance(value, list | dict)}
     sets = {name: _length(value) for name, value in labels.items()}
     if order == "table":
