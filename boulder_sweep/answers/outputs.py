@@ -34,7 +34,7 @@ from boulder_sweep.store.files import MANIFEST_NAME
 from boulder_sweep.store.provenance import check_identity, identity_in, judged_by, settings_sha256
 from boulder_sweep.store.reader import FinishedRows
 from boulder_sweep.store.schema import with_columns
-from boulder_sweep.text import counted, one_line, why
+from boulder_sweep.text import counted, why
 
 if TYPE_CHECKING:
     from boulder_sweep.answers.reserves import Reserves
@@ -247,7 +247,7 @@ def _identified(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[pa.
         raise
     except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError, RecursionError) as problem:
         # Of a damaged file, pyarrow raises almost anything; names and texts that are not Unicode are ValueErrors.
-        raise refusal(f"{path} cannot be read as a Parquet file: {one_line(problem)}") from problem
+        raise refusal(f"{path} is damaged; write it again") from problem
     try:
         check_identity(identity)
     except ValueError as problem:

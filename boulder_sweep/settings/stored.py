@@ -185,6 +185,8 @@ def _mistakes(value: Any, kind: Any, path: str) -> Iterator[str]:
     """Yield what is wrong with a value by the type that it should have, and with everything in it by its name."""
     choices = get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
     fitting = [choice for choice in choices if _is_of(value, choice)]
+    if len(fitting) > 1:  # the one by which least is wrong
+        fitting = [next((one for one in fitting if not any(_mistakes(value, one, path))), fitting[0])]
     if not fitting:
         yield f"{path} holds {str(value)[:60]!r}, which no settings give"
         return

@@ -175,10 +175,17 @@ def test_two_writers_in_one_process(tmp_path):
 
 def test_what_differs_is_said(tmp_path):
     out = finished_folder(tmp_path / "out")
-    other = {**IDENTITY, "settings": {"soil": 2}, "settings_sha256": "b" * 64, "versions": {"numba": "2"}}
+    settings = {**IDENTITY["settings"], "name": "another"}
+    other = {
+        **IDENTITY,
+        "settings": settings,
+        "settings_sha256": "b" * 64,
+        "versions": {**IDENTITY["versions"], "numba": "2"},
+    }
     with pytest.raises(SettingsDifferError) as refused:
         open_folder(out, identity=other, resume=True)
-    assert refused.value.differences == ["settings.soil: 1 -> 2", 'versions.numba: "1" -> "2"']
+    version = IDENTITY["versions"]["numba"]
+    assert refused.value.differences == ['settings.name: "test" -> "another"', f'versions.numba: "{version}" -> "2"']
     assert not status(out).running
     with pytest.raises(SettingsDifferError, match="rows: 441 -> 442"):
         open_folder(out, rows=442, resume=True)
