@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from boulder_sweep.answers.keys import key_of
 from boulder_sweep.answers.lightest import DEPTH, SIDES
@@ -23,16 +23,18 @@ from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning
 from boulder_sweep.impact.explanation import model_of
 from boulder_sweep.judge.accuracy import known_control
 from boulder_sweep.locations import Location, RemotePath
+from boulder_sweep.parquet import ParquetError, TableFile
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import Criterion, completed
+from boulder_sweep.settings.stored import check_entries
 from boulder_sweep.settings.sweep import Axis, DesignList, allowed_in
 from boulder_sweep.store.failures import settings_file
 from boulder_sweep.store.files import MANIFEST_NAME
-from boulder_sweep.store.provenance import identity_in, judged_by, settings_sha256
+from boulder_sweep.store.provenance import check_identity, identity_in, judged_by, settings_sha256
 from boulder_sweep.store.reader import FinishedRows
 from boulder_sweep.store.schema import with_columns
-from boulder_sweep.text import counted, one_line
+from boulder_sweep.text import counted, why
 
 if TYPE_CHECKING:
     from boulder_sweep.answers.reserves import Reserves
@@ -52,6 +54,32 @@ OF_ONE_FILE = {"repeat", "commit", "cpu"}
 """Entries of the metadata by which equal files differ."""
 _IDENTITY = {"settings", "settings_sha256", "kernels_sha256", "readings", "control", "versions"}
 """Entries of the metadata that every such file has."""
+
+
+@dataclass
+class _Need:
+    """What `sweep need` is asked."""
+
+    asked: str
+    tolerance: float
+    margin: float
+    probability: float | None = None
+    robust: bool = False
+
+
+@dataclass
+class _Chances:
+    """What `sweep uncertainty` is asked."""
+
+    asked: Literal["p_pass"]
+    half_width: float
+    confidence: float
+    margin: float
+    seed: int
+    most: int
+
+
+_QUESTIONS = {NEED: _Need, UNCERTAINTY: _Chances}
 OF_ANSWERS = "`sweep need`, `capacity` or `uncertainty`"
 
 
@@ -84,7 +112,7 @@ class AnswerFile:
 
     def __init__(self, path: Path, refusal: type[BoulderSweepError], *, histories: bool = False) -> None:
         self.path = path
-        self.table, identity, self.judged_by = _read_parquet(path, refusal)
+        self.table, identity, self.judged_by = _identified(path, refusal)
         self._refusal = refusal
         try:
             self.question: dict[str, Any] = json.loads(identity.pop("question", "{}"))
@@ -98,10 +126,25 @@ class AnswerFile:
             raise refusal(f"{path} is {what}; `sweep export` takes it")
         if self.kind and not names >= {spec.name for spec in COLUMNS} - LATER:
             raise refusal(f"{path} is damaged; write it again with `sweep {self.kind}`")
+        self._check(names)
         known = [spec.name for spec in COLUMNS] if self.kind else []
         self.columns = tuple(dict.fromkeys((*known, *self.table.column_names)))
         self.lacking = frozenset(self.columns) - frozenset(self.table.column_names)
         self.rows = self.rows_done = len(self.table)
+
+    def _check(self, names: set[str]) -> None:
+        """Refuse a question that no command asks, and more answers than there are designs."""
+        designs = self.identity["settings"]["n_designs"]
+        if self.kind and len(self.table) > designs:
+            what = f"it has {len(self.table):,} rows for {counted(designs, 'design')}"
+            raise self._refusal(f"{self.path} is damaged: {what}")
+        try:
+            if self.kind in _QUESTIONS:
+                check_entries(self.question, _QUESTIONS[self.kind], "question")
+            if self.kind == NEED and not (self.question["asked"] in names and self.question["tolerance"] > 0.0):
+                raise ValueError("question.asked is no answer of the file")
+        except ValueError as problem:
+            raise self._refusal(f"{self.path} is damaged ({problem}); write it again") from None
 
     def tables(self, columns: Sequence[str] | None = None, *, verify: bool = True) -> Iterator[pa.Table]:
         """Yield all rows, or some of their columns, at once."""
@@ -134,17 +177,9 @@ class AnswerFile:
         Raises
         ------
         BoulderSweepError
-            Another version wrote them, with other settings.
+            The files beside them are those of other answers.
         """
-        try:
-            return self._answers(asked_sweep(self.identity, self.table))
-        except (LookupError, TypeError, ValueError) as unfamiliar:
-            raise self._refusal(
-                f"{self.path} was written by another version, whose settings are not those of this one ({unfamiliar}); "
-                "run it again"
-            ) from unfamiliar
-
-    def _answers(self, sweep: Sweep) -> Need | Reserves | Uncertainty:
+        sweep = asked_sweep(self.identity, self.table)
         if self.kind == CAPACITY:
             from boulder_sweep.answers.reserves import Reserves
 
@@ -164,11 +199,15 @@ class AnswerFile:
         tables = {}
         for name in ("indices", "samples"):
             file = self.path.with_suffix(f".{name}.parquet")
-            tables[name] = pq.read_table(file) if file.exists() else pa.table({"design_id": pa.array([], pa.int64())})
+            tables[name] = pa.table({"design_id": pa.array([], pa.int64())})
+            if file.exists():
+                tables[name] = _rows(file, self._refusal)
+                if identity_in(tables[name].schema.metadata) != identity_in(self.table.schema.metadata):
+                    raise self._refusal(f"{file} belongs to other answers than {self.path}; write both again")
         return Uncertainty(sweep, self.table, tables["indices"], tables["samples"], self.question["seed"])
 
 
-def _read_parquet(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[pa.Table, dict[str, Any], str]:
+def _identified(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[pa.Table, dict[str, Any], str]:
     """Read a Parquet file that a command wrote, and warn where other rules than those of this version judged it.
 
     Parameters
@@ -194,8 +233,8 @@ def _read_parquet(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[p
     """
     if advice := settings_file(path):
         raise refusal(advice)
+    table = _rows(Path(path), refusal)
     try:
-        table = pq.read_table(path, page_checksum_verification=True)
         table.validate(full=True)
         kinds = {field.name: field.type for field in table.schema}
         identity = identity_in(table.schema.metadata)
@@ -208,10 +247,25 @@ def _read_parquet(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[p
         raise
     except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError, RecursionError) as problem:
         # Of a damaged file, pyarrow raises almost anything; names and texts that are not Unicode are ValueErrors.
-        raise refusal(f"{path} cannot be read as a Parquet file: {one_line(problem)}") from problem
+        raise refusal(f"{path} is damaged; write it again") from problem
+    try:
+        check_identity(identity)
+    except ValueError as problem:
+        raise refusal(f"{path} is damaged ({problem}); write it again") from None
     if judged := judged_by(identity):
         warnings.warn(f"{path} was {judged}", OlderRulesWarning, stacklevel=3)
     return table, identity, judged
+
+
+def _rows(path: Path, refusal: type[BoulderSweepError]) -> pa.Table:
+    """Return all rows of a Parquet file, or refuse it."""
+    try:
+        with path.open("rb") as file:
+            return TableFile(file).read()
+    except ParquetError as problem:
+        raise refusal(f"{path}: {problem}") from problem
+    except OSError as problem:
+        raise refusal(f"{path} cannot be read: {why(problem)}") from problem
 
 
 def _is_of(type_: str, kind: pa.DataType) -> bool:

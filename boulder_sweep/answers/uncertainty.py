@@ -39,6 +39,7 @@ from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.locations import Location
 from boulder_sweep.runner.pool import THREADING, Pool, pool
+from boulder_sweep.store.provenance import PREFIX
 from boulder_sweep.text import ProgressCallback
 
 if TYPE_CHECKING:
@@ -100,8 +101,10 @@ class Uncertainty(Result):
         """
         target = checked_parquet(path)
         files = [write_parquet(self.arrow, target)]
+        identity = {key: value for key, value in self.arrow.schema.metadata.items() if key.startswith(PREFIX.encode())}
         for name, table in (("indices", self.indices), ("samples", self.samples)):
             if len(table):
+                table = table.replace_schema_metadata(identity)
                 files.append(write_parquet(table, target.with_suffix(f".{name}.parquet")))
         return files
 

@@ -171,9 +171,7 @@ def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, 
         if trajectory is not None:
             explanation.trajectory.to_parquet(trajectory)
     elif plot is not None or trajectory is not None:
-        say(
-            f"note: the design cannot be computed{' again' if explanation.unfamiliar else ''}; there is no time history"
-        )
+        say("note: the design cannot be computed; there is no time history")
     if as_json:
         show(json.dumps(explanation.as_dict(units)))
         return 0
@@ -185,9 +183,7 @@ def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, 
         show(f"changed since: {line}")
     if explanation.judged_by:
         show(f"as stored, the row was {explanation.judged_by}")
-    if explanation.unfamiliar:
-        show(f"not computed again: {explanation.unfamiliar}")
-    elif not explanation.unequal:
+    if not explanation.unequal:
         show("computed again: the same to the last bit")
     return 0
 

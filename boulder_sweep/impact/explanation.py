@@ -59,8 +59,6 @@ class Explanation:
         The impact over time; None where the design cannot be computed.
     judged_by : str
         By whose rules the row was judged; empty where by those of this version.
-    unfamiliar : str
-        Why a row of another version cannot be computed again; `recomputed` is empty then.
     """
 
     name: str
@@ -71,7 +69,6 @@ class Explanation:
     changed: tuple[str, ...]
     trajectory: Trajectory | None
     judged_by: str = ""
-    unfamiliar: str = ""
 
     @property
     def unequal(self) -> tuple[str, ...]:
@@ -89,11 +86,10 @@ class Explanation:
             "design_id": self.design_id,
             "inputs": shown_values(self.inputs, units),
             "outcomes": shown_values(self.stored, units),
-            "same_bits": not self.unequal and not self.unfamiliar,
+            "same_bits": not self.unequal,
             "unequal": {name: [were[name], are[name]] for name in were},
             "changed_since": list(self.changed),
             "judged_by": self.judged_by,
-            "unfamiliar": self.unfamiliar,
         }
 
 
@@ -132,14 +128,10 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
         "stored": {name: value for name, value in values.items() if isinstance(BY_NAME.get(name), OutcomeColumn)},
         "judged_by": judged_by(there),
     }
-    try:
-        control, readings = known_control(there["control"]), Readings(**there["readings"])
-        settings = completed(there["settings"])
-        sweep = one_design(settings, inputs, control, values["step_s"] or reported_step_s(control))
-        stated = (there["settings"], there["readings"], there["control"], there.get("accuracy"))
-    except (LookupError, TypeError, ValueError) as unfamiliar:
-        why = f"its settings are not those of this version ({unfamiliar})"
-        return Explanation(name=folder.name, recomputed={}, changed=(), trajectory=None, unfamiliar=why, **common)
+    control, readings = known_control(there["control"]), Readings(**there["readings"])
+    settings = completed(there["settings"])
+    sweep = one_design(settings, inputs, control, values["step_s"] or reported_step_s(control))
+    stated = (there["settings"], there["readings"], there["control"], there.get("accuracy"))
     limits = limits_of(sweep)._replace(rotation=control.theta_limit)
     block = sweep.block(0, 1)
     laws = sweep.model.second_opinion if can_be_asked(sweep) else ()

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_kernels import Outcome
+from boulder_kernels import Outcome, Readings
 from boulder_sweep.columns import ColumnSpec
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import HistoryFileError
 from boulder_sweep.impact.history import MODE_NAMES, EnergyLedger, Motion, forces_along, ledger_of
 from boulder_sweep.judge.judged import Judged
+from boulder_sweep.settings.model import ReadingChoice
 from boulder_sweep.store.files import check_target, replacing
 from boulder_sweep.text import printable, why
 
@@ -269,7 +270,8 @@ class Trajectory:
             array = pa.array(values)
             arrays.append(array.dictionary_encode() if spec.type == "dictionary" else array)
             fields.append(pa.field(name, types[spec.type], metadata={"unit": spec.unit, "meaning": spec.meaning}))
-        run_identity = identity(self.settings, self.settings["model"]["readings"], self.motion.control._asdict())
+        readings = Readings(*ReadingChoice(**self.settings["model"]["readings"]).corrected)
+        run_identity = identity(self.settings, readings._asdict(), self.motion.control._asdict())
         repeat = f"boulder_sweep.simulate({self.name!r}, {self.design_id})"
         return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=file_metadata(run_identity, repeat)))
 

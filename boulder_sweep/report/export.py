@@ -31,6 +31,8 @@ MOST_SHEET_ROWS = 1_048_575
 JUDGED_BY = Shown(
     "judged_by", "judged_by", "", 1.0, "by whose rules the verdict was found; a column of tables of other versions only"
 )
+PIECE = 10_000
+"""Rows that become cells at once."""
 NUMBER_FORMATS = {
     "m": "0.000",
     "ft": "0.000",
@@ -198,10 +200,17 @@ def _csv(target: BinaryIO, finished: Exportable, units: str) -> int:
     for columns, table in _tables(finished, units):
         if rows == 0:
             writer.writerow(_cells(column.name for column in columns))
-        writer.writerows(zip(*(_cells(column.to_pylist()) for column in table.columns), strict=True))
+        writer.writerows(_rows(table))
         rows += len(table)
     file.detach()
     return rows
+
+
+def _rows(table: pa.Table) -> Iterator[tuple[Any, ...]]:
+    """Yield the rows as cells; not all are in memory at once."""
+    for first in range(0, len(table), PIECE):
+        columns = table.slice(first, PIECE).columns
+        yield from zip(*(_cells(column.to_pylist()) for column in columns), strict=True)
 
 
 def _cells(values: Iterable[Any]) -> list[Any]:
@@ -256,7 +265,7 @@ def _sheet(target: BinaryIO, finished: Exportable, units: str) -> int:
                 names = _cells(column.name for column in columns)
                 designs.append([_head(designs, text, bool(wide)) for text, wide in zip(names, words, strict=True)])
                 styled = [_styled(designs, column, bool(wide)) for column, wide in zip(columns, words, strict=True)]
-            for values in zip(*(_cells(column.to_pylist()) for column in table.columns), strict=True):
+            for values in _rows(table):
                 designs.append([_filled(cell, value) for cell, value in zip(styled, values, strict=True)])
             rows += len(table)
         if rows:
@@ -289,7 +298,8 @@ def _longest(column: pa.ChunkedArray) -> int:
 
     if not (pa.types.is_dictionary(column.type) or pa.types.is_string(column.type)):
         return 0
-    longest = pc.max(pc.utf8_length(column.cast("string"))).as_py() or 1
+    words = [chunk.dictionary if pa.types.is_dictionary(column.type) else chunk for chunk in column.chunks]
+    longest = max((pc.max(pc.utf8_length(those)).as_py() or 1 for those in words), default=1)
     return min(int(longest), MOST_CHARACTERS)
 
 

@@ -119,28 +119,22 @@ def write_report(
         raise ReportError(str(missing)) from missing
     identity = rows.finished.identity
     notes = _notes_on_rules(rows.finished.judged_by)
-    try:
-        settings, control = completed(identity["settings"]), known_control(identity["control"])
-        readings = Readings(**identity["readings"])
-        text = assembled(
-            heading=Heading(**{**settings.get(SECTION, {}), **heading.given()}).given(),
-            settings=settings,
-            control=control,
-            readings=readings,
-            start=chosen[0]["inputs"],
-            sentences=answer.sentences,
-            answers=answers_table(rows),
-            rows=rows,
-            chosen=chosen,
-            facts=_facts(identity, command, str(out)),
-            notes=[*notes, *_general_notes(settings, control, units)],
-            units=units,
-        )
-    except (KeyError, TypeError) as unfamiliar:
-        raise ReportError(
-            f"{out} was written by another version, whose settings are not those of this one ({unfamiliar}); "
-            "run it again"
-        ) from None
+    settings, control = completed(identity["settings"]), known_control(identity["control"])
+    readings = Readings(**identity["readings"])
+    text = assembled(
+        heading=Heading(**{**settings.get(SECTION, {}), **heading.given()}).given(),
+        settings=settings,
+        control=control,
+        readings=readings,
+        start=chosen[0]["inputs"],
+        sentences=answer.sentences,
+        answers=answers_table(rows),
+        rows=rows,
+        chosen=chosen,
+        facts=_facts(identity, command, str(out)),
+        notes=[*notes, *_general_notes(settings, control, units)],
+        units=units,
+    )
     return _written(target, text)
 
 

@@ -20,6 +20,7 @@ from boulder_sweep.errors import BackendError, ClusterLostError
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.firmness import firmness_of
 from boulder_sweep.locations import Location
+from boulder_sweep.parquet import ParquetError, TableFile
 from boulder_sweep.runner.estimate import (
     Estimate,
     blocks,
@@ -153,7 +154,6 @@ class Committer(threading.Thread):
     def _merge(self) -> None:
         """Replace small parts, once all rows are there, by those that a fast run writes directly."""
         import pyarrow as pa  # heavy, and only needed where there are small parts
-        import pyarrow.parquet as pq
 
         from boulder_sweep.store.schema import judged_rows
 
@@ -163,8 +163,8 @@ class Committer(threading.Thread):
             try:
                 contents = [(self._folder.path / name).read_bytes() for name in names]
                 sources = [pa.BufferReader(content) for content in contents]
-                tables = [pq.read_table(source, page_checksum_verification=True) for source in sources]
-            except (OSError, pa.ArrowException) as problem:
+                tables = [TableFile(source).read() for source in sources]
+            except (OSError, ParquetError) as problem:
                 self._folder.check()
                 raise DamagedError(f"{self._folder.path} was damaged during the run: {problem}") from problem
             first = self._folder.manifest.parts[names[0]].first

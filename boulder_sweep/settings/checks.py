@@ -49,16 +49,16 @@ SHORT_OF_FRONT = (
 def check_complete(entries: Entries) -> None:
     """Report missing entries, entries given twice, and axes beside a table."""
     # What a table that could not be read may contain is unknown.
-    unread_table = entries.root.get("table") is not None and entries.table is None
+    table_refused = entries.root.get("table") is not None and entries.table is None
     present = {field.path for field in fields.INPUTS if field.name in entries.listed} | entries.given
     for field in fields.INPUTS:
         if field.name in entries.listed and field.path in entries.given:
             entries.report(field.path, f"is given here and as column {field.name} of the table; remove one")
         if field.name == "boulder_density_kg_m3" and entries.gives_mass:
             continue  # that of most rocks is assumed
-        if not field.optional and not unread_table and field.path not in present | entries.misspelled:
+        if not field.optional and not table_refused and field.path not in present | entries.misspelled:
             entries.report(field.path, "is required and missing")
-    _check_embedment(entries, present, unread_table)
+    _check_embedment(entries, present, table_refused)
     if entries.root.get("table") is not None:
         for name, leaf in entries.leaves.items():
             if leaf.is_axis:
@@ -112,13 +112,13 @@ def _far_words(values: np.ndarray, field: Field, written: str = "") -> str:
     return f"{range_words(low, high, field.unit, written)} is {far} the usual {usual} ({field.usual.remark})"
 
 
-def _check_embedment(entries: Entries, present: set[str], unread_table: bool) -> None:
+def _check_embedment(entries: Entries, present: set[str], table_refused: bool) -> None:
     ways = [BY_NAME[name] for name in fields.EMBEDMENT]
     given = [field.path for field in ways if field.path in present]
     keys = " or ".join(field.key for field in ways)
     if len(given) > 1:
         entries.report(given[1], f"give {keys}, not both")
-    elif not given and not unread_table and not {field.path for field in ways} & entries.misspelled:
+    elif not given and not table_refused and not {field.path for field in ways} & entries.misspelled:
         entries.problems.add(entries.position_of(ways[0].path), "site", f"{keys} is required and missing")
 
 

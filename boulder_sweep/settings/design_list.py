@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 import zipfile
 from collections.abc import Callable, Iterator
@@ -13,6 +14,7 @@ import numpy as np
 
 from boulder_sweep.designs import Label
 from boulder_sweep.locations import Location, LocationError, is_url, location_of, source_of
+from boulder_sweep.parquet import MOST_ROWS, ParquetError, TableFile
 from boulder_sweep.settings.problems import (
     Position,
     ProblemList,
@@ -41,7 +43,9 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 MAX_TABLE_BYTES = 2_000_000_000
-MAX_TABLE_ROWS = 20_000_000
+MAX_TABLE_ROWS = MOST_ROWS
+MOST_WORDS = 2_000_000
+"""Most different words of a column of a Parquet file, which can be written in a few bytes."""
 MAX_UNPACKED_BYTES = 1_000_000_000
 """Largest spreadsheet once it is unpacked."""
 MAX_CELL = 32_767
@@ -57,7 +61,7 @@ Origin = tuple[int, str]
 """Where a row stands: number of the line, and its text where that is needed to find a cell."""
 
 
-def read_table(node: Scalar, folder: Path, problems: ProblemList) -> DesignList | None:
+def read_designs(node: Scalar, folder: Path, problems: ProblemList) -> DesignList | None:
     """Return the designs of a table; mistakes go to `problems`.
 
     Parameters
@@ -354,66 +358,72 @@ def _filled(texts: list[str]) -> int:
     return max(index + 1 for index, text in enumerate(texts) if text.strip())
 
 
-def _read_parquet(path: Location, problems: ProblemList) -> DesignList:
-    # pyarrow takes a third of a second to import: only for tables in this format.
-    import pyarrow as pa
-    import pyarrow.parquet as pq
+def _read_columns(path: Location, problems: ProblemList) -> DesignList:
+    label = str(path)
+    try:
+        with path.open("rb") as source:
+            return _checked_columns(TableFile(source, MAX_TABLE_ROWS, most_text=math.inf), path, problems)
+    except ParquetError as problem:
+        raise refuse(label, str(problem)) from None
+    except OSError as error:
+        raise refuse(label, f"cannot be read ({error.strerror})") from None
+
+
+def _checked_columns(file: TableFile, path: Location, problems: ProblemList) -> DesignList:
+    """Return the designs of an opened file, read column by column."""
+    import pyarrow as pa  # takes a third of a second to import: only for tables in this format
 
     label = str(path)
     position = Position(label)
     alike = Alike(problems)
     designs = DesignList(path.name, {})
-    try:
-        file = pq.ParquetFile(source_of(path))
-        rows = file.metadata.num_rows
-        if rows > MAX_TABLE_ROWS:
-            raise refuse(label, f"has {rows} rows; a table takes at most {MAX_TABLE_ROWS}")
-        if rows == 0:
-            raise refuse(label, "has no rows")
-        names = list(file.schema_arrow.names)
-        check_count(names, label)
-        for name, column in zip(names, read_header(names, [position] * len(names), problems), strict=True):
-            if column is None:
-                continue
-            cells = file.read(columns=[name]).column(0)
-            numeric = pa.types.is_floating(cells.type) or pa.types.is_integer(cells.type)
-            if column.field is None:
-                if not numeric or check_numbers(column, position, problems):
-                    designs.labels[name] = _label(cells)
-                continue
-            if not numeric:
-                problems.add(position, name, f"holds {cells.type}, not numbers")
-                continue
-            if cells.null_count:
-                problems.add(position, name, f"has {cells.null_count} empty cells; every design needs a value")
-                continue
-            values = to_input_unit(cells.cast(pa.float64()).to_numpy(), column)
-            for row, message in check_values(values, column.field):
-                alike.add("rows", position, name, f"row {row + 1}: {message}")
-            designs.columns[column.field.name] = np.ascontiguousarray(values)
-    except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError, MemoryError) as error:
-        # Of a damaged file, pyarrow raises almost anything.
-        raise refuse(label, f"cannot be read as Parquet ({shorten(str(error), 100)})") from None
+    if file.rows == 0:
+        raise refuse(label, "has no rows")
+    names = file.schema.names
+    check_count(names, label)
+    for name, column in zip(names, read_header(names, [position] * len(names), problems), strict=True):
+        if column is None:
+            continue
+        cells = file.read([name]).column(0)
+        numeric = pa.types.is_floating(cells.type) or pa.types.is_integer(cells.type)
+        if column.field is None:
+            if not numeric or check_numbers(column, position, problems):
+                designs.labels[name] = _label(name, cells, label)
+            continue
+        if not numeric:
+            held = "text" if pa.types.is_dictionary(cells.type) else cells.type
+            problems.add(position, name, f"holds {held}, not numbers")
+            continue
+        if cells.null_count:
+            problems.add(position, name, f"has {cells.null_count} empty cells; every design needs a value")
+            continue
+        values = to_input_unit(cells.cast(pa.float64(), safe=False).to_numpy(), column)
+        for row, message in check_values(values, column.field):
+            alike.add("rows", position, name, f"row {row + 1}: {message}")
+        designs.columns[column.field.name] = np.ascontiguousarray(values)
     alike.finish()
     return designs
 
 
-def _label(cells: pa.ChunkedArray) -> Label:
+def _label(name: str, cells: pa.ChunkedArray, label: str) -> Label:
     """Return a text column; every word is looked at once, however often it stands in the file."""
     import pyarrow as pa
 
     if not pa.types.is_dictionary(cells.type):
-        if pa.types.is_nested(cells.type):
-            return label_of(["" if cell is None else str(cell) for cell in cells.to_pylist()])
         cells = cells.dictionary_encode()
     array = cells.unify_dictionaries().combine_chunks()
-    words = label_of(["", *("" if word is None else str(word) for word in array.dictionary.to_pylist())])
-    return Label(words.codes[array.indices.fill_null(-1).to_numpy(zero_copy_only=False) + 1], words.words)
+    words = array.dictionary
+    if len(words) > MOST_WORDS:
+        raise refuse(label, f"column {name} has {len(words):,} different words; a table takes at most {MOST_WORDS:,}")
+    if pa.types.is_temporal(words.type):
+        words = words.cast(pa.string())  # Python has no year 20000, and no nanoseconds
+    found = label_of(["", *("" if word is None else str(word) for word in words.to_pylist())])
+    return Label(found.codes[array.indices.fill_null(-1).to_numpy(zero_copy_only=False) + 1], found.words)
 
 
 _READERS: dict[str, Callable[[Location, ProblemList], DesignList]] = {
     ".csv": _read_csv,
     ".xlsx": _read_xlsx,
-    ".parquet": _read_parquet,
+    ".parquet": _read_columns,
 }
 """By the end of the file's name."""

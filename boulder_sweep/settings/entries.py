@@ -78,7 +78,7 @@ class Entries:
             if entry.key not in TOP_KEYS:
                 self.unknown(entry, "", TOP_KEYS)
         self._read_allowed()
-        self._read_table()
+        self._read_list()
         self._unfold()
         for section in fields.SECTIONS:
             if section == "soil":  # which of its readings count depends on the boulder and the site
@@ -180,17 +180,17 @@ class Entries:
                 self.problems.add(item.position, fields.ALLOW_UNUSUAL, message)
         self.allowed = tuple(sorted(allowed))
 
-    def _read_table(self) -> None:
+    def _read_list(self) -> None:
         node = self.root.get("table")
         if node is None:
             return
         # The csv module is needed for tables only.
-        from boulder_sweep.settings.design_list import read_table
+        from boulder_sweep.settings.design_list import read_designs
 
         if not isinstance(node, Scalar) or not node.text.strip():
             self.problems.add(node.position, "table", "must be the name of a .csv, .xlsx or .parquet file")
             return
-        self.table = read_table(node, self._folder_of(node.position), self.problems)
+        self.table = read_designs(node, self._folder_of(node.position), self.problems)
 
     def block(self, section: str, known: Iterable[str]) -> Mapping | None:
         """Return a block of the file; None where it is left out, empty, or reported to be no block of keys."""

@@ -143,6 +143,30 @@ def identity_in(metadata: Mapping[bytes, bytes] | None) -> dict[str, Any]:
     return {key: json.loads(value) if key in parsed else value.decode() for key, value in entries.items()}
 
 
+def check_identity(there: Mapping[str, Any]) -> None:
+    """Check what a result says of itself, before anything is made of it: settings, control, readings and versions.
+
+    Parameters
+    ----------
+    there
+        The identity of the result, see `identity`.
+
+    Raises
+    ------
+    ValueError
+        It holds what no command writes; the text says what.
+    """
+    from boulder_sweep.settings.stored import check_control, check_stored  # not needed by runs
+
+    for name in ("settings", "control", "readings", "versions"):
+        if not isinstance(there.get(name), dict):
+            raise ValueError(f"{name} is missing")
+    check_stored(there["settings"])
+    check_control(there["control"], there["readings"])
+    if any(type(version) is not str for version in there["versions"].values()):
+        raise ValueError("versions are no text")
+
+
 def judged_by(there: Mapping[str, Any]) -> str:
     """Say by whose rules a table was judged; empty where rules and kernels are those of this version.
 

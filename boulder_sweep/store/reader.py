@@ -17,10 +17,12 @@ from typing import IO, TYPE_CHECKING, Any
 from boulder_sweep.columns import COLUMNS, OUTCOMES, column_spec
 from boulder_sweep.errors import OlderRulesWarning
 from boulder_sweep.locations import Location, RemotePath, location_of
+from boulder_sweep.parquet import ParquetError, ParquetLimitError, TableFile
 from boulder_sweep.settings.problems import shorten
-from boulder_sweep.store.failures import DamagedError, StoreError, refuse_to_guess
+from boulder_sweep.store.failures import DamagedError, ImpossibleRecordsError, StoreError, refuse_to_guess
+from boulder_sweep.store.files import MANIFEST_NAME
 from boulder_sweep.store.manifest import Manifest, Part, load
-from boulder_sweep.store.provenance import judged_by
+from boulder_sweep.store.provenance import check_identity, judged_by
 from boulder_sweep.store.verify import load_checked, wrong_bytes
 from boulder_sweep.text import counted
 
@@ -31,6 +33,8 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _THREADS = min(8, os.cpu_count() or 1)
+_MOST_PART_ROWS, _MOST_PART_BYTES = 1_000_000, 150_000_000
+"""Most rows of a part, and bytes unpacked: three times as many as a full one has; several are read at once."""
 
 
 def read(out: str | Path | RemotePath, columns: Sequence[str] | None = None, *, verify: bool = True) -> pd.DataFrame:
@@ -94,7 +98,7 @@ def _ordered(words: pd.Series, known: Sequence[str]) -> pd.Series:
     return words if wanted == there else words.cat.reorder_categories(wanted)
 
 
-def read_table(folder: Location, columns: Sequence[str] | None = None, *, verify: bool = True) -> pa.Table:
+def finished_table(folder: Location, columns: Sequence[str] | None = None, *, verify: bool = True) -> pa.Table:
     """Read the finished parts of a folder as one Arrow table; otherwise as `read`."""
     return _read(folder, columns, verify)[0]
 
@@ -173,6 +177,10 @@ class FinishedRows:
 
     def __init__(self, folder: Location):
         manifest = load(folder)
+        try:
+            check_identity(manifest.identity)
+        except ValueError as problem:
+            raise ImpossibleRecordsError(folder / MANIFEST_NAME, str(problem)) from None
         self.rows, self.rows_done, self.identity = manifest.rows, manifest.rows_done, manifest.identity
         today = (*(spec.name for spec in COLUMNS), *manifest.more_columns)
         self.columns = tuple(dict.fromkeys((*today, *manifest.columns)))
@@ -274,7 +282,6 @@ class FinishedRows:
     def _read(self, file: IO[bytes], name: str, part: Part, columns: list[str] | None, verify: bool) -> pa.Table:
         """Read a part from its open file."""
         import pyarrow as pa  # heavy, and only readers need it
-        import pyarrow.parquet as pq
 
         from boulder_sweep.store.schema import with_columns
 
@@ -285,15 +292,16 @@ class FinishedRows:
                 if wrong := wrong_bytes(content, part):
                     raise self._damaged({name: wrong})
                 source = pa.BufferReader(content)
-            # Parts are read in parallel already, and reading through a dataset would take twice as long.
-            with pq.ParquetFile(source, page_checksum_verification=True) as opened:
-                if set(opened.schema_arrow.names) != set(self._stored):
-                    raise self._damaged({name: "its columns are not those of the manifest"})
-                schema = self._schemas.setdefault("of all parts", opened.schema_arrow)  # one step, as of threads
-                if opened.metadata.num_rows != part.rows or not opened.schema_arrow.equals(schema):
-                    raise self._damaged({name: "other rows or columns than recorded"})
-                table = opened.read(columns, use_threads=False)
-        except (OSError, ValueError, pa.ArrowException) as problem:  # ValueError: a name that is no text
+            opened = TableFile(source, _MOST_PART_ROWS, _MOST_PART_BYTES)
+            if set(opened.schema.names) != set(self._stored):
+                raise self._damaged({name: "its columns are not those of the manifest"})
+            schema = self._schemas.setdefault("of all parts", opened.schema)  # one step, as of threads
+            if opened.rows != part.rows or not opened.schema.equals(schema):
+                raise self._damaged({name: "other rows or columns than recorded"})
+            table = opened.read(columns)
+        except ParquetLimitError as problem:
+            raise ImpossibleRecordsError(self._folder / name, str(problem)) from problem
+        except (OSError, ParquetError) as problem:
             raise self._damaged({name: str(problem)}) from problem
         if not self.lacking and columns is None:
             return table

@@ -8,7 +8,7 @@ import pytest
 from distributed import LocalCluster
 
 from boulder_sweep.store import status
-from boulder_sweep.store.reader import read_table
+from boulder_sweep.store.reader import finished_table
 from tests.runner.grids import same_bits
 
 
@@ -25,7 +25,7 @@ def assert_is_the_table_of_threads(sweep, grid, options):
     assert (code, err) == (0, "")
     assert "18 designs" in out
     assert "dask" in out
-    assert same_bits(read_table(grid.parent / "dask"), read_table(grid.parent / "threads"))
+    assert same_bits(finished_table(grid.parent / "dask"), finished_table(grid.parent / "threads"))
     assert status("dask").sessions[-1].backend == "dask"
 
 

@@ -17,7 +17,7 @@ from boulder_sweep.errors import ClusterLostError
 from boulder_sweep.runner import cluster as backend
 from boulder_sweep.runner.sweeper import Progress, run
 from boulder_sweep.store import status
-from boulder_sweep.store.reader import read_table
+from boulder_sweep.store.reader import finished_table
 from tests.faults.clusters import Cluster
 from tests.faults.faulty import slowly
 from tests.runner.grids import grid_of, same_bits
@@ -70,15 +70,15 @@ def disturbed(out: Path, cluster: Cluster, kill: Callable[[], None], rows: int, 
     found = status(out, verify=True)
     if found.damaged:
         faults.append(f"damaged: {found.damaged}")
-    if len(read_table(out)) != found.rows_done:
+    if len(finished_table(out)) != found.rows_done:
         faults.append("recorded rows are missing")
     return finished
 
 
 def check(out: Path, whole: Path, faults: list[str]) -> None:
     """Compare a finished table with the undisturbed one: rows, and the bytes of every part."""
-    table = read_table(out)
-    if table["design_id"].to_pylist() != list(range(ROWS)) or not same_bits(table, read_table(whole)):
+    table = finished_table(out)
+    if table["design_id"].to_pylist() != list(range(ROWS)) or not same_bits(table, finished_table(whole)):
         faults.append(f"{out} differs")
     for path in whole.glob("rows-*.parquet"):
         if (out / path.name).read_bytes() != path.read_bytes():

@@ -30,7 +30,7 @@ from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import status
 from boulder_sweep.store.manifest import load
-from boulder_sweep.store.reader import read_table
+from boulder_sweep.store.reader import finished_table
 from tests.runner.grids import grid_of, same_bits
 from tests.waiting import HANG_GUARD_S
 
@@ -106,7 +106,7 @@ def look_at(out: Path, faults: list[str]) -> None:
     found = status(out, verify=True)
     if found.damaged:
         faults.append(f"damaged: {found.damaged}")
-    recorded = read_table(out)["design_id"].to_pylist()
+    recorded = finished_table(out)["design_id"].to_pylist()
     if recorded != list(range(len(recorded))) or len(recorded) != found.rows_done:
         faults.append("recorded rows are not there")
     ids = pd.read_parquet(out).get("design_id", pd.Series(dtype=int)).to_list()
@@ -150,10 +150,10 @@ def main() -> None:
         while done < kills and in_a_child(out, life()):
             done += 1
             look_at(out, faults)
-    whole = read_table(whole_out)
+    whole = finished_table(whole_out)
     for out in outs:
         in_a_child(out, None)
-        tables.append(tally(read_table(out), whole))
+        tables.append(tally(finished_table(out), whole))
     result: dict[str, Any] = {"kills": done, "tables": tables, "faults": faults}
     print(json.dumps(result))
 

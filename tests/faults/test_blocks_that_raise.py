@@ -9,7 +9,7 @@ from boulder_sweep.errors import ComputationError
 from boulder_sweep.runner import workers
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import status
-from boulder_sweep.store.reader import read_table
+from boulder_sweep.store.reader import finished_table
 from tests.faults import faulty
 from tests.faults.processes import run_driver
 from tests.runner.grids import grid_of, plausible, same_bits
@@ -25,7 +25,7 @@ def whole(tmp_path_factory):
     """The table without faults."""
     out = tmp_path_factory.mktemp("whole") / "out"
     run(grid_of(ROWS), out, rows_per_part=30, simulate=plausible)
-    return read_table(out)
+    return finished_table(out)
 
 
 def poison(whole, rows) -> str:
@@ -34,7 +34,7 @@ def poison(whole, rows) -> str:
 
 
 def assert_only_these_are_errors(out, whole, rows, words):
-    found = read_table(out)
+    found = finished_table(out)
     assert found["design_id"].to_pylist() == list(range(ROWS))
     for row in rows:
         assert found["verdict"][row].as_py() == "error"
@@ -65,4 +65,4 @@ def test_a_run_of_which_most_raises_stops_and_can_be_resumed(tmp_path, whole, mo
     assert not found.running
     monkeypatch.setenv(faulty.POISON, "0")
     run(grid_of(ROWS), out, rows_per_part=30, backend=backend, resume=True, simulate=faulty.raises)
-    assert same_bits(read_table(out), whole)
+    assert same_bits(finished_table(out), whole)

@@ -24,7 +24,7 @@ from boulder_sweep.runner.sweeper import run
 from boulder_sweep.runner.workers import Computation
 from boulder_sweep.store import status
 from boulder_sweep.store.files import LOCK_NAME
-from boulder_sweep.store.reader import read_table
+from boulder_sweep.store.reader import finished_table
 from boulder_sweep.store.writer import EncodedPart
 from tests.faults import faulty
 from tests.faults.clusters import Cluster
@@ -102,7 +102,7 @@ def test_losing_the_last_worker_ends_the_run_resumable(tmp_path, monkeypatch, ba
         bar.allow()
         run(grid_of(rows), out, resume=True, **how)
     run(grid_of(rows), tmp_path / "whole", rows_per_part=5000, simulate=plausible)
-    assert same_bits(read_table(out), read_table(tmp_path / "whole"))
+    assert same_bits(finished_table(out), finished_table(tmp_path / "whole"))
 
 
 def test_a_result_lost_with_its_worker_is_computed_again(tmp_path, monkeypatch):
@@ -136,7 +136,7 @@ def test_a_result_lost_with_its_worker_is_computed_again(tmp_path, monkeypatch):
     assert max(asked.values()) >= ASKED_AGAIN, "a lost result is asked for again"
     assert sum(asked.values()) <= rows // 500 + 1 + sum(looks), "and once a look"
     run(grid_of(rows), tmp_path / "whole", **how)
-    assert same_bits(read_table(tmp_path / "out"), read_table(tmp_path / "whole"))
+    assert same_bits(finished_table(tmp_path / "out"), finished_table(tmp_path / "whole"))
 
 
 def test_a_result_that_does_not_come_is_asked_for_again(tmp_path, monkeypatch):
@@ -157,7 +157,7 @@ def test_a_result_that_does_not_come_is_asked_for_again(tmp_path, monkeypatch):
     assert limits[:3] == [2.0, 4.0, 4.0], "both in flight wait longer after the first"
     assert set(limits[3:]) == {8.0}, "a slow connection is not found out again for every result, or twice at once"
     run(grid_of(rows), tmp_path / "whole", **how)
-    assert same_bits(read_table(tmp_path / "out"), read_table(tmp_path / "whole"))
+    assert same_bits(finished_table(tmp_path / "out"), finished_table(tmp_path / "whole"))
 
 
 def test_a_scheduler_that_hangs_is_noticed(tmp_path, monkeypatch, bar):
@@ -192,7 +192,7 @@ def test_a_scheduler_that_hangs_is_noticed(tmp_path, monkeypatch, bar):
 def test_a_design_that_ends_every_worker_becomes_an_error_row(tmp_path, monkeypatch):
     out, rows = tmp_path / "out", 8
     run(grid_of(rows), tmp_path / "whole", simulate=plausible)
-    whole = read_table(tmp_path / "whole")
+    whole = finished_table(tmp_path / "whole")
     poison = whole["subgrade_reaction_MN_m3"][5].as_py()
     monkeypatch.setenv(faulty.POISON, str(round(poison, 6)))
     monkeypatch.setenv(faulty.MAIN_PROCESS, str(os.getpid()))
@@ -213,7 +213,7 @@ def test_a_design_that_ends_every_worker_becomes_an_error_row(tmp_path, monkeypa
         finally:
             stop.set()
             replacing.join()
-    table = read_table(out)
+    table = finished_table(out)
     assert table["reason"][5].as_py() == "every worker that computed this design died"
     others = [row for row in range(rows) if row != 5]
     assert same_bits(table.take(others), whole.take(others))
@@ -229,7 +229,7 @@ def test_an_adaptive_cluster_starts_workers_for_a_run(tmp_path):
         cluster.adapt(minimum=0, maximum=2, interval="100 ms", wait_count=1)
         run(grid_of(rows), tmp_path / "out", backend="dask", scheduler=cluster.scheduler_address, **how)
     run(grid_of(rows), tmp_path / "whole", **how)
-    assert same_bits(read_table(tmp_path / "out"), read_table(tmp_path / "whole"))
+    assert same_bits(finished_table(tmp_path / "out"), finished_table(tmp_path / "whole"))
 
 
 def test_a_worker_that_comes_back_after_the_run_writes_nothing(tmp_path):
@@ -267,7 +267,7 @@ def test_a_worker_that_hangs_is_named_and_others_get_its_tasks(tmp_path):
         assert any("is silent for 30 s; others get" in note for note in told[-1].notes)
         assert stopped.poll() is None
     run(grid_of(rows), tmp_path / "whole", **how)
-    assert same_bits(read_table(tmp_path / "out"), read_table(tmp_path / "whole"))
+    assert same_bits(finished_table(tmp_path / "out"), finished_table(tmp_path / "whole"))
 
 
 @pytest.mark.nightly

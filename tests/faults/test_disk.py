@@ -15,7 +15,7 @@ from boulder_sweep.runner import estimate as limits
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import files, status
 from boulder_sweep.store.failures import DoesNotFitError, StoreError, WriteError
-from boulder_sweep.store.reader import read_table
+from boulder_sweep.store.reader import finished_table
 from tests.faults.processes import ROOT
 from tests.runner.grids import grid, grid_of, plausible, same_bits
 
@@ -64,14 +64,14 @@ def test_a_disk_that_fills_up_stops_the_run_and_loses_nothing(filling, tmp_path)
     assert 0 < found.rows_done < ROWS
     assert not found.running
     # A part may have found room behind one that did not.
-    rows = read_table(out)["design_id"].to_numpy()
+    rows = finished_table(out)["design_id"].to_numpy()
     assert len(rows) == found.rows_done
     assert (np.diff(rows) > 0).all()
     make_room()
     summary = run(grid_of(ROWS), out, resume=True, simulate=plausible)
     assert summary.rows_computed == ROWS - found.rows_done
     run(grid_of(ROWS), tmp_path / "whole", rows_per_part=5000, simulate=plausible)
-    assert same_bits(read_table(out), read_table(tmp_path / "whole"))
+    assert same_bits(finished_table(out), finished_table(tmp_path / "whole"))
 
 
 @pytest.mark.parametrize("named", [False, True], ids=["nameless files", "named files"])
@@ -81,7 +81,7 @@ def test_a_disk_that_is_full_at_any_write_loses_nothing(tmp_path, monkeypatch, n
         monkeypatch.delattr(os, "O_TMPFILE")
     sweep, how = grid(), {"rows_per_part": 100, "commit_every_s": 0.0, "simulate": plausible}
     run(sweep, tmp_path / "whole", **how)
-    whole = read_table(tmp_path / "whole")
+    whole = finished_table(tmp_path / "whole")
     write = os.write
     for failing in range(0, 60, 5):
         calls = []
@@ -104,7 +104,7 @@ def test_a_disk_that_is_full_at_any_write_loses_nothing(tmp_path, monkeypatch, n
             assert status(out, verify=True).damaged == {}
             assert not [path for path in out.iterdir() if path.name.endswith(".writing")]
         run(sweep, out, resume=True, **how)
-        assert same_bits(read_table(out), whole)
+        assert same_bits(finished_table(out), whole)
         if finished:
             break
     assert failing > 5

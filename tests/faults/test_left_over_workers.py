@@ -14,7 +14,7 @@ from boulder_sweep.runner.sweeper import run
 from boulder_sweep.runner.workers import Computation
 from boulder_sweep.store.failures import FolderRemovedError
 from boulder_sweep.store.files import MANIFEST_NAME, is_part_name
-from boulder_sweep.store.reader import read_table
+from boulder_sweep.store.reader import finished_table
 from boulder_sweep.store.writer import OutputFolder
 from tests.faults.faulty import Bar, held
 from tests.runner.grids import grid_of, plausible, same_bits
@@ -67,7 +67,7 @@ def test_a_worker_of_a_killed_run_that_goes_on_changes_no_row_of_the_next(tmp_pa
         worker.kill()
         worker.join()
     run(grid_of(ROWS), tmp_path / "whole", **how)
-    assert same_bits(read_table(out), read_table(tmp_path / "whole"))
+    assert same_bits(finished_table(out), finished_table(tmp_path / "whole"))
     assert all(is_part_name(path.name) or path.name == MANIFEST_NAME for path in out.iterdir())
 
 

@@ -14,7 +14,7 @@ import pytest
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import read, status
 from boulder_sweep.store.manifest import load
-from boulder_sweep.store.reader import read_table
+from boulder_sweep.store.reader import finished_table
 from tests.faults.faulty import Bar
 from tests.faults.processes import Driver, run_driver
 from tests.runner.grids import grid_of, plausible, same_bits
@@ -127,7 +127,7 @@ def test_the_lock_of_a_killed_run_is_no_obstacle(tmp_path, bar):
 def test_broken_parts_are_found_and_computed_again(tmp_path):
     out = tmp_path / "out"
     run(grid_of(ROWS), out, rows_per_part=1000, simulate=plausible)
-    whole = read_table(out)
+    whole = finished_table(out)
     parts = sorted(out.glob("rows-*.parquet"))
     parts[1].write_bytes(parts[1].read_bytes()[:-100])
     content = bytearray(parts[4].read_bytes())
@@ -142,4 +142,4 @@ def test_broken_parts_are_found_and_computed_again(tmp_path):
     assert summary.rows_computed == 4000
     assert len([note for note in summary.notes if "was damaged" in note]) == 4
     assert status(out, verify=True).complete
-    assert same_bits(read_table(out), whole)
+    assert same_bits(finished_table(out), whole)

@@ -11,7 +11,7 @@ from boulder_sweep.runner.sweeper import run
 from boulder_sweep.settings import load
 from boulder_sweep.store import status
 from boulder_sweep.store.files import is_part_name
-from boulder_sweep.store.reader import read_table
+from boulder_sweep.store.reader import finished_table
 from tests.faults.clusters import Cluster
 from tests.faults.processes import ROOT
 from tests.faults.s3_server import BUCKET, SECRET, S3Server
@@ -56,7 +56,7 @@ def test_a_table_on_a_store_is_the_local_one_though_a_worker_and_the_scheduler_a
         assert not any("does not share" in note for note in summary.notes)
         place = location_of(out)
         assert isinstance(place, RemotePath)
-        assert same_bits(read_table(place), read_table(tmp_path / "whole"))
+        assert same_bits(finished_table(place), finished_table(tmp_path / "whole"))
         parts = {path.name: path.read_bytes() for path in (tmp_path / "whole").glob("rows-*")}
         objects = {name: (place / name).read_bytes() for name in place.names()}
         assert {name: content for name, content in objects.items() if is_part_name(name)} == parts

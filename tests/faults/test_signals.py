@@ -8,7 +8,7 @@ import pytest
 
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import status
-from boulder_sweep.store.reader import read_table
+from boulder_sweep.store.reader import finished_table
 from tests.faults.faulty import Bar
 from tests.faults.processes import Driver
 from tests.runner.grids import grid_of, plausible, same_bits
@@ -64,7 +64,7 @@ def test_a_run_stops_soon_keeps_what_is_done_and_says_how_to_go_on(tmp_path, bar
     assert not found.running
     assert SAFE <= found.rows_done <= REACHED
     assert found.sessions[-1].how == f"interrupted by signal {int(number)}"
-    assert read_table(out)["design_id"].to_pylist() == list(range(found.rows_done))
+    assert finished_table(out)["design_id"].to_pylist() == list(range(found.rows_done))
 
 
 def test_an_interrupted_run_goes_on_to_the_same_table(tmp_path, bar):
@@ -77,7 +77,7 @@ def test_an_interrupted_run_goes_on_to_the_same_table(tmp_path, bar):
     again = run(grid_of(ROWS), out, resume=True, simulate=plausible)
     assert again.rows_computed == ROWS - done
     run(grid_of(ROWS), tmp_path / "whole", simulate=plausible, rows_per_part=ROWS_PER_PART)
-    assert same_bits(read_table(out), read_table(tmp_path / "whole"))
+    assert same_bits(finished_table(out), finished_table(tmp_path / "whole"))
 
 
 @pytest.mark.parametrize("backend", ["threading", pytest.param("dask", marks=pytest.mark.nightly)])

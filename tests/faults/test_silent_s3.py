@@ -8,7 +8,7 @@ import pytest
 
 from boulder_sweep.locations import location_of
 from boulder_sweep.runner.sweeper import run
-from boulder_sweep.store.reader import read_table
+from boulder_sweep.store.reader import finished_table
 from tests.faults.processes import Driver
 from tests.faults.s3_server import BUCKET, S3Server
 from tests.runner.grids import grid_of, plausible, same_bits
@@ -44,4 +44,4 @@ def test_a_run_ends_while_the_store_hangs_and_goes_on_to_the_same_table(tmp_path
             assert code == 128 + number
         run(grid_of(ROWS), OUT, resume=True, rows_per_part=2000, simulate=plausible)
         run(grid_of(ROWS), tmp_path / "whole", rows_per_part=2000, simulate=plausible)
-        assert same_bits(read_table(location_of(OUT)), read_table(tmp_path / "whole"))
+        assert same_bits(finished_table(location_of(OUT)), finished_table(tmp_path / "whole"))

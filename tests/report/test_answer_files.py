@@ -266,3 +266,10 @@ def test_a_file_with_other_columns_or_rows_is_refused(files: dict[str, Path], tm
     pq.write_table(pa.table({"a": [1]}), other)
     with pytest.raises(ReportError, match="neither the folder of a run nor a file that `sweep` wrote"):
         write_report(other, tmp_path / "page.html")
+
+
+def test_more_rows_than_designs_are_refused(files: dict[str, Path], tmp_path: Path) -> None:
+    table = pq.read_table(files["capacity"])
+    pq.write_table(pa.concat_tables([table] * 2), tmp_path / "twice.parquet")
+    with pytest.raises(ReportError, match="is damaged: it has 8 rows for 4 designs"):
+        AnswerFile(tmp_path / "twice.parquet", ReportError)

@@ -94,7 +94,7 @@ def test_other_files_are_refused(chances: Path, tmp_path: Path) -> None:
     with pytest.raises(ReportError, match="is a time history; `sweep export` takes it"):
         write_report(tmp_path / "history.parquet", tmp_path / "page.html")
     (tmp_path / "text.parquet").write_text("text")
-    with pytest.raises(ReportError, match="cannot be read as a Parquet file"):
+    with pytest.raises(ReportError, match="cannot be read as Parquet"):
         write_report(tmp_path / "text.parquet", tmp_path / "page.html")
     with pytest.raises(ReportError, match="there is no 9"):
         write_report(chances, tmp_path / "page.html", designs=[9])
@@ -146,7 +146,7 @@ def test_a_column_name_that_is_no_text_is_told(chances: Path, tmp_path: Path, sw
     (tmp_path / "chances.parquet").write_bytes(content)
     code, out, err = sweep("report", tmp_path / "chances.parquet")
     assert (code, out) == (2, "")
-    assert err.startswith(f"error: {tmp_path / 'chances.parquet'} cannot be read as a Parquet file: ")
+    assert err.startswith(f"error: {tmp_path / 'chances.parquet'}: cannot be read as Parquet: ")
 
 
 @pytest.mark.parametrize(
@@ -180,7 +180,7 @@ def test_settings_of_another_version_are_said(chances: Path, tmp_path: Path) -> 
     metadata[b"boulder_sweep.settings"] = json.dumps(settings).encode()
     metadata[b"boulder_sweep.settings_sha256"] = sha256_of(settings).encode()
     pq.write_table(table.replace_schema_metadata(metadata), tmp_path / "old.parquet")
-    with pytest.raises(ReportError, match=r"another version, whose settings are not those of this one \('preset'\)"):
+    with pytest.raises(ReportError, match=r"is damaged \(settings.model.preset is missing\); write it again"):
         write_report(tmp_path / "old.parquet", tmp_path / "page.html")
 
 

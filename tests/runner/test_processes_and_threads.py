@@ -14,7 +14,7 @@ from boulder_sweep.runner.interruption import Signals, noted_signals
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import status
 from boulder_sweep.store.failures import FolderInUseError
-from boulder_sweep.store.reader import read_table
+from boulder_sweep.store.reader import finished_table
 from tests.faults.faulty import Bar, held, slowly
 from tests.runner.grids import grid_of, plausible, same_bits
 from tests.waiting import HANG_GUARD_S
@@ -27,7 +27,7 @@ def test_runs_side_by_side(tmp_path):
     with ThreadPoolExecutor(4) as pool:
         assert [summary.rows for summary in pool.map(one, range(4))] == [2000, 2001, 2002, 2003]
     for number in range(4):
-        assert read_table(tmp_path / f"out-{number}")["design_id"].to_pylist() == list(range(2000 + number))
+        assert finished_table(tmp_path / f"out-{number}")["design_id"].to_pylist() == list(range(2000 + number))
 
 
 def test_two_threads_cannot_write_into_one_folder(tmp_path):
@@ -54,7 +54,7 @@ def test_a_forked_process_can_run(tmp_path):
         finally:
             os._exit(code)
     assert os.waitpid(child, 0)[1] == 0
-    assert same_bits(read_table(tmp_path / "out"), read_table(tmp_path / "before"))
+    assert same_bits(finished_table(tmp_path / "out"), finished_table(tmp_path / "before"))
 
 
 @pytest.mark.parametrize("backend", ["threading", "dask"])
@@ -76,7 +76,7 @@ def test_an_interrupted_run_leaves_the_process_as_it_was(tmp_path, monkeypatch, 
     assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before
     assert not status(tmp_path / "out").running
     assert run(grid_of(20_000), tmp_path / "out", resume=True, **how).rows == 20_000
-    assert read_table(tmp_path / "out")["design_id"].to_pylist() == list(range(20_000))
+    assert finished_table(tmp_path / "out")["design_id"].to_pylist() == list(range(20_000))
 
 
 def test_a_call_returns_raises_and_is_left_at_a_signal():

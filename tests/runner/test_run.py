@@ -21,7 +21,7 @@ from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import read, status
 from boulder_sweep.store.failures import OutputExistsError, SettingsDifferError, StoreError
 from boulder_sweep.store.provenance import canonical, sha256_of
-from boulder_sweep.store.reader import read_table
+from boulder_sweep.store.reader import finished_table
 from tests.runner.grids import grid, grid_of, partly_impossible, plausible, same_bits
 
 ROOT = Path(__file__).parents[2]
@@ -68,7 +68,7 @@ def test_pandas_duckdb_and_polars_open_it_as_one_table_in_design_order(finished)
 
 def test_nothing_is_nan(finished):
     out, _ = finished
-    for column in read_table(out).itercolumns():
+    for column in finished_table(out).itercolumns():
         if pa.types.is_floating(column.type):
             present = column.drop_null().to_numpy()
             assert np.isfinite(present).all()
@@ -119,7 +119,7 @@ def test_workers_change_no_byte(finished, tmp_path, how):
 def test_the_size_of_parts_changes_no_bit(finished, tmp_path):
     run(grid(), tmp_path / "out", rows_per_part=7)
     assert len(part_files(tmp_path / "out")) == 63
-    assert same_bits(read_table(tmp_path / "out"), read_table(finished[0]))
+    assert same_bits(finished_table(tmp_path / "out"), finished_table(finished[0]))
 
 
 def test_blocks_change_no_bit(finished):
@@ -131,7 +131,7 @@ def test_blocks_change_no_bit(finished):
     sweep = grid()
     evaluation = evaluation_of(sweep, accuracy_of(sweep))
     order = np.random.default_rng(0).permutation(441)[:100]
-    whole = read_table(finished[0])
+    whole = finished_table(finished[0])
     for row in order:
         block = sweep.block(int(row), int(row) + 1)
         alone = pq.read_table(pa.BufferReader(encode(part_table(block, evaluation(block), {}))))

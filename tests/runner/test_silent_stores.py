@@ -17,7 +17,7 @@ from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import lock as locks
 from boulder_sweep.store import status, storage
 from boulder_sweep.store.failures import WriteError
-from boulder_sweep.store.reader import read_table
+from boulder_sweep.store.reader import finished_table
 from boulder_sweep.store.writer import OutputFolder
 from tests.runner.grids import grid_of, plausible, same_bits
 from tests.store.silent_stores import SilentFileSystem, store
@@ -128,7 +128,7 @@ def test_a_run_whose_store_was_silent_goes_on_to_the_same_table(silent, monkeypa
     wait_until(lambda: not status(OUT).running, "the lock is released")
     start(resume=True)
     run(grid_of(ROWS), tmp_path / "whole", rows_per_part=ROWS_PER_PART, simulate=plausible)
-    assert same_bits(read_table(location_of(OUT)), read_table(tmp_path / "whole"))
+    assert same_bits(finished_table(location_of(OUT)), finished_table(tmp_path / "whole"))
 
 
 def test_a_last_attempt_waits_without_limit_until_there_is_a_signal(monkeypatch):

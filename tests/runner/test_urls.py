@@ -11,7 +11,7 @@ from boulder_sweep.runner import sweeper
 from boulder_sweep.store import read, status
 from boulder_sweep.store.failures import OutputExistsError
 from boulder_sweep.store.files import is_part_name
-from boulder_sweep.store.reader import read_table
+from boulder_sweep.store.reader import finished_table
 from tests.runner.grids import grid, plausible, same_bits
 from tests.store.object_stores import store
 
@@ -57,7 +57,7 @@ def test_a_run_into_a_store_is_interrupted_and_resumed(local, monkeypatch):
     assert not found.running
     if not found.complete:
         sweeper.run(grid(), OUT, resume=True, **HOW)
-    assert same_bits(read_table(location_of(OUT)), read_table(local))
+    assert same_bits(finished_table(location_of(OUT)), finished_table(local))
     with pytest.raises(OutputExistsError, match="is finished"):
         sweeper.run(grid(), OUT, **HOW)
 

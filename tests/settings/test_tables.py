@@ -340,7 +340,7 @@ def test_mistakes_in_parquet(write_parquet, messages_of):
     for start in (
         "designs.parquet: margin: is an outcome of a run",
         "designs.parquet: boulder_length_m: row 2: -2 m is outside",
-        "designs.parquet: boulder_width_m: holds string, not numbers",
+        "designs.parquet: boulder_width_m: holds text, not numbers",
         "designs.parquet: boulder_height_m: has 1 empty cells",
         "designs.parquet: embedment_depth_m: row 2: is not a finite number",
     ):

@@ -15,18 +15,14 @@ from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.store.files import MANIFEST_NAME
 from boulder_sweep.store.manifest import Manifest
 from boulder_sweep.store.opening import claim_output
-from boulder_sweep.store.provenance import file_metadata, kernels_sha256, new_session, rules_sha256
+from boulder_sweep.store.provenance import file_metadata, identity, new_session
 from boulder_sweep.store.schema import encode, part_table, verdict_counts
 from boulder_sweep.store.writer import EncodedPart, OutputFolder
 from tests.runner.grids import grid, plausible
 
-IDENTITY = {
-    "settings": {"soil": 1},
-    "settings_sha256": "a" * 64,
-    "kernels_sha256": kernels_sha256(),
-    "rules_sha256": rules_sha256(),
-    "versions": {"numba": "1"},
-}
+IDENTITY = identity(
+    grid().resolved(), *evaluation_of(grid(), accuracy_of(grid()), plausible).settings(), accuracy_of(grid()).to_dict()
+)
 ROWS, SIZE = 441, 100
 
 

@@ -11,7 +11,7 @@ from boulder_sweep.store import status, storage, verify, writer
 from boulder_sweep.store.failures import DamagedError, StoreError, WriteError
 from boulder_sweep.store.files import MANIFEST_NAME
 from boulder_sweep.store.manifest import load
-from boulder_sweep.store.reader import FinishedRows, read_table
+from boulder_sweep.store.reader import FinishedRows, finished_table
 from tests.runner.grids import same_bits
 from tests.store.folders import ROWS, commit, open_folder, part_bytes
 
@@ -44,11 +44,11 @@ def merge(out):
 
 
 def test_small_parts_are_replaced_by_the_file_that_a_fast_run_writes(out, tmp_path):
-    before = read_table(out)
+    before = finished_table(out)
     folder = merge(out)
     folder.close("finished")
     assert names(out) == ["rows-000000000000-000000000100.parquet"]
-    assert same_bits(read_table(out), before)
+    assert same_bits(finished_table(out), before)
     assert sum(load(out).verdicts.values()) == 100
     assert status(out, verify=True).damaged == {}
     assert load(out).merge is None
@@ -76,7 +76,7 @@ def killed_at(monkeypatch, step: int):
 
 @pytest.mark.parametrize("step", range(9))
 def test_a_merge_killed_at_any_step_loses_and_doubles_nothing(out, monkeypatch, step):
-    before = read_table(out)
+    before = finished_table(out)
     folder = open_folder(out, resume=True)
     (group,) = folder.manifest.mergeable()
     content = part_bytes(0, 100)[0]
@@ -93,7 +93,7 @@ def test_a_merge_killed_at_any_step_loses_and_doubles_nothing(out, monkeypatch, 
     for deep in (False, True):
         assert status(out, verify=deep).rows_done == 100
         assert status(out, verify=deep).damaged == {}
-    assert same_bits(read_table(out), before)
+    assert same_bits(finished_table(out), before)
     again = open_folder(out, resume=True)
     assert again.damaged == {}
     assert again.manifest.rows_done == 100
@@ -101,7 +101,7 @@ def test_a_merge_killed_at_any_step_loses_and_doubles_nothing(out, monkeypatch, 
         again.merge(group, content)
     again.close("finished")
     assert names(out) == ["rows-000000000000-000000000100.parquet"]
-    assert same_bits(read_table(out), before)
+    assert same_bits(finished_table(out), before)
 
 
 @pytest.mark.parametrize("failing", ["save", "put_file"])
@@ -133,7 +133,7 @@ def test_verdicts_add_up(out):
 
 
 def test_rows_are_read_on_where_they_went(out):
-    before = read_table(out)
+    before = finished_table(out)
     begun, known, one = (FinishedRows(out) for _ in range(3))
     tables = begun.tables(["design_id", "margin"])
     first = next(tables)
@@ -147,7 +147,7 @@ def test_rows_are_read_on_where_they_went(out):
 
 @pytest.mark.parametrize("step", range(1, 8))
 def test_rows_are_read_on_in_the_middle_of_a_merge(out, monkeypatch, step):
-    before = read_table(out)
+    before = finished_table(out)
     finished = FinishedRows(out)
     folder = open_folder(out, resume=True)
     (group,) = folder.manifest.mergeable()
@@ -157,7 +157,7 @@ def test_rows_are_read_on_in_the_middle_of_a_merge(out, monkeypatch, step):
     monkeypatch.undo()
     folder._lock.release()
     assert same_bits(pa.concat_tables(finished.tables()), before)
-    assert same_bits(read_table(out), before)
+    assert same_bits(finished_table(out), before)
     assert status(out, verify=True).damaged == {}
 
 

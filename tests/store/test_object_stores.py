@@ -30,7 +30,7 @@ from boulder_sweep.store.failures import (
 )
 from boulder_sweep.store.files import MANIFEST_NAME, is_part_name, version_name
 from boulder_sweep.store.manifest import load
-from boulder_sweep.store.reader import read_table
+from boulder_sweep.store.reader import finished_table
 from boulder_sweep.store.storage import KEPT, newest
 from tests.runner.grids import same_bits
 from tests.store import folders
@@ -70,7 +70,7 @@ def test_a_finished_folder_holds_the_bytes_that_a_local_one_holds(out, tmp_path)
     parts = [path.name for path in sorted(local.glob("rows-*"))]
     assert [name for name in names(out) if is_part_name(name)] == parts
     assert all((out / name).read_bytes() == (local / name).read_bytes() for name in parts)
-    assert same_bits(read_table(out), read_table(local))
+    assert same_bits(finished_table(out), finished_table(local))
     assert [name for name in names(out) if name not in parts] == [
         *(version_name(number) for number in range(1, 8)),
         "_manifest.parquet",
@@ -181,7 +181,7 @@ def test_a_run_that_was_thought_dead_cannot_change_the_table(only_new, monkeypat
             folders.commit(asleep, 100)
         asleep.close("stopped")
         other.close("finished")
-        assert same_bits(read_table(out), whole())
+        assert same_bits(finished_table(out), whole())
         assert [name for name in names(out) if is_part_name(name)] == sorted(load(out).parts)
 
 
@@ -207,7 +207,7 @@ def test_no_row_is_lost_or_double_whatever_fails(only_new, monkeypatch):
             while faulty.late:
                 faulty.arrive()
             one_run(out)  # finds everything there, or computes again what a last fault has cost
-            assert same_bits(read_table(out), expected), f"seed {seed}"
+            assert same_bits(finished_table(out), expected), f"seed {seed}"
             assert sorted(load(out).parts) == [name for name in names(out) if is_part_name(name)], f"seed {seed}"
         counts.update(trouble.counts)
     assert min(counts.values()) >= least, counts
@@ -257,12 +257,12 @@ def test_what_is_there_is_not_overwritten_unasked(out):
 
 def test_foreign_files_and_places_without_a_result_are_refused(out):
     with pytest.raises(NotASweepError, match=f"there is no {OUT}"):
-        read_table(out)
+        finished_table(out)
     (out / "thesis.tex").put(b"x")
     with pytest.raises(ForeignFilesError, match=r"thesis\.tex"):
         folders.open_folder(out)
     with pytest.raises(NotASweepError, match="is not the result of a sweep"):
-        read_table(out)
+        finished_table(out)
     with pytest.raises(StoreError, match="is a file"):
         folders.open_folder(out / "thesis.tex")
 

@@ -19,7 +19,7 @@ from boulder_sweep.store import read, status
 from boulder_sweep.store.failures import DamagedError, FolderRemovedError, ImpossibleRecordsError, WriteError
 from boulder_sweep.store.files import MANIFEST_NAME, hidden_name, is_ours, part_name, staged_name
 from boulder_sweep.store.manifest import load
-from boulder_sweep.store.reader import FinishedRows, read_table
+from boulder_sweep.store.reader import FinishedRows, finished_table
 from boulder_sweep.store.storage import storage_of
 from boulder_sweep.store.writer import stage
 from tests.runner.grids import same_bits
@@ -324,7 +324,7 @@ def test_a_column_whose_name_is_no_text_is_refused(out):
 
 
 def test_a_merge_that_a_killed_run_announced_is_still_finished(out):
-    whole = read_table(out)
+    whole = finished_table(out)
     small = {first: part_bytes(first, 50)[0] for first in (0, 50)}
     for first, content in small.items():
         (out / part_name(first, first + 50, ROWS)).write_bytes(content)
@@ -342,7 +342,7 @@ def test_a_merge_that_a_killed_run_announced_is_still_finished(out):
     (out / FIRST).rename(out / hidden_name(FIRST))
     open_folder(out, resume=True).close("interrupted")
     assert FIRST in names(out)
-    assert same_bits(read_table(out), whole)
+    assert same_bits(finished_table(out), whole)
 
 
 def test_a_table_said_to_be_huge_is_looked_at_in_no_time(out):

@@ -22,7 +22,7 @@ from boulder_sweep.store.failures import (
 )
 from boulder_sweep.store.files import MANIFEST_NAME
 from boulder_sweep.store.manifest import load
-from boulder_sweep.store.reader import read_table
+from boulder_sweep.store.reader import finished_table
 from tests.store.folders import IDENTITY, ROWS, commit, finished_folder, open_folder, rewrite_records
 
 
@@ -36,7 +36,7 @@ PARTS = [f"rows-{first:012d}-{min(first + 100, ROWS):012d}.parquet" for first in
 def test_a_finished_folder_holds_parts_and_manifest_only(tmp_path):
     out = finished_folder(tmp_path / "out")
     assert names(out) == [MANIFEST_NAME, *PARTS]
-    assert read_table(out)["design_id"].to_pylist() == list(range(ROWS))
+    assert finished_table(out)["design_id"].to_pylist() == list(range(ROWS))
     manifest = load(out)
     assert manifest.rows_done == ROWS
     (session,) = manifest.sessions
@@ -175,10 +175,17 @@ def test_two_writers_in_one_process(tmp_path):
 
 def test_what_differs_is_said(tmp_path):
     out = finished_folder(tmp_path / "out")
-    other = {**IDENTITY, "settings": {"soil": 2}, "settings_sha256": "b" * 64, "versions": {"numba": "2"}}
+    settings = {**IDENTITY["settings"], "name": "another"}
+    other = {
+        **IDENTITY,
+        "settings": settings,
+        "settings_sha256": "b" * 64,
+        "versions": {**IDENTITY["versions"], "numba": "2"},
+    }
     with pytest.raises(SettingsDifferError) as refused:
         open_folder(out, identity=other, resume=True)
-    assert refused.value.differences == ["settings.soil: 1 -> 2", 'versions.numba: "1" -> "2"']
+    version = IDENTITY["versions"]["numba"]
+    assert refused.value.differences == ['settings.name: "test" -> "another"', f'versions.numba: "{version}" -> "2"']
     assert not status(out).running
     with pytest.raises(SettingsDifferError, match="rows: 441 -> 442"):
         open_folder(out, rows=442, resume=True)
@@ -204,7 +211,7 @@ def test_damaged_parts_are_found_and_missing_again(tmp_path, damage):
     assert not path.exists()
     commit(folder, 200)
     folder.close("finished")
-    assert read_table(out)["design_id"].to_pylist() == list(range(ROWS))
+    assert finished_table(out)["design_id"].to_pylist() == list(range(ROWS))
 
 
 def test_a_part_that_was_put_but_not_recorded_is_computed_again(tmp_path, monkeypatch):
@@ -256,7 +263,7 @@ def test_a_run_that_was_refused_leaves_no_trace(tmp_path):
     assert names(tmp_path / "mine") == []
     finished_folder(tmp_path / "done")
     open_folder(tmp_path / "done", resume=True).discard()
-    assert read_table(tmp_path / "done").num_rows == ROWS
+    assert finished_table(tmp_path / "done").num_rows == ROWS
 
 
 def test_a_refused_run_whose_folder_is_gone_releases_it(tmp_path):

@@ -1,0 +1,242 @@
+"""Parquet files that a user names, opened in one way: plain columns only, and no more bytes than a table may have.
+
+Packed, a page of a thousand bytes can hold gigabytes, and a word that stands once can stand in every row. What the
+columns take once they are unpacked is added up from the footer before a row is read. Text is read as words and codes,
+so that no word is repeated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import lru_cache, partial
+from typing import IO, TYPE_CHECKING
+
+from boulder_sweep.text import printable, size_text
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+MOST_COLUMNS = 2000
+"""Twice as many as a list of designs may have: a result has its own beside them."""
+MOST_ROWS = 20_000_000
+MOST_BYTES = 400_000_000
+"""Most bytes of a file once it is unpacked."""
+LONGEST_WORD = 1000
+"""Most characters of a word in a column of text."""
+_WIDEST_NUMBER = 32
+"""Width of the widest decimal number [bytes]."""
+_FLOAT, _CODE = 8, 4
+"""Widths of a number as it is used, and of the code of a word [bytes]."""
+_MARKS = {"RLE", "BIT_PACKED"}
+"""Encodings of what marks empty cells."""
+_CODED = {"PLAIN", "PLAIN_DICTIONARY", "RLE_DICTIONARY"} | _MARKS
+"""Encodings of text that pyarrow reads as codes."""
+_SPELLED = {"DELTA_LENGTH_BYTE_ARRAY"} | _MARKS
+"""Encodings of text of which no word takes more bytes than its page. By DELTA_BYTE_ARRAY a word repeats the beginning
+of the word before, and may be of any length."""
+_REMEDY = "write it again with pandas.DataFrame.to_parquet"
+
+
+class ParquetError(Exception):
+    """A file cannot be read as Parquet; the text says why, without the name of the file."""
+
+
+class ParquetLimitError(ParquetError):
+    """A file holds what no table of designs does: nested columns, long words, too many rows or bytes."""
+
+
+class TableFile:
+    """A Parquet file of plain columns; its rows are not read yet.
+
+    Parameters
+    ----------
+    source
+        The opened file.
+    most_rows
+        Most rows that it may have.
+    most_bytes
+        Most bytes that the columns may take that are read, each number as eight.
+    most_text
+        Most bytes that their text may take where every row spells its words.
+
+    Attributes
+    ----------
+    schema : pyarrow.Schema
+        Names and types; a column of text is a dictionary of words.
+    rows : int
+        Number of rows.
+
+    Raises
+    ------
+    ParquetError
+        It is no Parquet file, or damaged.
+    ParquetLimitError
+        A column is nested or of a type that no table has, or there are too many rows or columns.
+    """
+
+    def __init__(
+        self,
+        source: IO[bytes] | pa.NativeFile,
+        most_rows: int = MOST_ROWS,
+        most_bytes: int = MOST_BYTES,
+        most_text: float = MOST_BYTES,
+    ) -> None:
+        import pyarrow.parquet as pq  # takes a third of a second to import: only where there is such a file
+
+        self._source, self._most_bytes, self._most_text = source, most_bytes, most_text
+        self._taken, self._text = 0, 0
+        with _in_words():
+            self._opened = partial(pq.ParquetFile, source, page_checksum_verification=True)
+            self._file = self._opened()
+            footer, self.schema = self._file.metadata, self._file.schema_arrow
+            self.rows: int = footer.num_rows
+            if len(self.schema) > MOST_COLUMNS:
+                raise ParquetLimitError(f"has {len(self.schema):,} columns; at most {MOST_COLUMNS:,} are read")
+            for field in self.schema:
+                if _width(field.type) is None:
+                    held = f"holds {_shown(str(field.type))}; a table has plain columns of numbers and text only"
+                    raise ParquetLimitError(f"column {_shown(field.name)} {held}")
+            if self.rows > most_rows:
+                raise ParquetLimitError(f"has {self.rows:,} rows; at most {most_rows:,} are read")
+            for index, field in enumerate(self.schema):
+                stored = footer.schema.column(index) if _is_decimal(field.type) else None
+                if stored and (stored.physical_type == "BYTE_ARRAY" or stored.length > _WIDEST_NUMBER):
+                    raise ParquetLimitError(f"column {_shown(field.name)} holds decimals of any length; {_REMEDY}")
+            self._groups = [footer.row_group(number) for number in range(footer.num_row_groups)]
+            if sum(group.num_rows for group in self._groups) != self.rows:
+                raise ParquetError("is damaged: it says two numbers of rows")
+            self._strings = {field.name for field in self.schema if _is_string(field.type)}
+            if self._strings:
+                self._file = self._opened(metadata=footer, read_dictionary=[*self._strings])
+                self.schema = self._file.schema_arrow
+
+    def read(self, columns: Sequence[str] | None = None) -> pa.Table:
+        """Return all rows, of the named columns or of all.
+
+        Raises
+        ------
+        ParquetError
+            The file is damaged.
+        ParquetLimitError
+            The columns have too many bytes, or a word is too long.
+        """
+        with _in_words():
+            spelled = self._check_bytes(columns)
+            file = self._file
+            if spelled:
+                file = self._opened(metadata=file.metadata, read_dictionary=[*(self._strings - spelled)])
+            table = file.read(columns, use_threads=False)  # parts of a result are read in parallel already
+            for index, name in enumerate(table.column_names):
+                if name in spelled:
+                    table = table.set_column(index, self.schema.field(name), table[name].dictionary_encode())
+            if len(table) != self.rows:
+                raise ParquetError(f"is damaged: it has {len(table):,} rows, and says {self.rows:,}")
+            for name, column in zip(table.column_names, table.columns, strict=True):
+                if _is_text(column.type):
+                    self._check_words(_shown(name), column)
+            return table
+
+    def _check_bytes(self, columns: Sequence[str] | None) -> set[str]:
+        """Add up what columns take unpacked, before any is; return those of words that pyarrow cannot read as codes."""
+        spelled = set()
+        wanted = self.schema.names if columns is None else set(columns)
+        for index, field in enumerate(self.schema):
+            if field.name not in wanted:
+                continue
+            shown, is_text = _shown(field.name), _is_text(field.type)
+            encodings: set[str] = set()
+            for group in self._groups:
+                stored = group.column(index)
+                if stored.num_values != group.num_rows:
+                    raise ParquetError(f"is damaged: column {shown} has not one value in each row")
+                encodings.update(stored.encodings)
+                values, unpacked = group.num_rows * (_width(field.type) or _CODE), stored.total_uncompressed_size
+                self._taken += values + unpacked if is_text else max(values, unpacked)
+                if self._taken > self._most_bytes:
+                    most = size_text(self._most_bytes)
+                    raise ParquetLimitError(f"has more than {most} once unpacked, up to column {shown}")
+            if is_text and not encodings <= _CODED:
+                if not encodings <= _SPELLED:
+                    raise ParquetLimitError(f"column {shown} is text in an encoding that is not read; {_REMEDY}")
+                spelled.add(field.name)
+        return spelled
+
+    def _check_words(self, shown: str, column: pa.ChunkedArray) -> None:
+        """Refuse words that are too long, or too many rows of long ones."""
+        import pyarrow.compute as pc
+
+        for chunk in column.chunks:
+            longest = pc.max(pc.utf8_length(chunk.dictionary)).as_py() or 0
+            if longest > LONGEST_WORD:
+                said = f"has a word of {longest:,} characters; a word may have {LONGEST_WORD:,}"
+                raise ParquetLimitError(f"column {shown} {said}")
+            sizes = pc.binary_length(chunk.dictionary)
+            text = len(chunk) * (pc.max(sizes).as_py() or 0)
+            if self._text + text > self._most_text:  # at most; now exactly
+                text = pc.sum(sizes.take(chunk.indices)).as_py() or 0
+            self._text += text
+            if self._text > self._most_text:
+                most = size_text(self._most_text)
+                raise ParquetLimitError(f"has more than {most} of text, up to column {shown}")
+
+
+@contextmanager
+def _in_words() -> Iterator[None]:
+    """Raise whatever pyarrow does as `ParquetError`: of a damaged file, it raises almost anything.
+
+    A file system that fails gives its errors a number, and these pass.
+    """
+    import pyarrow as pa
+
+    try:
+        yield
+    except MemoryError as problem:
+        raise ParquetError("takes more memory than there is") from problem
+    except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError) as problem:
+        if isinstance(problem, OSError) and problem.errno is not None:
+            raise
+        raise ParquetError("cannot be read as Parquet: it is damaged, or of another kind") from problem
+
+
+def _shown(name: str) -> str:
+    """Return a name or a type, fit to be shown."""
+    return printable(name if len(name) <= 80 else f"{name[:77]}...")
+
+
+@lru_cache(maxsize=64)
+def _width(kind: pa.DataType) -> int | None:
+    """Return the bytes of a value, which becomes a float or a code; None for a type that no table has."""
+    import pyarrow.types as kinds
+
+    if _is_text(kind) or _is_string(kind):
+        return _CODE
+    if kinds.is_dictionary(kind):
+        kind = kind.value_type
+    if kinds.is_null(kind):
+        return _FLOAT
+    if kinds.is_primitive(kind) or kinds.is_decimal(kind):
+        return max(int(kind.bit_width) // 8, _FLOAT)
+    return None
+
+
+@lru_cache(maxsize=64)
+def _is_text(kind: pa.DataType) -> bool:
+    """Whether a column is words and codes."""
+    import pyarrow.types as kinds
+
+    return bool(kinds.is_dictionary(kind) and _is_string(kind.value_type))
+
+
+@lru_cache(maxsize=64)
+def _is_string(kind: pa.DataType) -> bool:
+    import pyarrow.types as kinds
+
+    return bool(kinds.is_string(kind) or kinds.is_large_string(kind))
+
+
+@lru_cache(maxsize=64)
+def _is_decimal(kind: pa.DataType) -> bool:
+    import pyarrow.types as kinds
+
+    return bool(kinds.is_decimal(kind))

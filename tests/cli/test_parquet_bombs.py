@@ -1,0 +1,289 @@
+"""Small Parquet files that hold gigabytes: every command that reads one refuses them in words, in little memory."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from boulder_sweep.parquet import ParquetError, TableFile
+from boulder_sweep.store.files import part_name
+from tests.store.folders import part_record, rewrite_records
+
+DATA = Path(__file__).with_name("data")
+SETTINGS = """\
+name: stones
+table: {file}
+boulder: {{length: 1.65 m, width: 1.68 m, density: 2596 kg/m^3}}
+soil: {{density: 1859.9 kg/m^3, friction_angle: 40 deg, subgrade_reaction: 60 MN/m^3}}
+vehicle: {{mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}}
+solver: {{accuracy: fast}}
+"""
+MOST_MEMORY_KB = 1_000_000
+MOST_CPU_S = 20
+TEXT, READ = "stone", "verdict"
+"""Columns that become a bomb: of a list and of answers, and of a result, of which every command reads the verdicts."""
+PIECE = 50_000
+DRIVER = f"""
+import re, resource, sys
+from pathlib import Path
+resource.setrlimit(resource.RLIMIT_CPU, ({MOST_CPU_S}, {MOST_CPU_S}))
+from boulder_sweep.cli import main
+try:
+    main.main(sys.argv[1:])
+finally:
+    peak = re.search(r"VmHWM:\\s*(\\d+)", Path("/proc/self/status").read_text())
+    print(f"peak: {{peak[1]}}", file=sys.__stderr__)
+"""
+
+
+def sweep(folder: Path, *words: str) -> tuple[int, str, int]:
+    """Run a command in a process of its own; return its exit code, what it said, and the most memory it took [kB]."""
+    # Each thread of OpenBLAS sets memory aside.
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", DRIVER, *words], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    said, found, peak = done.stderr.rpartition("peak: ")
+    assert found, f"ended by signal {-done.returncode}: {done.stderr}"
+    return done.returncode, said, int(peak)
+
+
+def of_rows(base: pa.Table, rows: int, words: pa.Array | pa.ChunkedArray) -> pa.Table:
+    """Return the rows of a table again and again, with other words in the column that becomes a bomb."""
+    table = base.take(np.arange(rows) % len(base))
+    name = bomb_of(table)
+    return table.set_column(table.column_names.index(name), name, words)
+
+
+def bomb_of(table: pa.Table) -> str:
+    is_result = READ in table.column_names and "fails_at" not in table.column_names
+    return READ if is_result else TEXT
+
+
+def codes(rows: int, word: str) -> pa.Array:
+    return pa.DictionaryArray.from_arrays(pa.array(np.zeros(rows, np.int32)), pa.array([word]))
+
+
+def repeated(base: pa.Table, path: Path) -> None:
+    pq.write_table(of_rows(base, 10_000, codes(10_000, "y" * 100_000)), path, compression="zstd")
+
+
+def million(base: pa.Table, path: Path) -> None:
+    pq.write_table(of_rows(base, len(base), codes(len(base), "y" * 1_000_000)), path, compression="zstd")
+
+
+def nested(base: pa.Table, path: Path) -> None:
+    ends = np.linspace(0, 20_000_000, len(base) + 1).astype(np.int32)
+    lists = pa.ListArray.from_arrays(pa.array(ends), pa.array(np.zeros(20_000_000, np.int8)))
+    pq.write_table(of_rows(base, len(base), lists), path, compression="zstd")
+
+
+def different(base: pa.Table, path: Path) -> None:
+    """Half a gigabyte of words that begin alike: no dictionary holds them."""
+    with pq.ParquetWriter(path, of_rows(base, 1, pa.array(["y"])).schema, compression="zstd") as writer:
+        for first in range(0, 10 * PIECE, PIECE):
+            words = pa.array([f"{'y' * 990}{number}" for number in range(first, first + PIECE)])
+            writer.write_table(of_rows(base, PIECE, words))
+
+
+def prefixes(base: pa.Table, path: Path) -> None:
+    words = pa.array([f"{'y' * 1_000_000}{number}" for number in range(len(base))])
+    how = {"column_encoding": {bomb_of(base): "DELTA_BYTE_ARRAY"}, "use_dictionary": False}
+    pq.write_table(of_rows(base, len(base), words), path, compression="zstd", **how)
+
+
+def constant(base: pa.Table, path: Path) -> None:
+    """Rows that all are the same, of some hundred bytes a column."""
+    schema = of_rows(base, 1, codes(1, "y")).schema
+    piece = of_rows(base.slice(0, 1), 500_000, codes(500_000, "y"))
+    with pq.ParquetWriter(path, schema, compression="zstd", use_dictionary=True) as writer:
+        for _ in range(3 if len(schema) > 10 else 45):
+            writer.write_table(piece, row_group_size=len(piece))
+
+
+def declared(base: pa.Table, path: Path) -> None:
+    """A footer that says ten times the rows there are, wherever it says their number."""
+    pq.write_table(of_rows(base, 10_000, codes(10_000, "y")), path, compression="zstd")
+    content = path.read_bytes()
+    start = len(content) - 8 - int.from_bytes(content[-8:-4], "little")
+    path.write_bytes(content[:start] + content[start:].replace(varint(2 * 10_000), varint(2 * 100_000)))
+
+
+def varint(number: int) -> bytes:
+    """Return a number as a footer holds it: seven bits a byte."""
+    digits = []
+    while number > 127:
+        digits.append(number & 127 | 128)
+        number >>= 7
+    return bytes([*digits, number])
+
+
+SAID = {
+    repeated: "column (stone|verdict) has a word of 100,000 characters; a word may have 1,000",
+    million: "column (stone|verdict) has a word of 1,000,000 characters; a word may have 1,000",
+    nested: "column (stone|verdict) holds list<element: int8>; a table has plain columns",
+    different: "MB once unpacked, up to column ",
+    prefixes: "column (stone|verdict) is text in an encoding that is not read; write it again",
+    constant: "(has [0-9,]+ rows; at most (20|1),000,000|has more than [0-9]+ MB once unpacked, up to column )",
+    declared: "is damaged: ",
+}
+LISTS = {
+    "check": ("check", "list.yaml"),
+    "run": ("run", "list.yaml"),
+    "simulate": ("simulate", "list.yaml"),
+    "need": ("need", "list.yaml"),
+    "capacity": ("capacity", "list.yaml"),
+    "uncertainty": ("uncertainty", "list.yaml"),
+    "tradeoff": ("tradeoff", "list.yaml"),
+}
+RESULTS = {
+    "report": ("report", "{}"),
+    "export": ("export", "{}", "-o", "table.csv"),
+    "plot": ("plot", "{}"),
+    "compare": ("compare", "{}", "{}"),
+}
+COMMANDS = [
+    *(("list", *words) for words in LISTS.values()),
+    *(("answers", *(word.format("bomb.parquet") for word in words)) for words in RESULTS.values()),
+    *(("result", *(word.format("stones.sweep") for word in words)) for words in RESULTS.values()),
+    ("result", "explain", "stones.sweep", "0"),
+]
+OFTEN = [("list", "check"), ("answers", "export"), ("result", "report")]
+"""One command of each way to read; the others wait for the night."""
+
+
+@pytest.fixture(scope="module")
+def bases(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A list of designs, and what commands wrote of it."""
+    folder = tmp_path_factory.mktemp("bases")
+    words = pa.array(["a", "b", "c"]).dictionary_encode()
+    columns = {"boulder_height_m": [3.0, 3.2, 3.4], "embedment_depth_m": [2.0, 2.1, 2.2], TEXT: words}
+    pq.write_table(pa.table(columns), folder / "list.parquet")
+    (folder / "list.yaml").write_text(SETTINGS.format(file="list.parquet"))
+    for words in (("run", "list.yaml"), ("need", "list.yaml", "-o", "answers.parquet")):
+        assert sweep(folder, *words)[0] == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def bombs(bases: Path) -> Callable[[str, Callable[[pa.Table, Path], None]], Path]:
+    """Return the folder with a bomb; it is made once."""
+    (part,) = (bases / "stones.sweep").glob("rows-*")
+    table = {"list": pq.read_table(bases / "list.parquet"), "answers": pq.read_table(bases / "answers.parquet")}
+    table["result"] = pq.read_table(part)
+
+    def bomb(kind: str, make: Callable[[pa.Table, Path], None]) -> Path:
+        folder = bases / f"{kind}-{make.__name__}"
+        if folder.exists():
+            return folder
+        folder.mkdir()
+        (folder / "list.yaml").write_text(SETTINGS.format(file="bomb.parquet"))
+        make(table[kind], folder / "bomb.parquet")
+        if kind == "result":
+            shutil.copytree(bases / "stones.sweep", folder / "stones.sweep")
+            (folder / "stones.sweep" / part.name).unlink()
+            _put_part(folder)
+        return folder
+
+    return bomb
+
+
+def _put_part(folder: Path) -> None:
+    """Make the file the one part of the result, with a checksum that is right."""
+    content = (folder / "bomb.parquet").read_bytes()
+    rows = pq.read_metadata(folder / "bomb.parquet").num_rows
+    name = part_name(0, rows, rows)
+    (folder / "bomb.parquet").rename(folder / "stones.sweep" / name)
+
+    def changed(records: dict) -> None:
+        record = part_record(records)
+        sha256 = hashlib.sha256(content).hexdigest()
+        record.update(first=0, rows=rows, bytes=len(content), sha256=sha256, verdicts={"fail/overturns": rows})
+        records.update(rows=rows, rows_per_part=rows, parts={name: record}, merge=None)
+
+    rewrite_records(folder / "stones.sweep", changed)
+
+
+@pytest.mark.parametrize("make", SAID, ids=lambda make: make.__name__)
+@pytest.mark.parametrize(
+    "command",
+    [
+        pytest.param(one, id="-".join(one[:2]), marks=[] if one[:2] in OFTEN else pytest.mark.nightly)
+        for one in COMMANDS
+    ],
+)
+def test_bombs_are_refused_in_words(bombs, command, make):
+    kind, *words = command
+    code, said, peak = sweep(bombs(kind, make), *words)
+    assert re.search(SAID[make], said), said
+    assert code == (1 if kind == "result" and make is declared else 2), said
+    assert "stones.sweep/rows-" in said or "stones.sweep is damaged (rows-" in said or "bomb.parquet" in said
+    assert not re.search(r"Traceback|internal error|[A-Z]\w+(Error|Exception|Invalid)\b", said), said
+    assert peak < MOST_MEMORY_KB
+
+
+@pytest.mark.parametrize("name", ["strbomb", "list2"])
+def test_lists_of_a_few_kilobytes_are_refused(tmp_path, name):
+    shutil.copy(DATA / f"{name}.parquet", tmp_path)
+    (tmp_path / "list.yaml").write_text(SETTINGS.format(file=f"{name}.parquet"))
+    code, said, peak = sweep(tmp_path, "check", "list.yaml")
+    assert code == 2
+    assert f"{name}.parquet: column stone h" in said
+    assert peak < MOST_MEMORY_KB
+
+
+VERSIONS = [
+    *({"compression": codec} for codec in ("none", "snappy", "gzip", "brotli", "lz4", "zstd")),
+    {"data_page_version": "2.0"},
+    {"use_dictionary": False},
+    {"use_dictionary": False, "column_encoding": "DELTA_LENGTH_BYTE_ARRAY"},
+    {"write_page_checksum": True, "write_statistics": False},
+    {"row_group_size": 7},
+    {"store_schema": False},
+    {"write_page_index": True},
+]
+
+
+@pytest.mark.parametrize("how", VERSIONS, ids=lambda how: ",".join(f"{key}={value}" for key, value in how.items()))
+def test_whatever_pyarrow_writes_is_read(tmp_path, how):
+    rows = 100_000 if "row_group_size" not in how else 100
+    numbers = np.round(np.random.default_rng(1).random(rows), 2)
+    table = pa.table(
+        {
+            "number": pa.array(numbers, mask=numbers > 0.9),
+            "count": pa.array(np.arange(rows)),
+            "truth": pa.array(numbers > 0.5),
+            "decimal": pa.array(np.arange(rows)).cast(pa.decimal128(20, 0)),
+            "word": pa.array(["é" * 100, None, "b", ""] * (rows // 4)),
+            "name": pa.array([f"stone {row}" for row in range(rows)]),
+        }
+    )
+    if "column_encoding" in how:
+        table = table.select(["word", "name"])
+        how = {**how, "column_encoding": dict.fromkeys(table.column_names, how["column_encoding"])}
+    pq.write_table(table, tmp_path / "table.parquet", **how)
+    with (tmp_path / "table.parquet").open("rb") as file:
+        found = TableFile(file).read()
+    assert found.column_names == table.column_names
+    for name in table.column_names:
+        assert found[name].cast(table[name].type).equals(table[name]), name
+
+
+def test_a_page_cut_short_is_damaged(tmp_path):
+    path = tmp_path / "cut.parquet"
+    pq.write_table(pa.table({"number": np.arange(50_000.0)}), path, use_dictionary=False)
+    content = path.read_bytes()
+    path.write_bytes(content[:4] + bytes(100) + content[104:])
+    with path.open("rb") as file, pytest.raises(ParquetError, match="cannot be read as Parquet"):
+        TableFile(file).read()
