@@ -40,17 +40,20 @@ class Signal(NamedTuple):
     unit: str
     """Unit it is converted to: s, m, m/s, m/s^2 or deg."""
     other_names: tuple[str, ...] = ()
+    positive: str = ""
+    """When it is positive, in words, where a film or a sensor may give either sign."""
 
 
+_ALONG = "in the direction in which the truck travels"
 TIME = Signal("time", "s", ("t",))
 DISPLACEMENT = Signal("displacement", "m", ("x", "crush", "vehicle_displacement"))
 VELOCITY = Signal("velocity", "m/s", ("v", "speed", "vehicle_velocity"))
 ACCELERATION = Signal("acceleration", "m/s^2", ("a", "vehicle_acceleration"))
 DECELERATION = Signal("deceleration", "m/s^2", ("vehicle_deceleration",))
-ROTATION = Signal("rotation", "deg", ("boulder_rotation", "angle"))
-BOULDER = Signal("boulder_displacement", "m", ("boulder_centre_displacement",))
-VEHICLE = Signal("vehicle_displacement", "m", ("truck_displacement",))
-VEHICLE_ACCELERATION = Signal("vehicle_acceleration", "m/s^2", ("truck_acceleration",))
+ROTATION = Signal("rotation", "deg", ("boulder_rotation", "angle"), "while the boulder's top moves away from the truck")
+BOULDER = Signal("boulder_displacement", "m", ("boulder_centre_displacement",), _ALONG)
+VEHICLE = Signal("vehicle_displacement", "m", ("truck_displacement",), _ALONG)
+VEHICLE_ACCELERATION = Signal("vehicle_acceleration", "m/s^2", ("truck_acceleration",), "while the truck gains speed")
 
 PULSE_SIGNALS = (TIME, DISPLACEMENT, VELOCITY, ACCELERATION, DECELERATION)
 """What a crash pulse against a rigid wall may hold."""
