@@ -64,7 +64,7 @@ class Deviation:
 
     @property
     def peak_error(self) -> float:
-        """By how much the simulated peak is the larger one, as a share of the measured one; NaN where their signs differ."""
+        """By how much the simulated peak is larger, as a share of the measured one; NaN where their signs differ."""
         return _share(self.measured_peak, self.simulated_peak)
 
     def to_dict(self) -> dict[str, Any]:

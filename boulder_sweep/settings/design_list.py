@@ -49,8 +49,10 @@ _FLOAT = 8
 _NAMES = [field.name for field in INPUTS]
 _STORED_INDEX = "__index_level_0__"
 """Where pandas stores the numbers of rows in a Parquet file."""
-MAX_UNPACKED_BYTES = 1_000_000_000
-"""Largest spreadsheet once it is unpacked."""
+MAX_UNPACKED_BYTES = 100_000_000
+"""Largest spreadsheet once it is unpacked: some two million cells."""
+MOST_CELLS = 20_000_000
+"""Most cells of a sheet, with the empty ones: a single cell far out makes as many as it likes."""
 MAX_CELL = 32_767
 """Longest text that spreadsheets keep in a cell, in characters."""
 _MAX_PIECE = 10 * MAX_CELL
@@ -125,7 +127,6 @@ def _designs_of(table: TextTable, path: Location, problems: ProblemList) -> Desi
                 if not np.isnan(values[row]):  # those have been reported as they were read
                     table.alike.add("cells", table.position(rows[row], index), column.name, message)
             numbers[column.field.name].append(values)
-    table.alike.finish()
     if count == 0 and len(problems.problems) == before:
         raise refuse(table.label, "has no rows below the column names")
     for column, position in zip(columns, table.positions, strict=True):
@@ -145,9 +146,8 @@ class _Words:
     def take(self, cells: list[str]) -> None:
         """Take the next cells, fit to be printed."""
         codes = self.codes
-        self.parts.append(
-            np.array([codes.setdefault(shorten(cell, MAX_TEXT), len(codes)) for cell in cells], dtype=np.int32)
-        )
+        known = {cell: codes.setdefault(shorten(cell, MAX_TEXT), len(codes)) for cell in dict.fromkeys(cells)}
+        self.parts.append(np.array([known[cell] for cell in cells], dtype=np.int32))
 
     def label(self) -> Label:
         """Return what was taken."""
@@ -205,13 +205,13 @@ def _sheet_rows(path: Location, load_workbook: Callable[..., Any]) -> Iterator[R
         source = source_of(path)
         with zipfile.ZipFile(source) as archive:
             if sum(entry.file_size for entry in archive.infolist()) > MAX_UNPACKED_BYTES:
-                raise refuse(label, f"has more than {MAX_UNPACKED_BYTES / 1e9:g} GB once unpacked; save it as CSV")
+                raise refuse(label, f"has more than {size_text(MAX_UNPACKED_BYTES)} once unpacked; save it as CSV")
             for entry in archive.infolist():
                 if entry.filename.endswith(".xml"):
                     _check_pieces(archive, entry, label)
         width, looked = 0, False
         with closing(load_workbook(source, read_only=True, data_only=True)) as book:
-            for number, cells in enumerate(book.worksheets[0].iter_rows(values_only=True), 1):
+            for number, cells in _first_sheet(book, label, values_only=True):
                 if None in cells and not looked:
                     looked = True
                     _check_formulas(source, load_workbook, label)
@@ -225,15 +225,25 @@ def _sheet_rows(path: Location, load_workbook: Callable[..., Any]) -> Iterator[R
         raise refuse(label, f"cannot be read as a spreadsheet ({shorten(one_line(error), 100)})") from None
 
 
+def _first_sheet(book: Any, label: str, *, values_only: bool = False) -> Iterator[tuple[int, tuple[Any, ...]]]:
+    """Yield the rows of the first sheet with their numbers."""
+    count = 0
+    for number, cells in enumerate(book.worksheets[0].iter_rows(values_only=values_only), 1):
+        count += len(cells)
+        if count > MOST_CELLS:
+            raise refuse(label, f"has more than {MOST_CELLS:,} cells, with the empty ones; save it as CSV", number, 1)
+        yield number, cells
+
+
 def _check_formulas(source: IO[bytes] | str | Path, load_workbook: Callable[..., Any], label: str) -> None:
     """Refuse formulas that nobody has worked out: a program that writes a file without opening it leaves them so."""
     with (
         closing(load_workbook(source, read_only=True, data_only=True)) as values,
         closing(load_workbook(source, read_only=True)) as formulas,
     ):
-        rows = zip(*(book.worksheets[0].iter_rows() for book in (values, formulas)), strict=True)
-        for number, row in enumerate(rows, 1):
-            for index, (found, written) in enumerate(zip(*row, strict=True), 1):
+        rows = zip(*(_first_sheet(book, label) for book in (values, formulas)), strict=True)
+        for (number, valued), (_, formed) in rows:
+            for index, (found, written) in enumerate(zip(valued, formed, strict=True), 1):
                 is_text = found.data_type == "str"  # an empty one is a value
                 if found.value is None and written.value is not None and not is_text:
                     message = "has formulas without values: open and save it once in a spreadsheet program"

@@ -238,8 +238,9 @@ class Alike:
 
 def shorten(text: str, limit: int = 60) -> str:
     """Return text that can be quoted in a message: one line, printable, not longer than `limit`."""
-    flat = "".join(char if char.isprintable() else "?" for char in " ".join(text.split()))
-    return flat if len(flat) <= limit else flat[: limit - 3] + "..."
+    head = text[: 10 * limit]  # of a text of a hundred thousand characters, too
+    flat = "".join(char if char.isprintable() else "?" for char in " ".join(head.split()))
+    return flat if len(flat) <= limit and len(head) == len(text) else flat[: limit - 3] + "..."
 
 
 def nearest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:

@@ -24,8 +24,10 @@ MAX_BYTES = 500_000_000
 MAX_COLUMNS = 1000
 LONGEST_ROW = 1_000_000
 """Most characters of a row."""
-CHUNK = 2_000_000
+CHUNK = 200_000
 """Characters that are converted and checked at once."""
+MOST_MISTAKES = 10_000
+"""Mistakes after which a table is not read further."""
 INDEX_NAMES = ("", "Unnamed: 0")
 """What pandas writes above the numbers of rows: nothing, or this where it has read and written them before."""
 
@@ -106,7 +108,7 @@ class TextTable:
         self.rows = chain([row], self.rows)
 
     def chunks(self) -> Iterator[list[Row]]:
-        """Yield the rows, some at once."""
+        """Yield the rows, some at once, up to the end or too many mistakes."""
         chunk: list[Row] = []
         size = 0
         for row in self.rows:
@@ -115,6 +117,11 @@ class TextTable:
             if size >= CHUNK:
                 yield chunk
                 chunk, size = [], 0
+                if self.alike.counts.total() > MOST_MISTAKES:
+                    self.problems.add(
+                        Position(self.label, row[1]), "", "is not read beyond this line: too many mistakes"
+                    )
+                    break
         if chunk:
             yield chunk
         self._check_signs()
@@ -151,7 +158,8 @@ class TextTable:
                 cells = [cell.replace(",", ".") if cell.count(",") == 1 and "." not in cell else cell for cell in cells]
         if text.isascii() and "_" not in text and "n" not in text.lower():
             try:
-                return np.array([float(cell) for cell in cells])  # the usual case, fast
+                gaps = may_be_empty and not all(cells)  # the usual case, fast
+                return np.array([np.nan if gaps and not cell.strip() else float(cell) for cell in cells])
             except ValueError:
                 pass
         values = np.full(len(cells), np.nan)
@@ -291,7 +299,7 @@ def _table_of(lines: _Lines, known: Sequence[str], problems: ProblemList) -> Tex
 
 
 def _is_filled(cells: list[str]) -> bool:
-    return bool(cells) and (bool(cells[0].strip()) or any(cell.strip() for cell in cells))
+    return bool(cells) and bool(cells[0].strip() or "".join(cells).strip())
 
 
 def _is_number(text: str) -> bool:

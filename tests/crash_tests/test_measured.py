@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -62,6 +63,19 @@ def test_curves_as_recorders_and_spreadsheets_write_them(tmp_path: Path, text: s
     found = read_history(write(tmp_path, text), PULSE_SIGNALS)
     assert found.time_s == pytest.approx([-0.05, 0.0015, 0.002])
     assert found.signals["acceleration"] == pytest.approx(np.array([0.0, -0.891367, -1.21936]) * 9.80665)
+
+
+@pytest.mark.parametrize("sign", [",", "\t", ";"])
+def test_a_pulse_with_decimal_commas_is_the_one_with_points(tmp_path: Path, sign: str, sweep: Command) -> None:
+    """The vehicle of the pulse is the truck of the paper at 13.4 m/s."""
+    text = (Path(__file__).parent / "pulses" / "decimal_commas.csv").read_text()
+    plain = text if sign == ";" else text.replace(",", ".").replace(";", sign)
+    file = write(tmp_path, plain)
+    code, out, _ = sweep("fit-vehicle", file, "--mass", "6800 kg", "--json")
+    found = json.loads(out)
+    assert code == 0
+    assert found["vehicle_spring_N_m"] == pytest.approx(3103.3e3, rel=1e-3)
+    assert found["vehicle_damper_N_s_m"] == pytest.approx(138.91e3, rel=1e-3)
 
 
 @pytest.mark.parametrize("cell", ["ax [g]", "ax", "dx [mm]", "vx [m/s]", "displacment [g]"])

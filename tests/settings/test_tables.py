@@ -3,6 +3,7 @@
 import re
 import zipfile
 from decimal import Decimal
+from pathlib import Path
 
 import numpy as np
 import openpyxl
@@ -34,6 +35,9 @@ def load_table(tmp_path):
         return load(tmp_path / "grid.yaml")
 
     return load_table
+
+
+TABLES = Path(__file__).parent / "tables"
 
 
 @pytest.fixture
@@ -213,6 +217,24 @@ def test_what_spreadsheets_and_pandas_write_around_the_numbers(load_table, text,
     sweep = load_table(text, grid=GRID.replace("boulder: {{", "boulder: {{length: 1.65, width: 1.68, "))
     assert _column(sweep, "boulder_height_m") == heights
     assert sweep.block(0, 1).labels == {}
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("blank_rows.csv", [2.6, 3.0]),
+        ("trailing_commas.csv", [2.6, 3.0]),
+        ("decimals.parquet", [2.6]),
+        ("formulas.xlsx", "formulas.xlsx:2:2: table: has formulas without values: open and save it once in a"),
+    ],
+)
+def test_tables_as_other_programs_wrote_them(load_table, messages_of, name, expected):
+    grid = GRID.replace("boulder: {{", "boulder: {{length: 1.65, width: 1.68, ")
+    content = (TABLES / name).read_bytes()
+    if isinstance(expected, str):
+        assert messages_of(content, name, grid)[0].startswith(expected)
+    else:
+        assert _column(load_table(content, name, grid), "boulder_height_m") == expected
 
 
 @pytest.mark.parametrize("numbers", [(0, 0), (2, 1), (1.5, 2), ("a", "b"), (-1, 0)])
@@ -522,6 +544,18 @@ def test_a_spreadsheet_that_unpacks_to_too_much(messages_of, tmp_path, monkeypat
         archive.writestr("xl/workbook.xml", bytes(1_000_001))
     (message,) = messages_of(None, "designs.xlsx")
     assert "once unpacked; save it as CSV" in message
+
+
+@pytest.mark.parametrize(("cell", "row"), [("XFD1048576", 1221), ("CV300000", 200001)])
+def test_a_single_cell_far_out(load_table, messages_of, tmp_path, cell, row):
+    book = openpyxl.Workbook()
+    book.active.append(["boulder_height_m"])
+    book.active[cell] = 1.0
+    book.save(tmp_path / "designs.xlsx")
+    (message,) = messages_of(None, "designs.xlsx")
+    assert (
+        message == f"designs.xlsx:{row}:1: table: has more than 20,000,000 cells, with the empty ones; save it as CSV"
+    )
 
 
 def test_an_empty_spreadsheet(write_xlsx, messages_of):
