@@ -215,7 +215,7 @@ class TextTable:
             if self._first:
                 number = int(cells[0]) if cells[0].isascii() and cells[0].isdecimal() and len(cells[0]) < 18 else -1
                 if number <= last:
-                    message = "has no name, and does not count the rows; name it, such as boulder_id, or remove it"
+                    message = "has no name, and does not count the rows; give it a name, or remove it"
                     self.alike.add("", unnamed, "the first column", message, most=1)
                 last = number
             yield row
