@@ -241,7 +241,7 @@ def test_tables_as_other_programs_wrote_them(load_table, messages_of, name, expe
 def test_a_first_column_without_a_name_that_does_not_count(messages_of, numbers):
     table = f",{HEADER}{numbers[0]},1,1,2,1\n{numbers[1]},1,1,2,1\n"
     (message,) = messages_of(table)
-    assert message.startswith("designs.csv:1:1: the first column: has no name, and does not count the rows; give it a name")
+    assert message.startswith("designs.csv:1:1: the first column: has no name, and does not count the rows; give it")
 
 
 def test_a_mistake_beside_an_index_has_its_column(messages_of):
