@@ -280,24 +280,6 @@ def test_more_rows_than_designs_are_refused(files: dict[str, Path], tmp_path: Pa
 
 
 OTHER_VALUES = (None, True, -1, 0, 1.5, 1e300, 10**30, "", "x", "table", [], ["x"], [1, "a"], {}, {"a": 1}, "gone")
-    None,
-    True,
-    -1,
-    0,
-    1.5,
-    1e300,
-    10**30,
-    "",
-    "x",
-    "table",
-    [],
-    ["x"],
-    [1, "a"],
-    {},
-    {"a": 1},
-    [[]],
-    "gone",
-)
 PARSED = ("settings", "control", "readings", "versions", "accuracy", "question")
 
 
