@@ -27,7 +27,7 @@ from boulder_sweep.cli.settings_files import check, new
 from boulder_sweep.cli.share import explore, export, plot, report
 from boulder_sweep.cli.simulate import explain, simulate
 from boulder_sweep.cli.stone import stone
-from boulder_sweep.cli.vehicle_commands import fit_vehicle, speed
+from boulder_sweep.cli.vehicle_commands import fit_vehicle
 from boulder_sweep.errors import (
     EXIT_INTERNAL,
     EXIT_INTERRUPTED,
@@ -68,7 +68,7 @@ def start_light() -> None:
 
 
 GROUPS = {
-    "Ask": (new, check, stone, speed, need, uncertainty, capacity, simulate, explore),
+    "Ask": (new, check, stone, need, uncertainty, capacity, simulate, explore),
     "Tables": (run, status, explain, compare),
     "Share": (plot, report, export),
     "Model": (tradeoff, validate, fit_vehicle),

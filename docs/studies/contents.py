@@ -309,7 +309,6 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "stone-site": stones.site_of_example,
     "borehole-notes": site_data.notes_of_borehole,
     "spt-angles": site_data.angles_of_counts,
-    "speed-street": site_data.speed_of_street,
     "gallery-embassy-street": lambda root: gallery.words_of(root, "embassy_street"),
     "gallery-wet-backfill": lambda root: gallery.words_of(root, "wet_backfill"),
     "gallery-clayey-terrace": lambda root: gallery.words_of(root, "clayey_terrace"),

@@ -1,21 +1,16 @@
-"""What a site gives, as the commands show it: constants of the soil by a borehole, the speed of a street."""
+"""What a site gives, as the commands show it: constants of the soil by a borehole."""
 
 from __future__ import annotations
 
 import textwrap
 from pathlib import Path
 
-from click.testing import CliRunner
-
 from boulder_sweep import load
-from boulder_sweep.cli.vehicle_commands import speed
 from boulder_sweep.settings.distributions import FRACTILE_5
 from boulder_sweep.settings.problems import Position
 from boulder_sweep.settings.soil_readings import soil_of
 from boulder_sweep.settings.sweep import derived_words
 from boulder_sweep.settings.tree import block_of
-
-STREET = ("--length", "80 m", "--from", "0 mph", "--acceleration", "1.2 m/s^2")
 
 BOREHOLE = Path("configs/borehole.yaml")
 
@@ -42,9 +37,3 @@ def angles_of_counts(_: Path) -> str:
             f"| {n} | {reading['n1_60']:.1f} | {shown} | {mean:.1f} ± {sd:g}° | {mean - FRACTILE_5 * sd:.1f}° |"
         )
     return "\n".join(lines)
-
-
-def speed_of_street(_: Path) -> str:
-    """Return the speed of the street on the page, as the command prints it."""
-    done = CliRunner().invoke(speed, STREET)
-    return f"```text\n{done.output.rstrip()}\n```"

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-COMMANDS = ("new", "run", "check", "stone", "speed", "need", "uncertainty", "capacity", "simulate", "status")
+COMMANDS = ("new", "run", "check", "stone", "need", "uncertainty", "capacity", "simulate", "status")
 HEAVY = ("numba", "pandas", "scipy", "pyarrow", "matplotlib", "joblib", "rich", "pint", "pydantic", "dask", "trimesh")
 BESIDE_THE_KERNELS = (
     "numba",
@@ -60,7 +60,6 @@ def test_help_groups_the_commands(sweep):
         "new",
         "check",
         "stone",
-        "speed",
         "need",
         "uncertainty",
         "capacity",
@@ -102,8 +101,6 @@ def test_version(sweep):
         (["--help"], (*HEAVY, "numpy")),
         (["run", "--help"], (*HEAVY, "numpy")),
         (["stone", "--help"], (*HEAVY, "numpy")),
-        (["speed", "--help"], (*HEAVY, "numpy")),
-        (["speed", "--length", "80 m", "--from", "0 mph", "--acceleration", "1 m/s^2"], HEAVY),
         (["--version"], (*HEAVY, "numpy")),
         (["check", str(ROOT / "configs" / "m30_sizing.yaml")], HEAVY),
         (["check", str(ROOT / "configs" / "crash_tests.yaml")], HEAVY),

@@ -15,14 +15,6 @@ from boulder_sweep.settings import SettingsError, load_text
 from boulder_sweep.settings.fields import BY_PATH
 
 SITE, GRID = "configs/site.yaml", "configs/m30_sizing.yaml"
-ROAD = {"--length": "80 m", "--from": "0 mph", "--acceleration": "1 m/s^2", "--curve-radius": "25 m"}
-"""Of `sweep speed`: what else it needs."""
-
-
-def _speed(**given):
-    return ["speed", *(word for pair in (ROAD | given).items() for word in pair)]
-
-
 BARE = {
     ("need", "--between"): (["need", SITE, "--between", "5", "9", "--units", "us"], "--between '5 ft' '9 ft'"),
     ("need", "--tolerance"): (["need", SITE, "--tolerance", "1"], "--tolerance '1 m' or --tolerance '1 ft'"),
@@ -34,13 +26,12 @@ BARE = {
         ["fit-vehicle", "pulse.csv", "--mass", "6800 kg", "--speed", "30"],
         "--speed '30 m/s' or --speed '30 mph'",
     ),
-    **{("speed", option): (_speed(**{option: "5"}), f"as in {option} '5 ") for option in ROAD},
 }
 """Every such option: a command with a bare number, and a part of what is to be written in its place."""
 PLAIN = {
     *("--set", "--at", "--least", "--most", "--across", "--up", "--facing", "--columns", "--rows", "--case", "--class"),
     *("--unit", "--scheduler", "--dashboard", "--project", "--client", "--author", "--date"),
-    *("--margin", "--probability", "--half-width", "--confidence", "--friction", "--grade"),
+    *("--margin", "--probability", "--half-width", "--confidence"),
 }
 """Options that take words, or numbers without a dimension."""
 

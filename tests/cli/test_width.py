@@ -17,10 +17,6 @@ WORDS = {
     "run": (SITE,),
     "check": (CONFIGS / "m30_sizing.yaml",),
     "stone": (CONFIGS.parent / "docs" / "examples" / "rock.ply", "--mass", "23.5 t"),
-    "speed": (
-        *("--length", "800 ft", "--from", "20 mph", "--acceleration", "3 ft/s^2"),
-        *("--curve-radius", "60 ft", "--friction", "0.8", "--grade", "4 %"),
-    ),
     "need": (SITE, *US),
     "uncertainty": (CONFIGS / "uncertain_site.yaml", "--half-width", "0.2", "--doubts", *US),
     "capacity": (SITE, *US),
