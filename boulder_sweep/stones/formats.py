@@ -530,6 +530,8 @@ def _accessor(header: dict[str, Any], buffer: memoryview, number: int, shape: st
     start, length, count = view.get("byteOffset", 0), view["byteLength"], index(accessor["count"])
     kind, width = np.dtype(_COMPONENTS[accessor["componentType"]]), _WIDTHS[shape]
     stride = view.get("byteStride", width * kind.itemsize)
+    if shape == "SCALAR" and kind.kind != "u":
+        raise ScanError("is damaged: it numbers corners with something else than whole numbers")
     if accessor["type"] != shape or min(start, count, stride) < 0 or start + length > len(buffer):
         raise ScanError("is damaged: it describes what is not there")
     check_count(count, 3)
