@@ -244,7 +244,7 @@ def answers(data: bytes) -> bool:
         table = table.replace_schema_metadata({**table.schema.metadata, **metadata})
         changed = HERE / "changed.parquet"
         pq.write_table(table, changed, compression="none")
-    except (ValueError, LookupError, TypeError, AttributeError, RecursionError, pa.ArrowException):
+    except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError, pa.ArrowException):
         return False  # no list of changes
     if is_refused(data, lambda: AnswerFile(changed, ReportError)):
         return False
