@@ -1,4 +1,4 @@
-"""Fuzz one reader, guided by coverage: ``python -m tests.fuzz NAME --seconds N``.
+"""Fuzz a reader, guided by coverage: ``python -m tests.fuzz NAME --seconds N``.
 
 It needs atheris (pip install atheris). An input that fails is written into the corpus, where it is a test from then on.
 With ``--into FOLDER`` the inputs that reached something new are kept there; ``--merge FOLDER`` takes into the corpus
@@ -18,6 +18,8 @@ from pathlib import Path
 import atheris
 
 LIMITS = ("-rss_limit_mb=1000", "-timeout=20", "-max_len=16384")
+AGAIN = "--"
+"""Before what libFuzzer asks of the process that merges, which it starts itself."""
 
 
 def main() -> None:
@@ -27,15 +29,20 @@ def main() -> None:
     parser.add_argument("--seconds", type=int, default=60)
     parser.add_argument("--into", type=Path)
     parser.add_argument("--merge", type=Path)
-    asked = parser.parse_args()
+    at = sys.argv.index(AGAIN) if AGAIN in sys.argv else len(sys.argv)
+    asked, given = parser.parse_args(sys.argv[1:at]), sys.argv[at + 1 :]
     with atheris.instrument_imports(include=["boulder_sweep"]), tempfile.TemporaryDirectory() as scratch:
         targets = importlib.import_module("tests.fuzz.targets")
         target, corpus = targets.TARGETS[asked.name], targets.CORPUS / asked.name
         corpus.mkdir(parents=True, exist_ok=True)
-        words = Path(scratch, "words")
-        words.write_bytes(b"\n".join(sorted(dictionary(corpus))))
-        options = [*LIMITS, f"-artifact_prefix={corpus}/", f"-dict={words}", "-print_final_stats=1"]
-        if asked.merge:
+        known, again = Path(scratch, "known"), Path(scratch, "again")
+        known.write_bytes(b"\n".join(sorted(dictionary(corpus))))
+        again.write_text(f'#!/bin/sh\nexec {sys.executable} -m tests.fuzz {asked.name} {AGAIN} "$@"\n')
+        again.chmod(0o755)
+        options = [*LIMITS, f"-artifact_prefix={corpus}/", f"-dict={known}", "-print_final_stats=1"]
+        if given:
+            options = given
+        elif asked.merge:
             options += ["-merge=1", str(corpus), str(asked.merge)]
         else:
             into = asked.into or Path(scratch, "new")
@@ -49,7 +56,7 @@ def main() -> None:
             found = target.changed(data, most, atheris.Mutate, random.Random(seed))
             return found if len(found) <= most else atheris.Mutate(data, most)
 
-        atheris.Setup([sys.argv[0], *options], attempt, **({"custom_mutator": changed} if target.changed else {}))
+        atheris.Setup([str(again), *options], attempt, **({"custom_mutator": changed} if target.changed else {}))
         atheris.Fuzz()
 
 
