@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from boulder_sweep.errors import ScanError
+from boulder_sweep.text import printable
 
 MAX_FACES = 1_000_000
 """Most triangles, and most points where triangles share them. A phone makes 100,000, a profile needs a few thousand."""
@@ -315,7 +316,9 @@ def _text_columns(element: _Element, rows: Iterator[tuple[int, list[bytes]]]) ->
         except (ValueError, LookupError, OverflowError):
             at = -1
         if at != len(words):
-            raise ScanError(f"line {number}: is damaged: it is no {element.name} as the header describes it")
+            raise ScanError(
+                f"line {number}: is damaged: it is no {printable(element.name[:60])} as the header describes it"
+            )
         check_count(len(counts), 3)
     many_each = np.frombuffer(counts, np.int64).reshape(element.count, -1) if columns else np.empty((0, 1), np.int64)
     return [np.frombuffer(column, column.typecode) for column in columns.values()], many_each[:, -1]

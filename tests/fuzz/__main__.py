@@ -9,55 +9,45 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import os
 import random
 import re
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 import atheris
 
+CORPUS = Path(__file__).parents[1] / "corpus"
 LIMITS = ("-rss_limit_mb=1000", "-timeout=20", "-max_len=16384")
-AGAIN = "--"
-"""Before what libFuzzer asks of the process that merges, which it starts itself."""
 
 
-def main() -> None:
-    """Read the command line and fuzz until the time is over or an input fails."""
+def main() -> int:
+    """Read the command line; fuzz in another process, which ends without clearing up."""
     parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__)
-    parser.add_argument("name")
+    parser.add_argument("name", choices=sorted(path.name for path in CORPUS.iterdir()))
     parser.add_argument("--seconds", type=int, default=60)
     parser.add_argument("--into", type=Path)
     parser.add_argument("--merge", type=Path)
-    at = sys.argv.index(AGAIN) if AGAIN in sys.argv else len(sys.argv)
-    asked, given = parser.parse_args(sys.argv[1:at]), sys.argv[at + 1 :]
-    with atheris.instrument_imports(include=["boulder_sweep"]), tempfile.TemporaryDirectory() as scratch:
-        targets = importlib.import_module("tests.fuzz.targets")
-        target, corpus = targets.TARGETS[asked.name], targets.CORPUS / asked.name
-        corpus.mkdir(parents=True, exist_ok=True)
-        known, again = Path(scratch, "known"), Path(scratch, "again")
+    asked = parser.parse_args()
+    corpus = CORPUS / asked.name
+    with tempfile.TemporaryDirectory() as scratch:
+        program, known = Path(scratch, "fuzz"), Path(scratch, "known")  # libFuzzer starts the program again to merge
+        program.write_text(
+            f'#!/bin/sh\nexec {sys.executable} -c "from tests.fuzz.__main__ import fuzz; fuzz()" "$0" "$@"\n'
+        )
+        program.chmod(0o755)
         known.write_bytes(b"\n".join(sorted(dictionary(corpus))))
-        again.write_text(f'#!/bin/sh\nexec {sys.executable} -m tests.fuzz {asked.name} {AGAIN} "$@"\n')
-        again.chmod(0o755)
         options = [*LIMITS, f"-artifact_prefix={corpus}/", f"-dict={known}", "-print_final_stats=1"]
-        if given:
-            options = given
-        elif asked.merge:
+        if asked.merge:
             options += ["-merge=1", str(corpus), str(asked.merge)]
         else:
             into = asked.into or Path(scratch, "new")
             into.mkdir(parents=True, exist_ok=True)
             options += [f"-max_total_time={asked.seconds}", str(into), str(corpus)]
-
-        def attempt(data: bytes) -> None:
-            target.attempt(data)
-
-        def changed(data: bytes, most: int, seed: int) -> bytes:
-            found = target.changed(data, most, atheris.Mutate, random.Random(seed))
-            return found if len(found) <= most else atheris.Mutate(data, most)
-
-        atheris.Setup([str(again), *options], attempt, **({"custom_mutator": changed} if target.changed else {}))
-        atheris.Fuzz()
+        environment = {**os.environ, "TMPDIR": scratch, "FUZZED": asked.name}
+        return subprocess.run([program, *options], env=environment, check=False).returncode
 
 
 def dictionary(corpus: Path) -> set[bytes]:
@@ -66,5 +56,21 @@ def dictionary(corpus: Path) -> set[bytes]:
     return {b'"' + word + b'"' for word in found}
 
 
+def fuzz() -> None:
+    """Fuzz until the time is over or an input fails."""
+    with atheris.instrument_imports(include=["boulder_sweep"]):
+        target = importlib.import_module("tests.fuzz.targets").TARGETS[os.environ["FUZZED"]]
+
+        def attempt(data: bytes) -> None:
+            target.attempt(data)
+
+        def changed(data: bytes, most: int, seed: int) -> bytes:
+            found = target.changed(data, most, atheris.Mutate, random.Random(seed))
+            return found if len(found) <= most else atheris.Mutate(data, most)
+
+        atheris.Setup(sys.argv[1:], attempt, **({"custom_mutator": changed} if target.changed else {}))
+        atheris.Fuzz()
+
+
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
