@@ -334,8 +334,9 @@ def _sheet_rows(path: Location, load_workbook: Callable[..., Any]) -> Iterator[t
     except (SettingsError, MemoryError):
         raise
     except Exception as error:  # of a damaged file, zlib, the parser of XML and openpyxl raise almost anything
-        known = isinstance(error, OSError) and error.errno is not None
-        reason = why(error) if known else "it is damaged, locked by a password, or of another kind; save it as CSV"
+        reason = "it is damaged, locked by a password, or of another kind; save it as CSV"
+        if isinstance(error, OSError) and error.errno is not None:
+            reason = why(error)
         raise refuse(label, f"cannot be read as a spreadsheet ({reason})") from None
 
 
