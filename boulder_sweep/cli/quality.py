@@ -187,6 +187,8 @@ The first line of a --measured file names its columns, with units:
   time [ms], rotation [deg], boulder_displacement [mm],
   vehicle_displacement [m], vehicle_acceleration [g]
 The boulder's displacement is that of its own centre of mass.
+Displacements are positive in the direction in which the truck
+travels, the rotation while the boulder's top moves away from it.
 Empty cells are gaps in a track.
 """
 
@@ -216,10 +218,11 @@ def validate(out: str | None, measured: str | None, case: str | None, as_json: b
     content: dict[str, Any] = validation.to_dict()
     text = [validation.text(), "", f"note: {NOT_COMPARED}"]
     if overlaid is not None:
-        overlay, scored, draw = overlaid
+        overlay, scored, notes, draw = overlaid
         written = [] if out is None else [draw(Path(out))]
         content["measured"] = {preset: [d.to_dict() for d in rows] for preset, rows in overlay.items()}
         content["scores"] = [score.to_dict() for score in scored]
+        content["notes"] = notes
         content["files"] += written
         from boulder_sweep.crash_tests.score import deviation_table, score_table
         from boulder_sweep.crash_tests.tables import WIDTH
@@ -229,7 +232,8 @@ def validate(out: str | None, measured: str | None, case: str | None, as_json: b
             signals = dict.fromkeys(d.signal for rows in overlay.values() for d in rows)
             by_signal = ({p: [d for d in rows if d.signal == name] for p, rows in overlay.items()} for name in signals)
             tables = [deviation_table(part).text() for part in by_signal]
-        text = [validation.text(), "", f"{measured} against {case}:", "\n\n".join(tables)]
+        text = [validation.text(), "", f"{measured} against {case}:"]
+        text += [*(f"note: {note}" for note in notes), "\n\n".join(tables)]
         text += ["", "scores, up to the limit of the rotation:", score_table(scored).text()]
         text += ["safe: the model moves more, or reaches the limit earlier, than the test did"]
     if out is not None:
@@ -242,11 +246,15 @@ def validate(out: str | None, measured: str | None, case: str | None, as_json: b
     return 0 if validation.holds else 1
 
 
-def _overlay(measured: str, case: str) -> tuple[dict[str, Any], list[Score], Callable[[Path], str]]:
-    """Compare a user's data with both presets, and score them; return a function that draws them into a folder, too."""
+def _overlay(measured: str, case: str) -> tuple[dict[str, Any], list[Score], list[str], Callable[[Path], str]]:
+    """Compare a user's data with both presets, and score them.
+
+    Returns deviations by preset, scores, notes on the signs of what was measured, and a function that draws it all into
+    a folder.
+    """
     from boulder_sweep.crash_tests.cases import NAMES, crash_test
     from boulder_sweep.crash_tests.measured import TEST_SIGNALS, read_history
-    from boulder_sweep.crash_tests.score import by_the_paper, compare, forms_of, scores
+    from boulder_sweep.crash_tests.score import by_the_paper, compare, forms_of, opposed, scores
     from boulder_sweep.judge.quantiles import MEAN, at_values
     from boulder_sweep.settings import load
     from boulder_sweep.settings.model import PRESETS
@@ -269,4 +277,4 @@ def _overlay(measured: str, case: str) -> tuple[dict[str, Any], list[Score], Cal
         draw_crash_test(sweep.name, trajectories, target, history)
         return str(target)
 
-    return deviations, scored, draw
+    return deviations, scored, opposed(trajectories.values(), history), draw

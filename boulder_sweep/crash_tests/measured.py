@@ -1,17 +1,15 @@
 """Measured time histories: a CSV file whose header names quantities and their units; a rigid-wall pulse is one.
 
 ``time [ms], displacement [mm], acceleration [g]``: the name of a quantity, then its unit in brackets or parentheses, or
-behind an underline as in ``time_s`` and ``vehicle_displacement_m``. Empty cells are gaps in a track. Lines that begin
-with # are skipped.
+behind an underline as in ``time_s`` and ``vehicle_displacement_m``. Units may stand in a line of their own below the
+names. Empty cells are gaps in a track. Lines that begin with # are skipped.
 """
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,17 +19,15 @@ from boulder_sweep.errors import FitError
 from boulder_sweep.settings.problems import (
     Position,
     ProblemList,
-    cell_position,
     check_regular_file,
     did_you_mean,
     refuse,
     shorten,
 )
+from boulder_sweep.settings.text_table import MAX_BYTES, TextTable, open_text
 from boulder_sweep.settings.units import UnitError, factor
-from boulder_sweep.settings.values import NumberError, split_number
 
-MOST_ROWS, MOST_COLUMNS = 2_000_000, 1000
-MAX_BYTES = 500_000_000
+MOST_ROWS = 2_000_000
 _BRACKETS = re.compile(r"(?P<name>[^\[(]*?)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))\s*")
 _SUFFIXES = {"m_s2": "m/s^2", "ft_s2": "ft/s^2", "m_s": "m/s", "km_h": "km/h", "ft_s": "ft/s"}
 _PLAIN_SUFFIXES = ("s", "ms", "m", "mm", "cm", "in", "ft", "deg", "rad", "mph", "g")
@@ -44,19 +40,20 @@ class Signal(NamedTuple):
     unit: str
     """Unit it is converted to: s, m, m/s, m/s^2 or deg."""
     other_names: tuple[str, ...] = ()
-    sign: float = 1.0
-    """-1 where `other_names` hold it with the opposite sign; such names are then the only ones."""
+    positive: str = ""
+    """When it is positive, in words, where a film or a sensor may give either sign."""
 
 
+_ALONG = "in the direction in which the truck travels"
 TIME = Signal("time", "s", ("t",))
 DISPLACEMENT = Signal("displacement", "m", ("x", "crush", "vehicle_displacement"))
 VELOCITY = Signal("velocity", "m/s", ("v", "speed", "vehicle_velocity"))
 ACCELERATION = Signal("acceleration", "m/s^2", ("a", "vehicle_acceleration"))
 DECELERATION = Signal("deceleration", "m/s^2", ("vehicle_deceleration",))
-ROTATION = Signal("rotation", "deg", ("boulder_rotation", "angle"))
-BOULDER = Signal("boulder_displacement", "m", ("boulder_centre_displacement",))
-VEHICLE = Signal("vehicle_displacement", "m", ("truck_displacement",))
-VEHICLE_ACCELERATION = Signal("vehicle_acceleration", "m/s^2", ("truck_acceleration",))
+ROTATION = Signal("rotation", "deg", ("boulder_rotation", "angle"), "while the boulder's top moves away from the truck")
+BOULDER = Signal("boulder_displacement", "m", ("boulder_centre_displacement",), _ALONG)
+VEHICLE = Signal("vehicle_displacement", "m", ("truck_displacement",), _ALONG)
+VEHICLE_ACCELERATION = Signal("vehicle_acceleration", "m/s^2", ("truck_acceleration",), "while the truck gains speed")
 
 PULSE_SIGNALS = (TIME, DISPLACEMENT, VELOCITY, ACCELERATION, DECELERATION)
 """What a crash pulse against a rigid wall may hold."""
@@ -89,7 +86,7 @@ def read_history(path: str | Path, wanted: Sequence[Signal]) -> TimeHistory:
     Parameters
     ----------
     path
-        UTF-8 text; comma, semicolon or tab between the cells.
+        See `boulder_sweep.settings.text_table.open_text`; the units may stand in the names, or below them.
     wanted
         Quantities it may hold; time among them.
 
@@ -104,27 +101,29 @@ def read_history(path: str | Path, wanted: Sequence[Signal]) -> TimeHistory:
         Every mistake of the file, with line and column.
     """
     file = Path(path)
-    header, *rows = _rows(file)
+    check_regular_file(file, MAX_BYTES, "Keep the impact, and leave out what comes before and after")
     problems = ProblemList()
-    if len(header.cells) > MOST_COLUMNS:
-        raise refuse(str(file), f"has {len(header.cells):,} columns; at most {MOST_COLUMNS:,} are read")
-    columns = [_column(cell, header.position(index), wanted, problems) for index, cell in enumerate(header.cells)]
-    named = [column and column.signal.name for column in columns]
-    for index, name in enumerate(named):
-        if name is not None and name in named[:index]:
-            problems.add(header.position(index), name, "stands in two columns")
-    if not problems and TIME.name not in named:
-        problems.add(header.position(0), "", "has no column of time, such as 'time [ms]'")
-    if not problems and len(named) < 2:
-        names = ", ".join(signal.name for signal in wanted if signal is not TIME)
-        problems.add(header.position(0), "", f"has nothing beside time; it may hold {names}")
+    with open_text(file, MOST_ROWS, [f"{signal.name} [{signal.unit}]" for signal in wanted], problems) as table:
+        columns = _columns(table, wanted, problems)
+        parts: dict[str, list[np.ndarray]] = {column.signal.name: [] for column in columns}
+        last = -np.inf
+        for rows in table.chunks():
+            for index, column in enumerate(columns):
+                name = column.signal.name
+                values = table.numbers(rows, index, name, may_be_empty=column.signal is not TIME) * column.factor
+                if column.signal is TIME:
+                    for row in np.flatnonzero(np.diff(values, prepend=last) <= 0.0):
+                        before = values[row - 1] if row else last
+                        message = f"{values[row]:.6g} s comes after {before:.6g} s; times must ascend"
+                        table.alike.add("rows", table.position(rows[row], index), name, message)
+                    last = values[-1]
+                parts[name].append(values)
     problems.raise_if_any()
-    values = _values(rows, columns, problems)
-    if not problems:
-        _check_time(rows, named.index(TIME.name), values[TIME.name], problems)
-    problems.raise_if_any()
-    time = values.pop(TIME.name)
-    return TimeHistory(file, time, values)
+    found = {name: np.concatenate([np.empty(0), *values]) for name, values in parts.items()}
+    time = found.pop(TIME.name)
+    if len(time) < 2:
+        raise refuse(str(file), "must hold a line of names and at least two rows of numbers")
+    return TimeHistory(file, time, found)
 
 
 class _Column(NamedTuple):
@@ -134,46 +133,41 @@ class _Column(NamedTuple):
     factor: float
 
 
-class _Row(NamedTuple):
-    """A line that holds something, cut into cells."""
+def _columns(table: TextTable, wanted: Sequence[Signal], problems: ProblemList) -> list[_Column]:
+    """Return what the columns are.
 
-    file: Path
-    line: int
-    text: str
-    delimiter: str
-    cells: list[str]
-
-    def position(self, index: int) -> Position:
-        """Return where a cell begins."""
-        return cell_position(str(self.file), self.line, self.text, self.delimiter, index)
-
-
-def _rows(file: Path) -> list[_Row]:
-    """Return the lines that hold something."""
-    label = str(file)
-    check_regular_file(file, MAX_BYTES, "Keep the impact, and leave out what comes before and after")
-    try:
-        with file.open(encoding="utf-8-sig", newline="") as stream:
-            filled = ((number, text) for number, text in enumerate(stream, 1) if _holds_something(text))
-            lines = list(islice(filled, MOST_ROWS + 2))
-    except UnicodeDecodeError:
-        raise refuse(label, "is not UTF-8 text; save it as CSV in UTF-8") from None
-    except OSError as error:
-        raise refuse(label, f"cannot be read ({error.strerror})") from None
-    if len(lines) < 3:
-        raise refuse(label, "must hold a line of names and at least two rows of numbers")
-    if len(lines) > MOST_ROWS + 1:
-        raise refuse(label, f"has more than {MOST_ROWS:,} rows")
-    delimiter = next((sign for sign in ",;\t" if sign in lines[0][1]), ",")
-    try:
-        cells = csv.reader([text for _, text in lines], delimiter=delimiter)
-        return [_Row(file, *line, delimiter, row) for line, row in zip(lines, cells, strict=True)]
-    except (csv.Error, ValueError):
-        raise refuse(label, "cannot be read as CSV: a cell runs over the end of its line") from None
+    Raises
+    ------
+    SettingsError
+        A name or a unit is not known, or time or all else is missing.
+    """
+    names = _with_units(table, wanted)
+    found = [_column(name, at, wanted, problems) for name, at in zip(names, table.positions, strict=True)]
+    columns = [column for column in found if column is not None]
+    named = [column and column.signal.name for column in found]
+    for index, name in enumerate(named):
+        if name is not None and name in named[:index]:
+            problems.add(table.positions[index], name, "stands in two columns")
+    if not problems and TIME.name not in named:
+        problems.add(table.positions[0], "", "has no column of time, such as 'time [ms]'")
+    if not problems and len(named) < 2:
+        others = ", ".join(signal.name for signal in wanted if signal is not TIME)
+        problems.add(table.positions[0], "", f"has nothing beside time; it may hold {others}")
+    problems.raise_if_any()
+    return columns
 
 
-def _holds_something(text: str) -> bool:
-    return bool(text.strip(" \t\r\n,;")) and not text.startswith("#")
+def _with_units(table: TextTable, wanted: Sequence[Signal]) -> list[str]:
+    """Return the names of columns with their units, which stand below them in some files."""
+    row = next(table.rows, None)
+    if row is None:
+        return table.names
+    units = [table.cells([row], index)[0].strip(" []()") for index in range(len(table.names))]
+    bare = not any(_split_header(name)[1] for name in table.names)
+    if bare and all(any(_is_unit(unit, signal.unit) for signal in wanted) for unit in units):
+        return [f"{name} [{unit}]" for name, unit in zip(table.names, units, strict=True)]
+    table.put_back(row)
+    return table.names
 
 
 def _column(cell: str, position: Position, wanted: Sequence[Signal], problems: ProblemList) -> _Column | None:
@@ -216,49 +210,6 @@ def _is_unit(unit: str, target: str) -> bool:
         return factor(unit, target) > 0
     except UnitError:
         return False
-
-
-def _values(rows: list[_Row], columns: Sequence[_Column | None], problems: ProblemList) -> dict[str, np.ndarray]:
-    """Return the numbers of every column, converted; NaN for an empty cell."""
-    values = {column.signal.name: np.full(len(rows), np.nan) for column in columns if column is not None}
-    for line, row in enumerate(rows):
-        if len(row.cells) != len(columns):
-            plural = "" if len(row.cells) == 1 else "s"
-            message = f"has {len(row.cells)} cell{plural}; the first line has {len(columns)}"
-            problems.add(row.position(0), "", message)
-            continue
-        for index, (cell, column) in enumerate(zip(row.cells, columns, strict=True)):
-            if column is not None and cell.strip():
-                value = _number(cell)
-                if isinstance(value, str):
-                    problems.add(row.position(index), column.signal.name, value)
-                else:
-                    values[column.signal.name][line] = value * column.factor
-    return values
-
-
-def _number(cell: str) -> float | str:
-    """Return the number in a cell, or what is wrong with it."""
-    try:
-        value = float(cell)  # the usual case, fast
-    except ValueError:
-        value = np.nan
-    if np.isfinite(value) and cell.isascii() and "_" not in cell:
-        return value
-    try:
-        number, unit = split_number(cell, "1")
-    except NumberError as error:
-        return str(error)
-    return f"'{shorten(cell)}' has a unit; the column has one in its name" if unit else float(number)
-
-
-def _check_time(rows: list[_Row], column: int, time: np.ndarray, problems: ProblemList) -> None:
-    """Report times that are missing or do not ascend."""
-    for row in np.flatnonzero(np.isnan(time))[:5]:
-        problems.add(rows[row].position(column), TIME.name, "is missing in this row")
-    for row in np.flatnonzero(np.diff(time) <= 0.0)[:5]:
-        message = f"{time[row + 1]:.6g} s comes after {time[row]:.6g} s; times must ascend"
-        problems.add(rows[row + 1].position(column), TIME.name, message)
 
 
 PULSE_UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -50,7 +50,7 @@ class Deviation:
     largest : float
         Largest difference, with its sign.
     measured_peak, simulated_peak : float
-        Largest values up to that time.
+        Values of the largest magnitude up to the last of the samples, with their signs.
     """
 
     signal: str
@@ -64,10 +64,8 @@ class Deviation:
 
     @property
     def peak_error(self) -> float:
-        """Simulated peak minus measured peak, as a share of the measured one."""
-        if self.measured_peak == 0.0:
-            return math.nan
-        return (self.simulated_peak - self.measured_peak) / abs(self.measured_peak)
+        """By how much the simulated peak is larger, as a share of the measured one; NaN where their signs differ."""
+        return _share(self.measured_peak, self.simulated_peak)
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data."""
@@ -99,8 +97,8 @@ def compare(trajectory: Trajectory, measured: TimeHistory) -> list[Deviation]:
     Returns
     -------
     list of Deviation
-        For every signal one over the time that both cover, and where the simulated boulder passes its rotation limit a
-        second one up to then, because the model does not hold beyond.
+        For every signal one over the time that both cover, and where the simulated or the measured boulder passes its
+        rotation limit a second one up to then, because the model does not hold beyond.
 
     Raises
     ------
@@ -108,16 +106,18 @@ def compare(trajectory: Trajectory, measured: TimeHistory) -> list[Deviation]:
         No measured value lies within the simulated time.
     """
     end = float(trajectory.time_s[-1]) if len(trajectory) else 0.0
-    limit = trajectory.motion.outcome.t_limit
+    when = time_of_limit(measured, math.degrees(trajectory.motion.control.theta_limit))
+    limits = [time for time in (trajectory.motion.outcome.t_limit, when) if time < end]
     deviations = []
     for name, values in measured.signals.items():
-        for until in (end, limit) if math.isfinite(limit) else (end,):
+        curve = simulated_signal(trajectory, name)
+        for until in (end, min(limits)) if limits else (end,):
             inside = np.isfinite(values) & (measured.time_s >= 0.0) & (measured.time_s <= until)
             if not inside.any():
                 continue
             times, data = measured.time_s[inside], values[inside]
-            simulated = np.interp(times, trajectory.time_s, simulated_signal(trajectory, name))
-            error = simulated - data
+            error = np.interp(times, trajectory.time_s, curve) - data
+            peaks = _peaks(times, data, trajectory.time_s, curve)
             deviations.append(
                 Deviation(
                     signal=name,
@@ -126,8 +126,8 @@ def compare(trajectory: Trajectory, measured: TimeHistory) -> list[Deviation]:
                     samples=len(data),
                     rms=float(np.sqrt(np.mean(error**2))),
                     largest=float(error[np.argmax(np.abs(error))]),
-                    measured_peak=_peak(data),
-                    simulated_peak=_peak(simulated),
+                    measured_peak=peaks[0],
+                    simulated_peak=peaks[1],
                 )
             )
     if not deviations:
@@ -153,11 +153,52 @@ def deviation_table(by_preset: dict[str, list[Deviation]]) -> Table:
     return table
 
 
-def _peak(values: np.ndarray) -> float:
-    """Value of the largest magnitude, with its sign."""
-    return float(values[np.argmax(np.abs(values))])
+def opposed(trajectories: Collection[Trajectory], measured: TimeHistory) -> list[str]:
+    """Return what to say of signals that run against every simulation, as a film from the other side makes them.
+
+    Parameters
+    ----------
+    trajectories
+        Simulations of the test.
+    measured
+        What was measured.
+    """
+    notes = []
+    for signal in TEST_SIGNALS:
+        values = measured.signals.get(signal.name)
+        if values is None:
+            continue
+        alike = []
+        for trajectory in trajectories:
+            inside = np.isfinite(values) & (measured.time_s >= 0.0) & (measured.time_s <= trajectory.time_s[-1])
+            curve = np.interp(measured.time_s[inside], trajectory.time_s, simulated_signal(trajectory, signal.name))
+            size = float(np.linalg.norm(curve) * np.linalg.norm(values[inside]))
+            alike.append(float(curve @ values[inside]) / size if size > 0.0 else 0.0)
+        if max(alike) < OPPOSED:
+            notes.append(
+                f"the measured {signal.name} runs against the simulated one, as in a mirrored film, taken from the "
+                f"other side, or from a sensor turned round. It counts as positive {signal.positive}; if it is "
+                f"mirrored, change the sign of this column. The figures take it as it is"
+            )
+    return notes
 
 
+def _peaks(times: np.ndarray, data: np.ndarray, curve_times: np.ndarray, curve: np.ndarray) -> tuple[float, float]:
+    """Return measured and simulated values of the largest magnitude, with their signs.
+
+    Between the samples of a camera the simulation may move further: its own samples up to the last of them count.
+    """
+    whole = curve[curve_times <= times[-1]]
+    return float(data[np.argmax(np.abs(data))]), float(whole[np.argmax(np.abs(whole))])
+
+
+def _share(measured: float, simulated: float) -> float:
+    """Return by how much a simulated peak is larger, as a share of the measured one; NaN where their signs differ."""
+    return math.nan if measured == 0.0 or measured * simulated < 0.0 else simulated / measured - 1.0
+
+
+OPPOSED = -0.5
+"""Correlation about zero below which a measured signal runs against the simulated one."""
 TIME_TO_LIMIT = "time to the limit"
 MOST_TIMES = 20_000
 """Most samples of a second opinion."""
@@ -337,17 +378,16 @@ def _of_signal(form: Form, measured: TimeHistory, name: str, when: float) -> lis
         return []
     times, data = measured.time_s[inside], values[inside]
     simulated = np.interp(times, form.time_s, form.signals[name])
-    # Between the samples of a camera the simulation may move further: its own samples up to the last of them count.
-    whole = form.signals[name][form.time_s <= times[-1]]
-    peaks = [float(np.abs(curve).max()) for curve in (data, whole)]
-    difference = peaks[1] - peaks[0]
-    side = "" if difference == 0.0 or name == "vehicle_acceleration" else "safe" if difference > 0.0 else "unsafe"
-    share = difference / peaks[0] if peaks[0] > 0.0 else None
+    peaks = _peaks(times, data, form.time_s, form.signals[name])
+    share = _share(*peaks)
+    unsaid = share == 0.0 or math.isnan(share) or name == VEHICLE_ACCELERATION.name
+    side = "" if unsaid else "safe" if share > 0.0 else "unsafe"
+    error = None if math.isnan(share) else share
     rms = float(np.sqrt(np.mean((simulated - data) ** 2)))
     words, unit = name.replace("_", " "), UNITS[name]
     return [
-        Score(form.name, f"peak {words}", unit, peaks[0], peaks[1], share, side),
-        Score(form.name, f"curve of {words}", unit, 0.0, rms, rms / peaks[0] if peaks[0] > 0.0 else None, ""),
+        Score(form.name, f"peak {words}", unit, *peaks, error, side),
+        Score(form.name, f"curve of {words}", unit, 0.0, rms, rms / abs(peaks[0]) if peaks[0] else None, ""),
     ]
 
 

@@ -162,8 +162,10 @@ def _read_point(node: Node) -> ProfilePoint:
     return ProfilePoint(values["height"], values["width"], values.get("near", half), values.get("far", half))
 
 
-def unfold_scan(boulder: Mapping, folder: Path) -> Scan:
+def unfold_scan(boulder: Mapping, folder: Path) -> tuple[Scan, list[str]]:
     """Replace the scan of a boulder, and the mass of the whole stone beside it, by profile and density.
+
+    Returns what the scan is, and what makes one doubt it.
 
     Parameters
     ----------
@@ -206,7 +208,8 @@ def unfold_scan(boulder: Mapping, folder: Path) -> Scan:
         texts = (f"{float(value)!r} m" for value in values)
         points.append(block_of(position, dict(zip(("height", "width", "near", "far"), texts, strict=True))))
     boulder.entries["profile"] = Entry("profile", position, Sequence(position, points))
-    return Scan(words["file"], scan.sha256, standing.up, standing.facing, standing.cut_m)
+    said = Scan(words["file"], scan.sha256, standing.up, standing.facing, standing.cut_m)
+    return said, scan.surface_cautions
 
 
 def _read_scan_words(node: Node) -> dict[str, str]:

@@ -70,6 +70,7 @@ class Entries:
         self.sets: dict[str, tuple[str, ...]] = {}
         self.table: DesignList | None = None
         self.derived: dict[str, Any] = {}
+        self.cautions: list[str] = []
         self.allowed: tuple[str, ...] = ()
 
     def read(self) -> None:
@@ -112,7 +113,7 @@ class Entries:
             self.given.add("boulder.scan")
             folder = self._folder_of(boulder.entries["scan"].position)
             with self.reporting("boulder.scan", [f"boulder.{key}" for key in (*SIDES, "density")]):
-                self.settings["scan"] = unfold_scan(boulder, folder)
+                self.settings["scan"], self.cautions = unfold_scan(boulder, folder)
 
     def _unfold_soils(self) -> None:
         """Replace the readings of an investigation by soil constants."""

@@ -21,6 +21,7 @@ from boulder_sweep.settings.entries import NAME, NAME_RULE, TOP_KEYS, Entries
 from boulder_sweep.settings.model import SECOND_OPINIONS, Criterion, Model, SolverSettings
 from boulder_sweep.settings.problems import (
     Position,
+    Problem,
     ProblemList,
     SettingsError,
     check_regular_file,
@@ -307,7 +308,9 @@ def _build(name: str, heading: Heading, entries: Entries, overrides: tuple[str, 
     )
     positions = {field.path: entries.position_of(field.path) for field in fields.INPUTS}
     written = {name: leaf.written for name, leaf in entries.leaves.items()}
-    return replace(sweep, notes=tuple(notes_on(sweep, positions, written)))
+    at = entries.position_of("boulder.profile")  # which stands for a scan by now
+    cautions = [Problem(at.file, at.line, at.column, "boulder.scan", caution) for caution in entries.cautions]
+    return replace(sweep, notes=(*cautions, *notes_on(sweep, positions, written)))
 
 
 def _apply_partial_factor(entries: Entries, factor: float) -> None:

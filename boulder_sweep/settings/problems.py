@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import stat
+from collections import Counter
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,6 +13,8 @@ from boulder_sweep.locations import RemotePath
 
 MAX_REPORTED = 100
 """Most problems reported at once: a longer list does not help, and a hostile file could make it endless."""
+MAX_ALIKE = 5
+"""Most problems reported of one column, and of lines with a wrong number of cells."""
 _SHORT_WORD = 3
 """Letters of a word in which a single one makes another word."""
 
@@ -211,10 +214,33 @@ class ProblemList:
             raise SettingsError(self.in_order())
 
 
+class Alike:
+    """Reports problems of one kind up to a limit, then counts them."""
+
+    def __init__(self, problems: ProblemList) -> None:
+        self.problems = problems
+        self.counts: Counter[tuple[str, str]] = Counter()
+        self.last: dict[tuple[str, str], Position] = {}
+
+    def add(self, kind: str, position: Position, key: str, message: str, most: int = MAX_ALIKE) -> None:
+        """Report a problem, or count it if there were enough of its kind and key."""
+        self.counts[kind, key] += 1
+        self.last[kind, key] = Position(position.file, position.line)
+        if self.counts[kind, key] <= most:
+            self.problems.add(position, key, message)
+
+    def finish(self) -> None:
+        """Say how many more there are."""
+        for (kind, key), count in self.counts.items():
+            if kind and count > MAX_ALIKE:
+                self.problems.add(self.last[kind, key], key, f"and {count - MAX_ALIKE} more {kind} like these")
+
+
 def shorten(text: str, limit: int = 60) -> str:
     """Return text that can be quoted in a message: one line, printable, not longer than `limit`."""
-    flat = "".join(char if char.isprintable() else "?" for char in " ".join(text.split()))
-    return flat if len(flat) <= limit else flat[: limit - 3] + "..."
+    head = text[: 10 * limit]  # of a text of a hundred thousand characters, too
+    flat = "".join(char if char.isprintable() else "?" for char in " ".join(head.split()))
+    return flat if len(flat) <= limit and len(head) == len(text) else flat[: limit - 3] + "..."
 
 
 def nearest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:

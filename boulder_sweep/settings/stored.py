@@ -175,9 +175,9 @@ def check_control(control: dict[str, Any], readings: dict[str, Any]) -> None:
     from boulder_kernels.design import Readings
 
     for name, kind in get_type_hints(Control).items():
-        value = control.get(name, Control._field_defaults.get(name))
-        bound = _CONTROL_BOUNDS.get(name)
-        if not _is_of(value, kind) or (bound and not bound[0] <= value <= bound[1]):
+        value: Any = control.get(name, Control._field_defaults.get(name))
+        low, high = _CONTROL_BOUNDS.get(name, (-math.inf, math.inf))
+        if not _is_of(value, kind) or not low <= value <= high:
             raise ValueError(f"control.{name} is {str(value)[:60]!r}, which no settings give")
     if readings.keys() != {*Readings._fields} or any(type(value) is not bool for value in readings.values()):
         raise ValueError("readings are not the five of the paper")

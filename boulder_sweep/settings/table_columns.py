@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -13,13 +12,10 @@ from boulder_sweep.columns import BY_NAME as TABLE_COLUMNS
 from boulder_sweep.columns import OUTCOME_COLUMNS
 from boulder_sweep.designs import Label
 from boulder_sweep.settings.fields import INPUTS, Field
-from boulder_sweep.settings.problems import Position, ProblemList, nearest, refuse, shorten
+from boulder_sweep.settings.problems import Position, ProblemList, nearest, shorten
 from boulder_sweep.settings.units import factor, name_suffix, suffix_unit
 from boulder_sweep.settings.values import outside
 
-MAX_COLUMNS = 1000
-MAX_ALIKE = 5
-"""Most problems reported of one column, and of lines with a wrong number of cells."""
 MAX_TEXT = 200
 """Longest text that is carried along, in characters."""
 _ID = re.compile(r"(.*_)?(id|no|nr|number|name|label|comment|note)", re.IGNORECASE)
@@ -48,12 +44,6 @@ class TableColumn:
 
 _STEMS: dict[str, Field] = {field.name.removesuffix(name_suffix(field.unit)): field for field in INPUTS}
 """Inputs by the name of the column without its unit."""
-
-
-def check_count(names: list[str], label: str) -> None:
-    """Refuse more columns than a table of designs can have, before any is looked at."""
-    if len(names) > MAX_COLUMNS:
-        raise refuse(label, f"has {len(names):,} columns; a table takes at most {MAX_COLUMNS:,}")
 
 
 def read_header(names: list[str], positions: list[Position], problems: ProblemList) -> list[TableColumn | None]:
@@ -125,28 +115,6 @@ def _meant(name: str) -> str:
         if word in (stem, field.key, *field.also):
             return f"{stem}, with its unit at the end" if field.unit != "1" else stem
     return ""
-
-
-class Alike:
-    """Reports problems of one kind up to a limit, then counts them."""
-
-    def __init__(self, problems: ProblemList) -> None:
-        self.problems = problems
-        self.counts: Counter[tuple[str, str]] = Counter()
-        self.last: dict[tuple[str, str], Position] = {}
-
-    def add(self, kind: str, position: Position, key: str, message: str, most: int = MAX_ALIKE) -> None:
-        """Report a problem, or count it if there were enough of its kind and key."""
-        self.counts[kind, key] += 1
-        self.last[kind, key] = Position(position.file, position.line)
-        if self.counts[kind, key] <= most:
-            self.problems.add(position, key, message)
-
-    def finish(self) -> None:
-        """Say how many more there are."""
-        for (kind, key), count in self.counts.items():
-            if kind and count > MAX_ALIKE:
-                self.problems.add(self.last[kind, key], key, f"and {count - MAX_ALIKE} more {kind} like these")
 
 
 def check_values(values: np.ndarray, field: Field) -> list[tuple[int, str]]:

@@ -72,6 +72,12 @@ class ScannedStone:
                 f"its density is {self.density_kg_m3:,.0f} kg/m³, and rock has {low:,.0f} to {high:,.0f}: the mass, "
                 "the scale of the scan or its unit is wrong"
             )
+        return cautions + self.surface_cautions
+
+    @property
+    def surface_cautions(self) -> list[str]:
+        """What makes one doubt the surface, whatever the stone weighs."""
+        cautions = []
         solid = self.stone.solid
         if solid.closed > MUCH_CLOSED:
             cautions.append(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,36 @@ def test_units_of_the_header(tmp_path: Path, head: str, row: str, name: str, exp
     assert found.signals[name] == pytest.approx([0.0, expected])
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "time [s];acceleration [g]\n-0,05;-0\n1,5e-3;-8,91367e-1\n0,002;-1,21936\n",
+        "time [s],acceleration [g],\n-.05,0,\n,,\n1.5e-3,-.891367,\n.002,-1.21936,\n,,\n",
+        ",time [s],acceleration [g]\n0,-0.05,0\n1,0.0015,-.891367\n2,0.002,-1.21936\n",
+        "time,acceleration\ns,g\n-.05,0\n1.5e-3,-.891367\n.002,-1.21936\n",
+        "Time;Acceleration\n[s];[g]\n-0,05;0\n0,0015;-0,891367\n0,002;-1,21936\n",
+        "time\tacceleration\n(ms)\t(g)\n-50\t0\n1.5\t-.891367\n2\t-1.21936\n",
+    ],
+)
+def test_curves_as_recorders_and_spreadsheets_write_them(tmp_path: Path, text: str) -> None:
+    found = read_history(write(tmp_path, text), PULSE_SIGNALS)
+    assert found.time_s == pytest.approx([-0.05, 0.0015, 0.002])
+    assert found.signals["acceleration"] == pytest.approx(np.array([0.0, -0.891367, -1.21936]) * 9.80665)
+
+
+@pytest.mark.parametrize("sign", [",", "\t", ";"])
+def test_a_pulse_with_decimal_commas_is_the_one_with_points(tmp_path: Path, sign: str, sweep: Command) -> None:
+    """The vehicle of the pulse is the truck of the paper at 13.4 m/s."""
+    text = (Path(__file__).parent / "pulses" / "decimal_commas.csv").read_text()
+    plain = text if sign == ";" else text.replace(",", ".").replace(";", sign)
+    file = write(tmp_path, plain)
+    code, out, _ = sweep("fit-vehicle", file, "--mass", "6800 kg", "--json")
+    found = json.loads(out)
+    assert code == 0
+    assert found["vehicle_spring_N_m"] == pytest.approx(3103.3e3, rel=1e-3)
+    assert found["vehicle_damper_N_s_m"] == pytest.approx(138.91e3, rel=1e-3)
+
+
 @pytest.mark.parametrize("cell", ["ax [g]", "ax", "dx [mm]", "vx [m/s]", "displacment [g]"])
 def test_no_quantity_of_another_kind_is_suggested(tmp_path: Path, cell: str) -> None:
     with pytest.raises(SettingsError, match="is not known") as refused:
@@ -75,18 +106,29 @@ def test_empty_cells_are_gaps(tmp_path: Path) -> None:
         ("time [ms]\n0\n1\n", ["1:1: has nothing beside time"]),
         ("time [ms],x [m],displacement [m]\n0,1,1\n1,2,2\n", ["1:17: displacement: stands in two columns"]),
         ("time [ms],x [m]\n0,1\n0,2\n", ["3:1: time: 0 s comes after 0 s; times must ascend"]),
-        ("time [ms],x [m]\n0,1\n,2\n", ["3:1: time: is missing in this row"]),
+        ("time [ms],x [m]\n0,1\n,2\n", ["3:1: time: is empty; a number is needed"]),
         ("x [m];time [ms]\n0;1\n12;1\n", ["3:4: time: 0.001 s comes after 0.001 s"]),
         ('time [ms],"x [m]"\n0,1\n"1",two\n', ["3: displacement: 'two' is not a number"]),
         ("time [ms],x [m]\n0,1\n1,two\n", ["3:3: displacement: 'two' is not a number"]),
-        ("time [ms],x [m]\n0,1\n1,2 mm\n", ["3:3: displacement: '2 mm' has a unit; the column has one"]),
+        ("time [ms],x [m]\n0,1\n1,2 mm\n", ["3:3: displacement: '2 mm' has a unit; units belong in the column's name"]),
         ("time [ms],x [m]\n0,1\n1,nan\n", ["3:3: displacement: 'nan' is not a finite number"]),
         ("time [ms],x [m]\n0,1\n1,1_0\n", ["3:3: displacement:"]),
         ("time [ms],x [m]\n0,1\n1,\u0661\n", ["3:3: displacement: '\u0661' is not a number"]),
         ("time [ms],x [m]\n0,1\n1,2,3\n", ["3:1: has 3 cells; the first line has 2"]),
         ("time [ms],x [m]\n", ["at least two rows"]),
-        ("", ["at least two rows"]),
-        ('time [ms],x [m]\n0,"1\n1,2\n', ["runs over the end of its line"]),
+        ("", ["is empty; the first line must hold the column names"]),
+        ('time [ms],x [m]\n0,1\n1,"2\n3,4\n', ["3:1: cannot be read as CSV", "is a quotation mark not closed?"]),
+        (
+            "0,0\n0.1,1\n",
+            [
+                "1:1: the first line holds numbers; write a line of names above it",
+                "such as time [s],displacement [m]; known names are time [s], displacement [m], velocity [m/s],",
+            ],
+        ),
+        ("0,001;-1,5\n0,002;-2,5\n", ["1:1: the first line holds numbers", "such as time [s];displacement [m];"]),
+        ("time,acceleration\ns,furlong\n0,0\n1,1\n", ["1:1: time: has no unit", "'time [s]'"]),
+        ("time,weight\ns,m\n0,0\n1,1\n", ["1:6: weight [m]: is not known"]),
+        ("time,acceleration\ns,m\n0,0\n1,1\n", ["1:6: acceleration [m]: ", "an acceleration is needed"]),
     ],
 )
 def test_mistakes_with_their_place(tmp_path: Path, text: str, messages: list[str]) -> None:
@@ -103,7 +145,7 @@ def test_mistakes_with_their_place(tmp_path: Path, text: str, messages: list[str
     [
         ("time [ms],velocity [m/s],x [m]\n0,13,0\n1,two,0.01\n", "3:3: velocity: 'two' is not a number"),
         ("# a comment\ntime [ms],weight [kg]\n0,13\n1,12\n", "2:11: weight [kg]: is not known"),
-        ("x [m];time [ms]\n\n0,1;0\n0,2;0\n", "3:1: displacement: "),
+        ("x [m];time [ms]\n\n0,1;0\n0,2;0\n", "4:5: time: 0 s comes after 0 s"),
     ],
 )
 def test_mistakes_in_a_pulse_are_told_with_file_line_and_column(

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import random
 import re
+import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +26,7 @@ from boulder_sweep.report.asked import Measure, answers_table
 from boulder_sweep.report.comparison import compare
 from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import load_text
+from boulder_sweep.store.provenance import settings_sha256
 from tests.answers.designs import site
 from tests.conftest import Command
 from tests.report.conftest import SETS
@@ -273,3 +277,72 @@ def test_more_rows_than_designs_are_refused(files: dict[str, Path], tmp_path: Pa
     pq.write_table(pa.concat_tables([table] * 2), tmp_path / "twice.parquet")
     with pytest.raises(ReportError, match="is damaged: it has 8 rows for 4 designs"):
         AnswerFile(tmp_path / "twice.parquet", ReportError)
+
+
+OTHER_VALUES = (None, True, -1, 0, 1.5, 1e300, 10**30, "", "x", "table", [], ["x"], [1, "a"], {}, {"a": 1}, "gone")
+PARSED = ("settings", "control", "readings", "versions", "accuracy", "question")
+
+
+def places(tree: Any, above: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:
+    """Every place of plain data; of lists the first two items."""
+    keys = tree if isinstance(tree, dict) else range(min(len(tree), 2)) if isinstance(tree, list) else ()
+    for key in keys:
+        yield (*above, key)
+        yield from places(tree[key], (*above, key))
+
+
+def changed(table: pa.Table, chance: random.Random) -> tuple[pa.Table, str]:
+    """Return answers with one place of their settings changed, and their hash made right again; and which place."""
+    keys = [name for name in PARSED if f"boulder_sweep.{name}".encode() in table.schema.metadata]
+    parts = {name: json.loads(table.schema.metadata[f"boulder_sweep.{name}".encode()]) for name in keys}
+    *above, last = chance.choice([place for place in places(parts) if len(place) > 1])
+    inner: Any = parts
+    for key in above:
+        inner = inner[key]
+    value = chance.choice(OTHER_VALUES)
+    if value == "gone":
+        del inner[last]
+    else:
+        inner[last] = value
+    metadata = dict(table.schema.metadata)
+    metadata |= {f"boulder_sweep.{name}".encode(): json.dumps(part).encode() for name, part in parts.items()}
+    metadata[b"boulder_sweep.settings_sha256"] = settings_sha256(parts["settings"]).encode()
+    return table.replace_schema_metadata(metadata), f"{[*above, last]}: {value!r}"
+
+
+@pytest.mark.parametrize("many", [pytest.param(6, id="some"), pytest.param(120, id="many", marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("name", ["depth", "sets", "chance", "capacity", "uncertainty"])
+def test_one_changed_place_in_the_settings_ends_in_words(
+    files: dict[str, Path], tmp_path: Path, sweep: Command, name: str, many: int
+) -> None:
+    """Or in the answer, where the place holds what a settings file may say."""
+    table, chance, refused = pq.read_table(files[name]), random.Random(name), 0
+    file = tmp_path / "changed.parquet"
+    for _ in range(many):
+        other, place = changed(table, chance)
+        pq.write_table(other, file)
+        for words in (
+            ("report", file, "-o", tmp_path / "page.html"),
+            ("export", file, "-o", tmp_path / "table.csv"),
+            ("compare", file, files[name]),
+            ("plot", file, "-o", tmp_path / "plot.png"),
+        ):
+            code, _, err = sweep(*words)
+            assert code in (0, 2), (place, err)
+            assert not re.search(r"\b[A-Z]\w+(Error|Exception)\b", err), (place, err)
+            refused += code
+    assert refused > many
+
+
+def test_files_beside_answers_belong_to_them(files: dict[str, Path], tmp_path: Path, sweep: Command) -> None:
+    """Samples of other answers, and of none."""
+    for name in ("uncertainty.parquet", "uncertainty.indices.parquet", "uncertainty.samples.parquet"):
+        shutil.copy(files["uncertainty"].with_name(name), tmp_path / name)
+    assert sweep("plot", tmp_path / "uncertainty.parquet", "-o", tmp_path / "chance.png")[0] == 0
+    samples = tmp_path / "uncertainty.samples.parquet"
+    table = pq.read_table(samples)
+    for metadata in (None, {**table.schema.metadata, b"boulder_sweep.settings_sha256": b"0" * 64}):
+        pq.write_table(table.replace_schema_metadata(metadata), samples)
+        code, _, err = sweep("plot", tmp_path / "uncertainty.parquet", "-o", tmp_path / "chance.png")
+        assert code == 2
+        assert "uncertainty.samples.parquet belongs to other answers than" in err

@@ -10,6 +10,7 @@ import pytest
 from boulder_sweep.settings import SettingsError, load
 from boulder_sweep.settings.loader import load_text
 from boulder_sweep.stones.weighing import scanned
+from tests.stones.files import ply, prism, regular
 
 ROCK = Path(__file__).parents[2] / "docs" / "examples" / "rock.ply"
 SCAN = "{file: rock.ply, up: a, facing: b}"
@@ -58,6 +59,17 @@ def test_the_metadata_hold_the_scan(site):
 
 def test_a_density_in_place_of_the_mass_may_be_an_axis(site):
     assert load(site(("mass: 23.5 t", "density: [2500, 2600] kg/m^3"))).n_designs == 2
+
+
+def test_what_makes_one_doubt_a_scan_is_a_note(site, tmp_path):
+    """Coordinates that count from far away, in single precision: steps of 2 mm."""
+    path = site()
+    points, polygons = prism(regular(8, 0.8), 2.0)
+    (tmp_path / "rock.ply").write_bytes(ply(points + 20_000.0, polygons, real="f4"))
+    (note,) = [note for note in load(path).notes if note.key == "boulder.scan"]
+    assert (note.line, "subtract a point near the stone" in note.message) == (2, True), note
+    (tmp_path / "rock.ply").write_bytes(ply(points, polygons, real="f4"))
+    assert not [note for note in load(path).notes if note.key == "boulder.scan"]
 
 
 def test_a_unit(site, tmp_path):

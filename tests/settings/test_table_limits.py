@@ -213,6 +213,34 @@ def test_more_columns_than_a_table_has(tmp_path, name):
     assert calls_of(lambda: read(tmp_path / name)) < 100_000  # a few a column; there are 12 million pairs
 
 
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (f'{HEIGHT},note\n2,"' + '\n","' * 300_000, "has a row of more than 1,000,000 characters; is a quotation mark"),
+        (f"{HEIGHT},note\n2," + "x" * 1_000_001, "has a row of more than 1,000,000 characters"),
+        (f"{HEIGHT},note\n2," + '"' + "x" * 200_000, "field larger than field limit"),
+        (f"{HEIGHT}\n" + "2\n" * 6, "has more than 6 lines"),
+        (f"{HEIGHT}\n" + "\n#\n" * 3, "has more than 6 lines"),
+        (f"{HEIGHT},a_id\n2,a\n2,b\n2,c\n", "column a_id has more than 2 different words"),
+        (f"{HEIGHT},friction_angle_deg\n2,40\n2,40\n2,40\n", "has more than 40 bytes of numbers"),
+        (f"{HEIGHT}\n" + "x\n" * 300, "is not read beyond this line: too many mistakes"),
+    ],
+)
+def test_every_limit_of_a_text(tmp_path, monkeypatch, text, words):
+    monkeypatch.setattr("boulder_sweep.settings.design_list.MAX_TABLE_ROWS", 6 if "lines" in words else 10**6)
+    monkeypatch.setattr("boulder_sweep.settings.design_list.MOST_WORDS", 2)
+    monkeypatch.setattr(
+        "boulder_sweep.settings.design_list._TOO_MANY_WORDS", "column {} has more than 2 different words"
+    )
+    monkeypatch.setattr("boulder_sweep.settings.design_list.MOST_BYTES", 40 if "bytes" in words else 10**6)
+    monkeypatch.setattr("boulder_sweep.settings.text_table.MOST_MISTAKES", 100)
+    monkeypatch.setattr("boulder_sweep.settings.text_table.CHUNK", 300)
+    (tmp_path / "table.csv").write_text(text)
+    with pytest.raises(SettingsError) as refused:
+        load_text(SETTINGS.format(file="table.csv"), tmp_path / "grid.yaml")
+    assert words in str(refused.value)
+
+
 def large(folder: Path) -> dict[str, Path]:
     """Files made to take time or memory."""
     rows = 20_000_000

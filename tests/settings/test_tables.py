@@ -2,6 +2,8 @@
 
 import re
 import zipfile
+from decimal import Decimal
+from pathlib import Path
 
 import numpy as np
 import openpyxl
@@ -33,6 +35,9 @@ def load_table(tmp_path):
         return load(tmp_path / "grid.yaml")
 
     return load_table
+
+
+TABLES = Path(__file__).parent / "tables"
 
 
 @pytest.fixture
@@ -138,14 +143,14 @@ def test_cells_are_reported_with_line_and_column_all_at_once(messages_of):
 
 
 def test_the_header_is_checked(messages_of):
-    text = "design_id,boulder_lenght_m,boulder_width_m,boulder_width_m,verdict,boulder_height_m,embedment_depth_m,\n"
-    messages = messages_of(text + "0,1,1,1,pass,2,1,\n")
+    text = "design_id,boulder_lenght_m,boulder_width_m,boulder_width_m,verdict,,boulder_height_m\n"
+    messages = messages_of(text + "0,1,1,1,pass,2,1\n")
     assert [message.split(" ")[0] for message in messages] == [
         "designs.csv:1:1:",
         "designs.csv:1:11:",
         "designs.csv:1:44:",
         "designs.csv:1:60:",
-        "designs.csv:1:103:",
+        "designs.csv:1:68:",
     ]
     assert "numbered in their order" in messages[0]
     assert "did you mean boulder_length_m?" in messages[1]
@@ -153,15 +158,102 @@ def test_the_header_is_checked(messages_of):
     assert "outcome of a run" in messages[3]
 
 
-def test_decimal_commas_are_one_mistake(messages_of):
-    (message,) = messages_of((HEADER + 100 * ROWS).replace(",", ";").replace(".", ","))
-    assert (
-        message == "designs.csv:2:1: '0,762' has a comma; save the file with decimal points, and thousands unseparated"
-    )
+def test_commas_that_begin_cells_are_counted(messages_of):
     (*lines, rest) = messages_of(HEADER + 100 * ROWS.replace(".", ","))
     assert len(lines) == 5
     assert "has 8 cells; the first line has 4 (a comma begins a cell: write 15000 for 15,000" in lines[0]
     assert rest == "designs.csv:201: and 195 more lines like these"
+
+
+@pytest.mark.parametrize("sign", [";", "\t"])
+@pytest.mark.parametrize(
+    ("masses", "expected"),
+    [
+        (["6800,5", "7000"], [6800.5, 7000.0]),
+        (["6,8005e3", "7000"], [6800.5, 7000.0]),
+        (["0,680e4", "7,000E+3"], [6800.0, 7000.0]),
+        ([" 6800,25 ", '"7000,5"'], [6800.25, 7000.5]),
+        (["6800.5", "7000"], [6800.5, 7000.0]),
+        (["6800,5", "15,000"], [6800.5, 15.0]),
+        (["15,000", "7000"], "3:9: '15,000' may be 15000 or 15.000, and no other number tells; write the numbers"),
+        (["15,000", "7000.5"], "3:9: '15,000' has a comma, and '7000.5' in line 4 a point; write all numbers with"),
+        (["6800,5", "15.000"], "3:9: '6800,5' has a comma, and '15.000' in line 4 a point; write all numbers with"),
+        (["1,500,000", "7000"], "3:9: vehicle_mass_kg: '1,500,000' is not a plain number; write 1500000"),
+        (["1.500,5", "7000"], "3:9: vehicle_mass_kg: '1.500,5' is not a plain number; write 1500.5"),
+    ],
+)
+def test_decimal_commas_where_a_comma_separates_no_cells(load_table, messages_of, sign, masses, expected):
+    table = HEADER.replace("\n", ",vehicle_mass_kg\n").replace(",", sign)
+    table = "# from a spreadsheet\n" + table + "".join(sign.join(["1", "1", "2", "1", mass]) + "\n" for mass in masses)
+    grid = GRID.replace("mass: 6800, ", "")
+    if isinstance(expected, str):
+        assert messages_of(table, grid=grid)[0].startswith(f"designs.csv:{expected}")
+    else:
+        assert _column(load_table(table, grid=grid), "vehicle_mass_kg") == expected
+
+
+def test_rows_of_a_result_of_calculation_with_commas_in_every_column(load_table):
+    sweep = load_table((HEADER + ROWS).replace(",", ";").replace(".", ","))
+    assert _column(sweep, "boulder_length_m") == [0.762, 1.65]
+    assert _column(sweep, "embedment_depth_m") == [1.2, 2.03]
+
+
+@pytest.mark.parametrize(
+    ("text", "heights"),
+    [
+        ("boulder_height_m,embedment_depth_m\n2.6,1.8\n3.0,2.0\n,\n,\n", [2.6, 3.0]),
+        ("boulder_height_m,embedment_depth_m,\n2.6,1.8,\n3.0,2.0,\n", [2.6, 3.0]),
+        ("boulder_height_m,embedment_depth_m,,,\n2.6,1.8,,,\n,,,,\n3.0,2.0,,,\n", [2.6, 3.0]),
+        ("boulder_height_m,embedment_depth_m\n2.6,1.8,,\n , \n3.0,2.0, \n", [2.6, 3.0]),
+        ('boulder_height_m,embedment_depth_m\n2.6,1.8\n"",""\n3.0,2.0\n', [2.6, 3.0]),
+        (",,\nboulder_height_m,embedment_depth_m\n2.6,1.8\n", [2.6]),
+        (",boulder_height_m,embedment_depth_m\n0,2.6,1.8\n1,3.0,2.0\n", [2.6, 3.0]),
+        (",boulder_height_m,embedment_depth_m\n3,2.6,1.8\n17,3.0,2.0\n", [2.6, 3.0]),
+        (";boulder_height_m;embedment_depth_m\n0;2,6;1,8\n1;3,0;2,0\n", [2.6, 3.0]),
+        ("Unnamed: 0,boulder_height_m,embedment_depth_m\n0,2.6,1.8\n1,3.0,2.0\n", [2.6, 3.0]),
+    ],
+)
+def test_what_spreadsheets_and_pandas_write_around_the_numbers(load_table, text, heights):
+    sweep = load_table(text, grid=GRID.replace("boulder: {{", "boulder: {{length: 1.65, width: 1.68, "))
+    assert _column(sweep, "boulder_height_m") == heights
+    assert sweep.block(0, 1).labels == {}
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("blank_rows.csv", [2.6, 3.0]),
+        ("trailing_commas.csv", [2.6, 3.0]),
+        ("decimals.parquet", [2.6]),
+        ("formulas.xlsx", "formulas.xlsx:2:2: table: has formulas without values: open and save it once in a"),
+    ],
+)
+def test_tables_as_other_programs_wrote_them(load_table, messages_of, name, expected):
+    grid = GRID.replace("boulder: {{", "boulder: {{length: 1.65, width: 1.68, ")
+    content = (TABLES / name).read_bytes()
+    if isinstance(expected, str):
+        assert messages_of(content, name, grid)[0].startswith(expected)
+    else:
+        assert _column(load_table(content, name, grid), "boulder_height_m") == expected
+
+
+@pytest.mark.parametrize("numbers", [(0, 0), (2, 1), (1.5, 2), ("a", "b"), (-1, 0)])
+def test_a_first_column_without_a_name_that_does_not_count(messages_of, numbers):
+    table = f",{HEADER}{numbers[0]},1,1,2,1\n{numbers[1]},1,1,2,1\n"
+    (message,) = messages_of(table)
+    assert message.startswith("designs.csv:1:1: the first column: has no name, and does not count the rows; give it")
+
+
+def test_a_mistake_beside_an_index_has_its_column(messages_of):
+    assert messages_of(f",{HEADER}0,1,x,2,1\n")[0].startswith("designs.csv:2:5: boulder_width_m: 'x' is not")
+
+
+def test_a_table_without_names_says_which_line_is_wanted(messages_of):
+    (message,) = messages_of("1;1;2,2;1,2\n1;1;2;1\n")
+    line = "boulder_length_m;boulder_width_m;boulder_height_m;boulder_density_kg_m3"
+    assert message.startswith(
+        f"designs.csv:1:1: table: the first line holds numbers; write a line of names above it, such as {line};"
+    )
 
 
 def test_mistakes_of_one_kind_are_counted(messages_of):
@@ -327,6 +419,19 @@ def test_parquet(write_parquet, load_table):
     assert sweep.n_designs == 2
 
 
+def test_decimals_of_a_database_and_the_index_of_pandas(load_table, tmp_path):
+    kinds = [pa.decimal128(2, 1), pa.decimal128(18, 3), pa.decimal256(40, 2), pa.decimal128(5, 0)]
+    values = [["1.5", "2.0"], ["1.25", "2"], ["3.44", "4"], ["2", "3"]]
+    columns = {
+        name: pa.array([Decimal(value) for value in own], type=kind)
+        for name, own, kind in zip(HEADER.strip().split(","), values, kinds, strict=True)
+    }
+    pq.write_table(pa.table({**columns, "__index_level_0__": [4, 9]}), tmp_path / "designs.parquet")
+    sweep = load_table(None, "designs.parquet")
+    assert [_column(sweep, name) for name in columns] == [[float(value) for value in own] for own in values]
+    assert sweep.block(0, 1).labels == {}
+
+
 def test_mistakes_in_parquet(write_parquet, messages_of):
     write_parquet(
         boulder_length_m=[1.0, -2.0],
@@ -386,6 +491,38 @@ def test_a_spreadsheet(load_table, write_xlsx):
     assert [label.words[code] for code in label.codes] == ["A 1", "A 2", ""]
 
 
+@pytest.mark.parametrize(
+    ("rows", "place"),
+    [
+        ([[1, 1, 2, "=C2*0.5"]], "2:4"),
+        ([[1, 1, 2, 1], [None, None, None, None], [1, 1, "=2*D2", 1]], "4:3"),
+        ([["=1+1", "=1+1", "=2*2", "=1+0"]], "2:1"),
+    ],
+)
+def test_formulas_without_values(write_xlsx, messages_of, rows, place):
+    write_xlsx(HEADER.strip().split(","), *rows)
+    (message,) = messages_of(None, "designs.xlsx")
+    words = "has formulas without values: open and save it once in a spreadsheet program"
+    assert message == f"designs.xlsx:{place}: table: {words}"
+
+
+def test_formulas_with_values(write_xlsx, load_table, tmp_path):
+    """As a spreadsheet program saves them; a text of no letters is a value, too."""
+    write_xlsx([None, *HEADER.strip().split(","), "remark"], [0, 1, 1, 2, "=D2*0.5", '=""'])
+    file = tmp_path / "designs.xlsx"
+    with zipfile.ZipFile(file) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    sheet = "xl/worksheets/sheet1.xml"
+    text = re.sub(rb'r="E2"><f>(.*?)</f><v ?/>', rb'r="E2"><f>\1</f><v>1.25</v>', parts[sheet])
+    text = re.sub(rb'r="F2"><f>(.*?)</f><v ?/>', rb'r="F2" t="str"><f>\1</f><v></v>', text)
+    assert text.count(b"</v>") > parts[sheet].count(b"</v>") + 1
+    with zipfile.ZipFile(file, "w") as archive:
+        for name, content in parts.items():
+            archive.writestr(name, text if name == sheet else content)
+    sweep = load_table(None, "designs.xlsx")
+    assert _column(sweep, "embedment_depth_m") == [1.25]
+
+
 def test_mistakes_in_a_spreadsheet(write_xlsx, messages_of):
     write_xlsx(HEADER.strip().split(","), [1, 1, 2, 1], [1, "x", 2, None], [1, 1, 2, 1, 7], [1, 1, 200, 1])
     messages = messages_of(None, "designs.xlsx")
@@ -409,9 +546,21 @@ def test_a_spreadsheet_that_unpacks_to_too_much(messages_of, tmp_path, monkeypat
     assert "once unpacked; save it as CSV" in message
 
 
+@pytest.mark.parametrize(("cell", "row"), [("XFD1048576", 1221), ("CV300000", 200001)])
+def test_a_single_cell_far_out(load_table, messages_of, tmp_path, cell, row):
+    book = openpyxl.Workbook()
+    book.active.append(["boulder_height_m"])
+    book.active[cell] = 1.0
+    book.save(tmp_path / "designs.xlsx")
+    (message,) = messages_of(None, "designs.xlsx")
+    assert (
+        message == f"designs.xlsx:{row}:1: table: has more than 20,000,000 cells, with the empty ones; save it as CSV"
+    )
+
+
 def test_an_empty_spreadsheet(write_xlsx, messages_of):
     write_xlsx()
-    assert "is empty; the first row" in messages_of(None, "designs.xlsx")[0]
+    assert "is empty; the first line" in messages_of(None, "designs.xlsx")[0]
     write_xlsx(HEADER.strip().split(","))
     assert "no rows below the column names" in messages_of(None, "designs.xlsx")[0]
 

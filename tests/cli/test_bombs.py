@@ -1,13 +1,16 @@
-"""Small Parquet files that hold gigabytes: every command that reads one refuses them in words, in little memory."""
+"""Files that hold far more than they seem to: every command that reads one refuses it in words, in little memory."""
 
 from __future__ import annotations
 
 import hashlib
+import io
 import os
 import re
 import shutil
+import struct
 import subprocess
 import sys
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,9 +18,11 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from openpyxl import Workbook
 
 from boulder_sweep.parquet import ParquetError, TableFile
 from boulder_sweep.store.files import part_name
+from tests.stones.files import glb, gltf, prism, regular
 from tests.store.folders import part_record, rewrite_records
 
 DATA = Path(__file__).with_name("data")
@@ -229,6 +234,127 @@ def test_bombs_are_refused_in_words(bombs, command, make):
     assert re.search(SAID[make], said), said
     assert code == (1 if kind == "result" and make is declared else 2), said
     assert "stones.sweep/rows-" in said or "stones.sweep is damaged (rows-" in said or "bomb.parquet" in said
+    assert not re.search(r"Traceback|internal error|[A-Z]\w+(Error|Exception|Invalid)\b", said), said
+    assert peak < MOST_MEMORY_KB
+
+
+def glb_of(description: bytes) -> bytes:
+    chunks = struct.pack("<I4s", len(description), b"JSON") + description
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def instances() -> bytes:
+    """A mesh of 2,000 triangles, in 2,000 places."""
+    header, buffer = gltf(*prism(regular(1001, 1.0), 1.0))
+    header["nodes"] = [{"mesh": 0} for _ in range(2_000)]
+    header["scenes"] = [{"nodes": list(range(2_000))}]
+    return glb(header, buffer)
+
+
+def ply_of(*lines: str, data: bytes = b"", form: str = "binary_little_endian") -> bytes:
+    return "\n".join(["ply", f"format {form} 1.0", *lines, "end_header\n"]).encode() + data
+
+
+def spreadsheet(sheet: str) -> bytes:
+    """A spreadsheet of one sheet, by the text of its cells."""
+    packed = io.BytesIO()
+    Workbook().save(packed)
+    content = io.BytesIO()
+    with zipfile.ZipFile(packed) as old, zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as new:
+        for name in old.namelist():
+            text = old.read(name)
+            if name.endswith("sheet1.xml"):
+                text = text.replace(b"<sheetData>", b"<sheetData>" + sheet.encode())
+            new.writestr(name, text)
+    return content.getvalue()
+
+
+def ten_times(levels: int) -> str:
+    """Lists of ten references to the list before."""
+    lines = ["a0: &a0 [x]", *(f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 10)}]" for k in range(1, levels))]
+    return "\n".join(lines)
+
+
+VERTICES = ("element vertex 3", "property float x", "property float y", "property float z")
+CORNERS = "property list uint int vertex_indices"
+MANY = "length: {{from: 1 m, to: 2 m, count: 1000000000000}}, width: 1.7 m, height: 3 m, density: 2600"
+DEEP = b"[" * 900_000
+FILES: dict[str, Callable[[], bytes]] = {
+    "header.ply": lambda: ply_of(
+        "comment xend_header", "element vertex 2000000000", *VERTICES[1:], "element face 2000000000", CORNERS
+    ),
+    "corners.ply": lambda: ply_of(*VERTICES, "element face 1", CORNERS, data=bytes(36) + struct.pack("<I", 1 << 31)),
+    "polygon.ply": lambda: ply_of(
+        *VERTICES, "element face 1", CORNERS, data=bytes(36) + struct.pack("<I", 5_000_000) + bytes(20_000_000)
+    ),
+    "comments.ply": lambda: ply_of(*["comment"] * 2_000_000),
+    "properties.ply": lambda: ply_of("element vertex 900000", *(f"property double p{k}" for k in range(3_000))),
+    "count.stl": lambda: bytes(80) + struct.pack("<I", 80_000_000),
+    "mixed.stl": lambda: b"solid x\n" + b"EndFacet\n" * 8_100_000,
+    "line.obj": lambda: b"f" + b" 1" * 20_000_000,
+    "lines.obj": lambda: b"#\n" * 8_100_000,
+    "faces.obj": lambda: b"v 0 0 0\n" + b"f 1 1 1\n" * 1_100_000,
+    "description.glb": lambda: glb_of(b" " * 180_000_000 + b"{}"),
+    "deep.glb": lambda: glb_of(DEEP),
+    "instances.glb": instances,
+    "accessor.glb": lambda: glb(
+        {
+            "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 1 << 40, "type": "VEC3"}],
+            "bufferViews": [{"buffer": 0, "byteLength": 12}],
+        },
+        bytes(12),
+    ),
+    "cell.csv": lambda: b"boulder_height_m\n" + b"1" * 200_000_000,
+    "names.csv": lambda: b"a," * 2_000_000 + b"a\n1\n",
+    "lines.csv": lambda: b"boulder_height_m,embedment_depth_m\n" + b"\n" * 21_000_000,
+    "quoted.csv": lambda: b'boulder_height_m\n"' + b"\n" * 20_000_000,
+    "far.xlsx": lambda: spreadsheet('<row r="1048576"><c r="XFD1048576"><v>1</v></c></row>'),
+    "cells.xlsx": lambda: spreadsheet('<row r="1">' + "<c><v>1</v></c>" * 12_000_000 + "</row>"),
+    "references.yaml": lambda: ten_times(12).encode(),
+    "deep.yaml": lambda: b"a: " + DEEP[:400_000],
+    "long.yaml": lambda: b"name: " + b"x" * 60_000_000,
+    "many.yaml": lambda: (
+        SCAN_SETTINGS.replace("scan: {{file: {file}, up: c, facing: a}}, mass: 12 t", MANY).format().encode()
+    ),
+    "wide.yaml": lambda: b"a: [" + b"1, " * 150_000 + b"1]",
+}
+SCAN_SETTINGS = SETTINGS.replace("table: {file}\n", "").replace(
+    "length: 1.65 m, width: 1.68 m, density: 2596 kg/m^3", "scan: {{file: {file}, up: c, facing: a}}, mass: 12 t"
+)
+READ_BY = {
+    (".ply", ".stl", ".obj", ".glb"): (
+        ("stone", "{}"),
+        *((command, "scan.yaml") for command in ("check", "run", "simulate", "need", "explore")),
+    ),
+    (".csv",): (
+        ("fit-vehicle", "{}", "--mass", "6804 kg"),
+        ("validate", "--case", "rwg", "--measured", "{}"),
+        *LISTS.values(),
+    ),
+    (".xlsx",): tuple(LISTS.values()),
+    (".yaml",): tuple((command, "{}") for command in (*LISTS, "explore")),
+}
+OTHERS = [
+    pytest.param(name, words, id=f"{words[0]}-{name}", marks=pytest.mark.nightly if place else [])
+    for ends, commands in READ_BY.items()
+    for name in FILES
+    if name.endswith(ends)
+    for place, words in enumerate(commands)
+]
+
+
+@pytest.mark.parametrize(("name", "words"), OTHERS)
+def test_what_is_more_than_it_seems_is_refused_in_words(tmp_path, name, words):
+    (tmp_path / name).write_bytes(FILES[name]())
+    if not name.endswith(".yaml"):
+        (tmp_path / "list.yaml").write_text(SETTINGS.format(file=name))
+        (tmp_path / "scan.yaml").write_text(SCAN_SETTINGS.format(file=name))
+    code, said, peak = sweep(tmp_path, *(word.format(name) for word in words))
+    assert code == 2, said
+    assert name in said
+    assert len(said) < 5_000
     assert not re.search(r"Traceback|internal error|[A-Z]\w+(Error|Exception|Invalid)\b", said), said
     assert peak < MOST_MEMORY_KB
 
