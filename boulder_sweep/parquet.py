@@ -7,8 +7,9 @@ so that no word is repeated.
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import lru_cache, partial
 from typing import IO, TYPE_CHECKING
 
@@ -87,8 +88,8 @@ class TableFile:
         self._source, self._most_bytes, self._most_text = source, most_bytes, most_text
         self._taken, self._text = 0, 0
         with _in_words():
-            self._opened = partial(pq.ParquetFile, source, page_checksum_verification=True)
-            self._file = self._opened()
+            self._opened = partial(pq.ParquetFile, page_checksum_verification=True)
+            self._file = self._opened(source)
             footer, self.schema = self._file.metadata, self._file.schema_arrow
             self.rows: int = footer.num_rows
             if len(self.schema) > MOST_COLUMNS:
@@ -103,12 +104,13 @@ class TableFile:
                 stored = footer.schema.column(index) if _is_decimal(field.type) else None
                 if stored and (stored.physical_type == "BYTE_ARRAY" or stored.length > _WIDEST_NUMBER):
                     raise ParquetLimitError(f"column {_shown(field.name)} holds decimals of any length; {_REMEDY}")
+            self._check_chunks()
             self._groups = [footer.row_group(number) for number in range(footer.num_row_groups)]
             if sum(group.num_rows for group in self._groups) != self.rows:
                 raise ParquetError("is damaged: it says two numbers of rows")
             self._strings = {field.name for field in self.schema if _is_string(field.type)}
             if self._strings:
-                self._file = self._opened(metadata=footer, read_dictionary=[*self._strings])
+                self._file = self._opened(source, metadata=footer, read_dictionary=[*self._strings])
                 self.schema = self._file.schema_arrow
 
     def read(self, columns: Sequence[str] | None = None) -> pa.Table:
@@ -125,7 +127,7 @@ class TableFile:
             spelled = self._check_bytes(columns)
             file = self._file
             if spelled:
-                file = self._opened(metadata=file.metadata, read_dictionary=[*(self._strings - spelled)])
+                file = self._opened(self._source, metadata=file.metadata, read_dictionary=[*(self._strings - spelled)])
             table = file.read(columns, use_threads=False)  # parts of a result are read in parallel already
             for index, name in enumerate(table.column_names):
                 if name in spelled:
@@ -136,6 +138,18 @@ class TableFile:
                 if _is_text(column.type):
                     self._check_words(_shown(name), column)
             return table
+
+    def _check_chunks(self) -> None:
+        """Have pyarrow look at what the footer says of every piece of a column, where it can refuse it.
+
+        Asked for a single damaged piece, it ends the process. A read of all looks at them first, in one go, and then
+        meets a file without bytes.
+        """
+        import pyarrow as pa
+
+        empty = pa.PythonFile(_Unread(self._source.seek(0, 2)), mode="r")
+        with suppress(_ReachedError):
+            self._opened(empty, metadata=self._file.metadata, pre_buffer=True).read(use_threads=False)
 
     def _check_bytes(self, columns: Sequence[str] | None) -> set[str]:
         """Add up what columns take unpacked, before any is; return those of words that pyarrow cannot read as codes."""
@@ -179,6 +193,33 @@ class TableFile:
             if self._text > self._most_text:
                 most = size_text(self._most_text)
                 raise ParquetLimitError(f"has more than {most} of text, up to column {shown}")
+
+
+class _ReachedError(Exception):
+    """Bytes were asked for."""
+
+
+class _Unread(io.RawIOBase):
+    """A file of some size of which nothing can be read."""
+
+    def __init__(self, size: int) -> None:
+        self._size, self._at = size, 0
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        self._at = offset + (0, self._at, self._size)[whence]
+        return self._at
+
+    def tell(self) -> int:
+        return self._at
+
+    def read(self, size: int = -1) -> bytes:
+        raise _ReachedError
 
 
 @contextmanager

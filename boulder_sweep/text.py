@@ -63,9 +63,8 @@ def script_data(data: Any) -> str:
 
 
 def one_line(problem: BaseException) -> str:
-    """Describe an exception in one line of bounded length."""
-    words = " ".join(str(problem).split())
-    text = f"{type(problem).__name__}: {words}" if words else type(problem).__name__
+    """Return the words of an exception in one line of bounded length."""
+    text = " ".join(str(problem).split()) or "it gives no reason"
     return text if len(text) <= _LONGEST_LINE else f"{text[: _LONGEST_LINE - 3]}..."
 
 

@@ -16,7 +16,7 @@ from boulder_sweep.answers.keys import key_of
 from boulder_sweep.answers.lightest import DEPTH, SIDES
 from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.trials import Open
-from boulder_sweep.columns import BOULDER_MASS, COLUMNS
+from boulder_sweep.columns import BOULDER_MASS, COLUMNS, DESIGN_ID, GRADES, RATINGS, VERDICTS
 from boulder_sweep.columns import BY_NAME as COLUMN_OF
 from boulder_sweep.designs import Label
 from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning
@@ -25,8 +25,9 @@ from boulder_sweep.judge.accuracy import known_control
 from boulder_sweep.locations import Location, RemotePath
 from boulder_sweep.parquet import ParquetError, TableFile
 from boulder_sweep.settings import Sweep
-from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.settings.fields import BY_NAME, INPUTS
 from boulder_sweep.settings.model import Criterion, completed
+from boulder_sweep.settings.problems import shorten
 from boulder_sweep.settings.stored import check_entries
 from boulder_sweep.settings.sweep import Axis, DesignList, allowed_in
 from boulder_sweep.store.failures import settings_file
@@ -80,6 +81,9 @@ class _Chances:
 
 
 _QUESTIONS = {NEED: _Need, UNCERTAINTY: _Chances}
+_ADMITTED = {entry.name: entry.admitted for entry in INPUTS if entry.admitted}
+_WORDS = {"verdict": VERDICTS, "rating": RATINGS, "robustness": GRADES}
+"""Words of columns in which every version has the same."""
 OF_ANSWERS = "`sweep need`, `capacity` or `uncertainty`"
 
 
@@ -133,11 +137,13 @@ class AnswerFile:
         self.rows = self.rows_done = len(self.table)
 
     def _check(self, names: set[str]) -> None:
-        """Refuse a question that no command asks, and more answers than there are designs."""
+        """Refuse a question that no command asks, more answers than designs, and inputs or words that none has."""
         designs = self.identity["settings"]["n_designs"]
         if self.kind and len(self.table) > designs:
             what = f"it has {len(self.table):,} rows for {counted(designs, 'design')}"
             raise self._refusal(f"{self.path} is damaged: {what}")
+        if self.kind and (wrong := next(self._wrong_columns(), "")):
+            raise self._refusal(f"{self.path} is damaged: {wrong}; write it again with `sweep {self.kind}`")
         try:
             if self.kind in _QUESTIONS:
                 check_entries(self.question, _QUESTIONS[self.kind], "question")
@@ -145,6 +151,20 @@ class AnswerFile:
                 raise ValueError("question.asked is no answer of the file")
         except ValueError as problem:
             raise self._refusal(f"{self.path} is damaged ({problem}); write it again") from None
+
+    def _wrong_columns(self) -> Iterator[str]:
+        """Yield what is wrong with the columns by which answers are described: inputs, and words of a known list."""
+        for name in self.table.column_names:
+            column, admitted = self.table[name], _ADMITTED.get(name)
+            needed = name == DESIGN_ID.name or (self.kind != NEED and (admitted or name == "verdict"))
+            if needed and column.null_count:
+                yield f"column {name} has empty cells"
+            if admitted:
+                values = column.drop_null().to_numpy()
+                if len(outside := values[~((values >= admitted.low) & (values <= admitted.high))]):
+                    yield f"column {name} holds {outside[0]:g}, which no settings give"
+            if name in _WORDS and (unknown := {*column.unique().to_pylist()} - {*_WORDS[name], None}):
+                yield f"column {name} holds {shorten(str(unknown.pop()))!r}, none of {', '.join(_WORDS[name])}"
 
     def tables(self, columns: Sequence[str] | None = None, *, verify: bool = True) -> Iterator[pa.Table]:
         """Yield all rows, or some of their columns, at once."""

@@ -35,7 +35,7 @@ from boulder_sweep.settings.table_columns import (
 )
 from boulder_sweep.settings.text_table import MAX_BYTES, MAX_COLUMNS, Row, TextTable, open_text
 from boulder_sweep.settings.tree import Scalar
-from boulder_sweep.text import one_line, size_text
+from boulder_sweep.text import size_text, why
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -222,7 +222,10 @@ def _sheet_rows(path: Location, load_workbook: Callable[..., Any]) -> Iterator[R
     except (SettingsError, MemoryError):
         raise
     except Exception as error:  # of a damaged file, zlib, the parser of XML and openpyxl raise almost anything
-        raise refuse(label, f"cannot be read as a spreadsheet ({shorten(one_line(error), 100)})") from None
+        reason = "it is damaged, locked by a password, or of another kind; save it as CSV"
+        if isinstance(error, OSError) and error.errno is not None:
+            reason = why(error)
+        raise refuse(label, f"cannot be read as a spreadsheet ({reason})") from None
 
 
 def _first_sheet(book: Any, label: str, *, values_only: bool = False) -> Iterator[tuple[int, tuple[Any, ...]]]:

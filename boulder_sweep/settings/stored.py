@@ -7,11 +7,13 @@ are checked once, where the result is opened.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterator
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
+from boulder_sweep.parquet import MOST_ROWS
 from boulder_sweep.settings.distributions import Distribution
 from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT, INPUTS, MAX_ELEMENTS
 from boulder_sweep.settings.model import (
@@ -44,7 +46,7 @@ _WORDS = {
 """Words that an entry may hold, where its declaration lists none."""
 _OTHER_BOUNDS = {
     "n_designs": Bound(0, math.inf, ""),
-    "count": Bound(1, math.inf, ""),
+    "count": Bound(1, MOST_ROWS, ""),  # some values are made from it
     "soil": Bound(1, MAX_ELEMENTS, ""),
 }
 _CONTROL_BOUNDS = {
@@ -219,7 +221,7 @@ def _is_of(value: Any, kind: Any) -> bool:
     if kind is Any:
         return True
     if kind is float:
-        return type(value) in (int, float) and math.isfinite(value)
+        return type(value) in (int, float) and abs(value) <= sys.float_info.max
     if kind in (int, str, bool, type(None)):
         return type(value) is kind
     if get_origin(kind) is Literal:

@@ -195,7 +195,7 @@ class TextTable:
             remedy = "write all numbers with decimal points, or all with decimal commas, and thousands unseparated"
             self.problems.add(position, "", f"{message}; {remedy}")
         elif "certain" not in self._seen:
-            whole, _, decimals = (part.strip() for part in cell.partition(","))
+            whole, _, decimals = (shorten(part) for part in cell.partition(","))
             message = f"'{shorten(cell)}' may be {whole}{decimals} or {whole}.{decimals}, and no other number tells"
             self.problems.add(position, "", f"{message}; write the numbers of this file without commas")
 

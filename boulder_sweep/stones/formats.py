@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from boulder_sweep.errors import ScanError
+from boulder_sweep.text import printable
 
 MAX_FACES = 1_000_000
 """Most triangles, and most points where triangles share them. A phone makes 100,000, a profile needs a few thousand."""
@@ -315,7 +316,9 @@ def _text_columns(element: _Element, rows: Iterator[tuple[int, list[bytes]]]) ->
         except (ValueError, LookupError, OverflowError):
             at = -1
         if at != len(words):
-            raise ScanError(f"line {number}: is damaged: it is no {element.name} as the header describes it")
+            raise ScanError(
+                f"line {number}: is damaged: it is no {printable(element.name[:60])} as the header describes it"
+            )
         check_count(len(counts), 3)
     many_each = np.frombuffer(counts, np.int64).reshape(element.count, -1) if columns else np.empty((0, 1), np.int64)
     return [np.frombuffer(column, column.typecode) for column in columns.values()], many_each[:, -1]
@@ -530,6 +533,8 @@ def _accessor(header: dict[str, Any], buffer: memoryview, number: int, shape: st
     start, length, count = view.get("byteOffset", 0), view["byteLength"], index(accessor["count"])
     kind, width = np.dtype(_COMPONENTS[accessor["componentType"]]), _WIDTHS[shape]
     stride = view.get("byteStride", width * kind.itemsize)
+    if shape == "SCALAR" and kind.kind != "u":
+        raise ScanError("is damaged: it numbers corners with something else than whole numbers")
     if accessor["type"] != shape or min(start, count, stride) < 0 or start + length > len(buffer):
         raise ScanError("is damaged: it describes what is not there")
     check_count(count, 3)

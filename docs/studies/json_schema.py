@@ -49,7 +49,7 @@ _NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
 _QUANTITY = rf"^\s*{_NUMBER}\s*([^\d\s.,;\[\]][^,;\[\]]*)?$"
 """A number and perhaps a unit. Which units fit is left to the program: their products are too many to list."""
 _AT_LEAST = rf"^\s*((>=?|≥)\s*{_NUMBER}.*|{_NUMBER}\s*\+[^\d]*)$"
-_REFUSAL = r"^\s*(\d+\s*(/|(blows? )?(for|in)\s)\s*[\d.].*|[Rr]|[Rr]ef(\.|usal)?)\s*$"
+_REFUSAL = r"^\s*(\d+\s*(/|(blows? )?(for|in)\s)\s*[\d.].*|[Rr]|[Rr]ef\.?|[Rr]efusal)\s*$"
 """Readings beyond the range of a test: ``>50`` and ``50+``; ``50/75mm`` and ``R``."""
 
 Schema = dict[str, Any]

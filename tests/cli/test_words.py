@@ -91,7 +91,7 @@ def test_a_wrong_question_is_refused_before_anything_is_compiled(sweep, words, m
 
 def test_the_time_of_a_compilation_is_remembered_for_the_next_kernels(sweep, monkeypatch, tmp_path):
     """By the kernel that it begins with, beside the folders of all versions of the kernels."""
-    monkeypatch.setattr("boulder_kernels._cache.CACHE_FOLDER", str(tmp_path / "kernels-1"))
+    monkeypatch.setattr("boulder_kernels._cache.CACHE_FOLDER", str(tmp_path / "kernels-1" / "native-1"))
     (tmp_path / f"{KERNEL}-and-more-in-seconds").write_text("12.3")
     monkeypatch.setattr(_ahead, "call", after_compiling(KERNEL))
     assert f"{COMPILING}12 s" in sweep("simulate", SITE, *ONE)[2]

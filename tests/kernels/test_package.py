@@ -105,8 +105,8 @@ def test_the_hash_tells_sources_apart(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_folder_of_the_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The one that is named; else the user's; else a temporary one of this user's own; named by the hash."""
-    name = f"kernels-{_cache.source_hash()[:16]}"
+    """The one that is named; else the user's; else a temporary one of this user's own; named by the hashes."""
+    name = f"kernels-{_cache.source_hash()[:16]}/native-{_cache.machine_hash()[:16]}"
     monkeypatch.setenv(_cache.CACHE_VARIABLE, str(tmp_path / "named"))
     assert _cache._cache_folder() == str(tmp_path / "named" / name)
     monkeypatch.delenv(_cache.CACHE_VARIABLE)
