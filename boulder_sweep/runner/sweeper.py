@@ -44,7 +44,6 @@ def run(
     jobs: int | None = None,
     backend: str = "threading",
     scheduler: str | None = None,
-    dashboard: str | None = None,
     resume: bool = False,
     overwrite: bool = False,
     force: bool = False,
@@ -69,9 +68,6 @@ def run(
         ``threading`` or ``dask``.
     scheduler
         Address of a Dask scheduler; with ``dask`` only.
-    dashboard
-        Where the dashboard of a cluster that the run starts itself listens, such as ``0.0.0.0:8787``; by default on a
-        free port of this machine only. Its address is a note of `progress`.
     resume
         Continue what `out` holds, if it is the same sweep; damaged parts are computed again. Starts from the
         beginning if `out` does not exist.
@@ -152,7 +148,7 @@ def run(
                 begin = partial(claimed.open, manifest, session)
                 folder = signals.call(begin, lambda late: late.close("interrupted")) if remote else begin()
                 whole = Run(sweep, evaluation, folder, signals)
-                whole.prepare(backend, jobs, scheduler, dashboard, force)
+                whole.prepare(backend, jobs, scheduler, force)
                 whole.compute(progress, commit_every_s)
         except Interrupted as stop:
             done = ended(f"interrupted by signal {stop.signum}")
