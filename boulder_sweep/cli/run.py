@@ -49,7 +49,6 @@ Examples:
 @click.option("--jobs", type=JOBS, help="Workers [default: all cores].")
 @click.option("--resume", is_flag=True, help="Resume an interrupted run.")
 @click.option("--overwrite", is_flag=True, help="Replace the table of an earlier run.")
-@click.option("--force", is_flag=True, help="Run even if disk or memory seem too small.")
 @click.option("--dry-run", is_flag=True, help="Show designs, settings and cost; write nothing.")
 @click.option("--accuracy", type=Quantity("deg"), metavar="NAME", help="fast, balanced, fine, or '0.01 deg'.")
 @second_opinion_option

@@ -197,7 +197,7 @@ class Run:
         """What is recorded of the folder."""
         return self._folder.manifest
 
-    def prepare(self, backend: str, jobs: int, scheduler: str | None, force: bool) -> None:
+    def prepare(self, backend: str, jobs: int, scheduler: str | None) -> None:
         """Connect to workers, warm up the kernels, and check that the result will fit."""
         self.jobs = jobs
         try:
@@ -212,9 +212,8 @@ class Run:
             self._metadata = file_metadata(identity, command, self.firmness)
             if self._rows_before < self._sweep.n_designs:
                 self._estimate = self._signals.call(self._estimated)
-                objections = self._estimate.objections
-                if objections and not force:
-                    raise DoesNotFitError("; ".join(objections) + ". Use --force to run anyway")
+                if self._estimate.objections:
+                    raise DoesNotFitError("; ".join(self._estimate.objections))
         except BaseException:
             self._discard()
             raise

@@ -46,7 +46,6 @@ def run(
     scheduler: str | None = None,
     resume: bool = False,
     overwrite: bool = False,
-    force: bool = False,
     progress: Report | None = None,
     command: str | None = None,
     resume_command: str | None = None,
@@ -73,8 +72,6 @@ def run(
         beginning if `out` does not exist.
     overwrite
         Replace what a sweep wrote into `out` before.
-    force
-        Run even if the result is not expected to fit on the disk or in memory.
     progress
         Called up to ten times a second, from the calling thread.
     command
@@ -134,8 +131,7 @@ def run(
 
         try:
             with telling_start_failure(jobs):
-                if not force:
-                    refuse_hopeless(sweep, sweep.n_designs - claimed.rows_done, out)
+                refuse_hopeless(sweep, sweep.n_designs - claimed.rows_done, out)
                 accuracy = signals.call(lambda: accuracy_of(sweep))
                 evaluation = evaluation_of(sweep, accuracy, simulate)
                 manifest = Manifest(
@@ -148,7 +144,7 @@ def run(
                 begin = partial(claimed.open, manifest, session)
                 folder = signals.call(begin, lambda late: late.close("interrupted")) if remote else begin()
                 whole = Run(sweep, evaluation, folder, signals)
-                whole.prepare(backend, jobs, scheduler, force)
+                whole.prepare(backend, jobs, scheduler)
                 whole.compute(progress, commit_every_s)
         except Interrupted as stop:
             done = ended(f"interrupted by signal {stop.signum}")

@@ -338,7 +338,7 @@ def test_workers_that_do_not_share_the_folder_send_their_parts(tmp_path, monkeyp
 
 
 def test_whatever_dask_opens_here_is_bound_to_loopback(tmp_path):
-    """Scheduler and worker of a cluster that is started by the run itself."""
+    """Ports of a cluster that is started by the run itself."""
     before = _listening()
     cluster = backend.Cluster(1, None)
     try:
