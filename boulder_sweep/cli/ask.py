@@ -68,7 +68,6 @@ Examples:
     is_flag=True,
     help="Count only passes that stand under every second opinion, with --margin.",
 )
-@click.option("--under", type=click.Choice(["all"]), help="Under all laws of the soil's resistance: as --robust.")
 @click.option(
     "--other-readings",
     "both_readings",
@@ -93,7 +92,6 @@ def need(
     quiet: bool,
     overrides: tuple[str, ...],
     as_json: bool,
-    under: str | None,
     **question: Any,
 ) -> int:
     """Find the least KEY that passes, for every combination of the other inputs of GRID.
@@ -115,7 +113,6 @@ def need(
     elif at is not None:
         raise click.UsageError("--at and --probability cannot be used together")
     refuse_unwritable(out, picture)
-    question["robust"] |= under is not None
     with working(quiet, of="designs" if question["probability"] is None else "values") as progress:
         result = find(sweep, **question, progress=progress)
     if as_json:
