@@ -135,14 +135,13 @@ Examples:
   sweep uncertainty configs/uncertain_site.yaml --plot chances.png
   sweep uncertainty configs/uncertain_site.yaml --rare -o chances.parquet
   sweep uncertainty configs/uncertain_site.yaml --doubts
-  sweep uncertainty --published
 """
 
 
 @click.command(
     "uncertainty", short_help="The probability of passing with uncertain inputs.", epilog=UNCERTAINTY_EXAMPLES
 )
-@click.argument("grid", type=click.Path(), required=False)
+@grid_argument
 @click.option("--half-width", default="0.01", metavar="P", help="Largest half-width of the interval [0.01].")
 @click.option("--confidence", default="95 %", metavar="SHARE", help="Confidence level of the interval [95 %].")
 @margin_option
@@ -157,19 +156,17 @@ Examples:
 @click.option(
     "--design", type=click.IntRange(min=0), default=0, metavar="ID", help="The design of --plot and --doubts [0]."
 )
-@click.option("--published", is_flag=True, help="List published spreads with their sources; takes no GRID.")
 @quiet_option
 @cluster_options
 @units_option
 @set_option
 @json_option
 def uncertainty(
-    grid: str | None,
+    grid: str,
     doubts: bool,
     out: str | None,
     picture: str | None,
     design: int,
-    published: bool,
     units: str,
     quiet: bool,
     overrides: tuple[str, ...],
@@ -181,10 +178,6 @@ def uncertainty(
     An input takes a distribution instead of a value: {mean: 38 deg, sd: 3 deg}, or with cov: 5 %. Sampling continues
     until the interval is narrow enough.
     """
-    if published:
-        return _show_published(grid, units, as_json)
-    if grid is None:
-        raise click.MissingParameter(param_hint="'GRID'", param_type="argument")
     from boulder_sweep.answers.printing import doubt_lines, uncertainty_lines
     from boulder_sweep.answers.uncertainty import uncertainty as estimate
 
@@ -211,21 +204,6 @@ def uncertainty(
             say(f"written  {file}")
     if picture is not None:
         result.plot(picture, design, units=units)
-    return 0
-
-
-def _show_published(grid: str | None, units: str, as_json: bool) -> int:
-    """List published spreads with their sources."""
-    if grid is not None or units != "si":
-        other = "GRID" if grid is not None else f"--units {units}"
-        raise click.UsageError(f"--published lists spreads as their sources state them; leave out {other}")
-    from boulder_sweep.answers.spread import PUBLISHED
-
-    if as_json:
-        show(json.dumps({"published": [spread._asdict() for spread in PUBLISHED]}))
-        return 0
-    for spread in PUBLISHED:
-        show(f"{spread.input:<24}{spread.cov:<14}{spread.of}", f"{'':<38}{spread.source}")
     return 0
 
 

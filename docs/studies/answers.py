@@ -12,7 +12,6 @@ from boulder_sweep.answers.doubts import doubts
 from boulder_sweep.answers.need_printing import need_lines
 from boulder_sweep.answers.printing import doubt_lines, reserve_lines, uncertainty_lines
 from boulder_sweep.answers.reserves import reserves
-from boulder_sweep.answers.spread import PUBLISHED
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.distributions import Distribution, SetDistributions
@@ -131,14 +130,6 @@ def uncertainty_of_cases(root: Path) -> str:
             interval = f"{row['p_pass_low']:.3f} to {row['p_pass_high']:.3f}"
             words = best[1].rpartition("_")[0].replace("_", " ")
             table.add(name, readings.replace("_", " "), f"{row['p_pass']:.3f}", interval, words, f"{best[0]:.2f}")
-    return table.markdown()
-
-
-def published_spreads(_: Path) -> str:
-    """Return the published coefficients of variation with their sources."""
-    table = Table(("input", "coefficient of variation", "of", "source"))
-    for own in PUBLISHED:
-        table.add(f"`{own.input}`", own.cov, own.of, own.source)
     return table.markdown()
 
 

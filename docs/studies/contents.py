@@ -302,7 +302,6 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "moves": _moves,
     "open-readings": answers.open_readings_words,
     "partial-factors": answers.partial_factors,
-    "published-spreads": answers.published_spreads,
     "stone-shapes": lambda root: shapes.shapes_table(root / GRID).markdown(),
     "stone-example": stones.stone_of_example,
     "stone-settings": stones.settings_of_example,

@@ -87,24 +87,6 @@ def test_an_object_in_us_units_is_refused(sweep):
     assert "leave out --units us or --json" in err
 
 
-def test_published_spreads_have_sources(sweep):
-    code, out, _ = sweep("uncertainty", "--published")
-    assert code == 0
-    assert "JCSS" in out
-    assert out.count("as quoted by others") == 4
-    assert "\\n" not in out
-    code, out, _ = sweep("uncertainty", "--published", "--json")
-    assert code == 0
-    assert json.loads(out)["published"][0]["input"] == "soil.friction_angle"
-
-
-@pytest.mark.parametrize("words", [("--published", "--units", "us"), (CONFIG, "--published"), ()])
-def test_what_does_not_go_with_published_spreads_is_refused(sweep, words):
-    code, out, err = sweep("uncertainty", *words)
-    assert (code, out) == (2, "")
-    assert ("--published lists spreads as their sources state them" if words else "Missing argument 'GRID'") in err
-
-
 @pytest.mark.parametrize("command", ["need", "uncertainty"])
 @pytest.mark.parametrize("margin", ["25", "200%", "-0.5", "1"])
 def test_a_margin_that_no_design_has_is_refused(sweep, command, margin):
