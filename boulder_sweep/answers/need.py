@@ -100,7 +100,6 @@ class Need(Result):
             "name": self.sweep.name,
             "asked": self.key.answer,
             "unit": self.key.field.unit,
-            "tolerance": self.key.tolerance,
             "margin": self.least_margin,
             "simulated": self.simulated,
             "found": self.counts(),
@@ -138,7 +137,6 @@ def need(
     seed: int = 0,
     open_readings: bool = False,
     between: Ends = None,
-    tolerance: str | float | None = None,
     robust: bool = False,
     both_readings: bool = False,
     jobs: int | None = None,
@@ -166,8 +164,6 @@ def need(
         readings of the sweep.
     between
         Search range, instead of the axis or the usual range.
-    tolerance
-        Spacing of the values tried; 1 mm for lengths.
     robust
         Whether only a pass counts that is robust, see `boulder_sweep.judge.robustness`. The readings as printed have
         none.
@@ -200,12 +196,12 @@ def need(
     if least and most:
         raise QuestionError("use either --least or --most, not both")
     word = most or least or "embedment_depth"
-    if (between is not None or tolerance is not None) and key_of(word).name == BOULDER_MASS.name:
+    key = key_of(word, most=bool(most))
+    if between is not None and key.name == BOULDER_MASS.name:
         raise QuestionError(
-            "--least mass takes neither --between nor --tolerance; the sides and the embedment in the file are its "
-            "bounds, in whole millimetres"
+            "--least mass takes no --between; the sides and the embedment in the file are its bounds, in whole "
+            "millimetres"
         )
-    key = key_of(word, most=bool(most), tolerance=tolerance)
     if key.name == "friction_angle_deg" and sweep.partial_factor != 1.0:
         raise QuestionError(
             "the friction angle is asked for, and partial_factor would not be applied to the answer; remove it from "
@@ -250,7 +246,7 @@ def need(
             simulated += count
             done.answered(len(table))
     chance = None if probability is None else share(probability, "--probability")
-    question = {"asked": key.answer, "tolerance": key.tolerance, "margin": least_margin}
+    question = {"asked": key.answer, "margin": least_margin}
     question |= {} if chance is None else {"probability": chance}
     question |= {"robust": True} if robust else {}
     table = joined_tables(tables, sweep, judges[0], "boulder_sweep.need", question)

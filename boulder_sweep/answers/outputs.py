@@ -61,7 +61,6 @@ class _Need:
     """What `sweep need` is asked."""
 
     asked: str
-    tolerance: float
     margin: float
     probability: float | None = None
     robust: bool = False
@@ -141,7 +140,7 @@ class AnswerFile:
         try:
             if self.kind in _QUESTIONS:
                 check_entries(self.question, _QUESTIONS[self.kind], "question")
-            if self.kind == NEED and not (self.question["asked"] in names and self.question["tolerance"] > 0.0):
+            if self.kind == NEED and self.question["asked"] not in names:
                 raise ValueError("question.asked is no answer of the file")
         except ValueError as problem:
             raise self._refusal(f"{self.path} is damaged ({problem}); write it again") from None
@@ -189,7 +188,7 @@ class AnswerFile:
         asked = self.question
         sense, _, name = asked["asked"].partition("_")
         word = BY_NAME[name].key if name == BOULDER_MASS else name
-        key = key_of(word, most=sense == "most", tolerance=asked["tolerance"])
+        key = key_of(word, most=sense == "most")
         return Need(sweep, self.table, key, asked["margin"], 0, asked.get("probability"))
 
     def _chances(self, sweep: Sweep) -> Uncertainty:

@@ -271,7 +271,7 @@ def _format_withstood(key: Key, column: str, found: str, units: str) -> Cell:
 def answer_cell(key: Key, column: str, found: str, units: str) -> Cell:
     """Return a formatter for an answer to a question, from the columns of its value and of what was found."""
     size = 1.0 if units == "si" else shown_unit(key.field.unit, units).size
-    decimals = max(0, -math.floor(math.log10(key.tolerance / size) + 1e-9))
+    decimals = max(0, -math.floor(math.log10(key.step / size) + 1e-9))
 
     def cell(row: Row) -> str:
         kind = row[found]

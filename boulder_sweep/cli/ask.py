@@ -58,12 +58,6 @@ Examples:
     help="Range to search, with units, e.g. '5 ft' '9 ft' [default: the axis of the file, or the usual].",
 )
 @click.option(
-    "--tolerance",
-    type=Quantity(),
-    metavar="T",
-    help="Spacing of the values tried, with its unit [1 mm, 0.01 deg, 0.01 m/s, ...].",
-)
-@click.option(
     "--robust",
     is_flag=True,
     help="Count only passes that stand under every second opinion, with --margin.",
