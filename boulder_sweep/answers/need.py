@@ -8,7 +8,6 @@ run`` would judge them. If that disagrees, the row is searched again with the ac
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
@@ -27,7 +26,7 @@ from boulder_sweep.answers.result import (
     write_parquet,
 )
 from boulder_sweep.answers.search import BLOCKED, WORDS
-from boulder_sweep.answers.trials import NO_FACE, Judges, every_reading, judges_of, other_readings, ranges
+from boulder_sweep.answers.trials import NO_FACE, Judges, every_reading, judges_of, ranges
 from boulder_sweep.columns import INPUTS, SECOND_SPRING_COLUMNS
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
@@ -66,12 +65,6 @@ class Need(Result):
     least_margin: float
     simulated: int
     probability: float | None = None
-
-    @property
-    def others(self) -> list[str]:
-        """Names of the other readings for which the question was answered as well."""
-        before = f"{self.key.answer}_"
-        return [name.removeprefix(before) for name in self.arrow.column_names if name.startswith(before)]
 
     @property
     def derived(self) -> tuple[str, ...]:
@@ -138,7 +131,6 @@ def need(
     open_readings: bool = False,
     between: Ends = None,
     robust: bool = False,
-    both_readings: bool = False,
     jobs: int | None = None,
     backend: str = THREADING,
     scheduler: str | None = None,
@@ -167,8 +159,6 @@ def need(
     robust
         Whether only a pass counts that is robust, see `boulder_sweep.judge.robustness`. The readings as printed have
         none.
-    both_readings
-        Whether to answer for the other preset of readings as well.
     jobs
         Threads; all cores by default. The answers do not depend on it.
     backend, scheduler
@@ -232,13 +222,10 @@ def need(
         raise QuestionError(
             "--robust and --probability cannot be used together: second opinions are not asked of the designs drawn"
         )
-    sweeps = [sweep, other_readings(sweep)] if both_readings and not open_readings and not robust else [sweep]
-    judges = [judges_of(one, least_margin, robust=robust) for one in sweeps]
-    pairs = zip(sweeps, judges, strict=True)
-    asked = [_question(one, key, between, judge, probability, seed, variants) for one, judge in pairs]
-    asked[0].judges.final.warm_up()
+    asked = _question(sweep, key, between, judges_of(sweep, least_margin, robust=robust), probability, seed, variants)
+    asked.judges.final.warm_up()
     done = _Progress(progress, asked, local=backend == THREADING)
-    pieces = list(ranges(asked[0].count, asked[0].rows_at_once))
+    pieces = list(ranges(asked.count, asked.rows_at_once))
     tables, simulated = [], 0
     with pool(jobs, backend, scheduler) as workers:
         for table, count in workers(call(_table_of, asked, start, stop) for start, stop in pieces):
@@ -249,7 +236,7 @@ def need(
     question = {"asked": key.answer, "margin": least_margin}
     question |= {} if chance is None else {"probability": chance}
     question |= {"robust": True} if robust else {}
-    table = joined_tables(tables, sweep, judges[0], "boulder_sweep.need", question)
+    table = joined_tables(tables, sweep, asked.judges, "boulder_sweep.need", question)
     return Need(sweep, table, key, least_margin, simulated, chance)
 
 
@@ -261,22 +248,20 @@ class _Progress:
     report
         Called with how many of how many are done, first with none; None for no reports.
     asked
-        The questions.
+        The question.
     local
-        Whether they are answered in this process.
+        Whether it is answered in this process.
     """
 
-    def __init__(self, report: ProgressCallback | None, asked: Sequence[Question | LightestQuestion], *, local: bool):
-        self._report, self._rows = report, asked[0].count
+    def __init__(self, report: ProgressCallback | None, asked: Question | LightestQuestion, *, local: bool):
+        self._report, self._rows = report, asked.count
         self._done, self._rows_done, self._total = 0, 0, self._rows
         self._lock = Lock()  # values are tried by several threads
         if report is None:
             return
-        slow = [question for question in asked if isinstance(question, Question) and question.values_to_try()]
-        if local and slow:
-            self._total = sum(question.values_to_try() for question in slow)
-            for question in slow:
-                question.tried = self._tried
+        if local and isinstance(asked, Question) and (values := asked.values_to_try()):
+            self._total = values
+            asked.tried = self._tried
         report(0, self._total)
 
     def answered(self, count: int) -> None:
@@ -319,33 +304,25 @@ def _question(
     return ProbabilityQuestion(sweep, key, between, judges, chance, seed, variants)
 
 
-def _table_of(asked: Sequence[Question | LightestQuestion], start: int, stop: int) -> tuple[pa.Table, int]:
-    """Answer some rows for all readings asked about; the table and the designs simulated.
+def _table_of(asked: Question | LightestQuestion, start: int, stop: int) -> tuple[pa.Table, int]:
+    """Answer some rows; the table and the designs simulated.
 
     The table has the inputs, the answer and its bracket, and the outcome at the answer.
     """
     from boulder_sweep.store.schema import word_array
 
-    answers = [question.answered(start, stop) for question in asked]
-    first, key, sweep = answers[0], asked[0].key, asked[0].sweep
+    answers, key = asked.answered(start, stop), asked.key
     unit = key.field.unit
     what = f"{'largest' if key.most else 'smallest'} value of {key.field.path} that passes"
     next_to_it = f"value next to it of {key.field.path} that does not pass; where none passes, the last one tried"
     columns: list[TableColumn] = [
-        (key.answer, unit, f"{what}; null where none does", first.passes),
-        ("fails_at", unit, next_to_it, first.fails),
-        ("passes_at", unit, "the same as the answer: judged as a run judges it", first.passes),
-        ("found", "", ", ".join(WORDS), word_array(first.kind, WORDS)),
-        ("passes_within", unit, "where it is not monotone: all stretches that pass", first.stretches),
-        *to_build(first.block, sweep),
+        (key.answer, unit, f"{what}; null where none does", answers.passes),
+        ("fails_at", unit, next_to_it, answers.fails),
+        ("passes_at", unit, "the same as the answer: judged as a run judges it", answers.passes),
+        ("found", "", ", ".join(WORDS), word_array(answers.kind, WORDS)),
+        ("passes_within", unit, "where it is not monotone: all stretches that pass", answers.stretches),
+        *to_build(answers.block, asked.sweep),
     ]
-    for question, other in zip(asked[1:], answers[1:], strict=True):
-        name = question.sweep.model.preset
-        columns += [
-            (f"{key.answer}_{name}", unit, f"{what} by the readings {name}", other.passes),
-            (f"found_{name}", "", f"as found, by the readings {name}", word_array(other.kind, WORDS)),
-        ]
-    if first.chances is not None:
-        columns += chance_columns(first.chances, "chance of passing at the answer, or at the value tried last")
-    table = rows_table(start, first.block, first.judged, columns, at=1 + len(INPUTS))
-    return table, sum(answer.simulated for answer in answers)
+    if answers.chances is not None:
+        columns += chance_columns(answers.chances, "chance of passing at the answer, or at the value tried last")
+    return rows_table(start, answers.block, answers.judged, columns, at=1 + len(INPUTS)), answers.simulated

@@ -58,12 +58,6 @@ NOTES = {
     "blocked_by_overlap": "blocked: does not pass up to where the truck would pass or ride over the boulder",
     "undecided": "undecided: no value is known to pass, and the one tried last would if it were decided",
 }
-SHORT = {"as_printed": "printed", "corrected": "corrected"}
-"""Heads of the columns of other readings."""
-OTHER = {
-    "as_printed": "printed: by the equations as the paper prints them, misprints included (docs/readings.md)",
-    "corrected": "corrected: by the equations with their misprints corrected (docs/readings.md)",
-}
 
 
 def need_lines(need: Need, units: str = "si", file: str = "GRID.yaml") -> list[str]:
@@ -94,8 +88,6 @@ def need_lines(need: Need, units: str = "si", file: str = "GRID.yaml") -> list[s
         lines.append(f"(the first {len(kept)} of {len(tables)} tables; -o writes all {len(rows):,} rows)")
     elif not by_soil and len(rows) > MOST_IN_ALL:
         lines.append(f"(the first {MOST_IN_ALL:,} of {len(rows):,} rows; -o writes them all)")
-    if by_soil and need.others:
-        lines.append("(by the readings of the file; -o writes those by the others as well)")
     remarks = [*volume_lines(tables[0][0]), *_legend(need, file), *_grades(need), *_outside(need)]
     if need.probability is not None:
         remarks += undecided_lines(need.arrow)
@@ -109,8 +101,8 @@ def _shown_part(need: Need) -> pa.Table:
     """Return the columns that lines are made of: rows of all would take longer to make than to search."""
     needed = {*HEADS, *need.sweep.plan.labels, "design_id", "boulder_mass_kg", "passes_at", "robustness"}
     needed |= {"margin", "p_pass", "p_undecided", "p_undecided_reason", EXCAVATED.name, BACKFILLED.name}
-    answers = (need.key.answer, "found")
-    return need.arrow.select([n for n in need.arrow.column_names if n in needed or n.startswith(answers)])
+    needed |= {need.key.answer, "found"}
+    return need.arrow.select([name for name in need.arrow.column_names if name in needed])
 
 
 def _by_soil(need: Need, rows: Sequence[Row], units: str) -> list[list[str]]:
@@ -158,21 +150,18 @@ def _by_soil(need: Need, rows: Sequence[Row], units: str) -> list[list[str]]:
 def _legend(need: Need, file: str) -> list[str]:
     """Return what the words of the answers mean, how many rows have each, and what to ask next."""
     counts = need.counts()
-    occurring = {*counts, *(word for name in need.others for word in need.arrow[f"found_{name}"].unique().to_pylist())}
     smaller = "smaller" if need.key.most else "greater"
     steady = f"passes here and at all {smaller} values, and in other places between values that fail"
     broken = f"{steady} (never*: there alone)" if need.key.is_steady else "fails again further on"
     lines = [
-        f"{note.format(broken)} ({counted(counts[word], 'row')})" if word in counts else note.format(broken)
-        for word, note in NOTES.items()
-        if word in occurring
+        f"{note.format(broken)} ({counted(counts[word], 'row')})" for word, note in NOTES.items() if word in counts
     ]
     if "never" in counts or "blocked_by_overlap" in counts:
         if need.key.name == BOULDER_MASS.name:
             lines.append(f"next: wider ranges for the sides and the embedment in {file}")
         else:
             lines.append(f"next: another boulder: sweep need {shlex.quote(file)} --least mass")
-    return [*lines, *(OTHER[name] for name in need.others)]
+    return lines
 
 
 def _grades(need: Need) -> list[str]:
@@ -236,9 +225,6 @@ def _need_columns(need: Need, units: str) -> list[Column]:
     else:
         columns.append((("margin", ""), _where_it_passes(_margin)))
         columns.append((GRADE[0], lambda row: (row["passes_at"] and row["robustness"]) or "-"))
-    columns += [
-        ((SHORT[name], unit), answer_cell(key, f"{key.answer}_{name}", f"found_{name}", units)) for name in need.others
-    ]
     return [*columns, *((head, _where_it_passes(cell)) for head, cell in volume_columns(units))]
 
 

@@ -189,12 +189,6 @@ def every_reading(sweep: Sweep) -> list[Sweep]:
     return [dataclasses.replace(sweep, model=dataclasses.replace(sweep.model, readings=one)) for one in readings]
 
 
-def other_readings(sweep: Sweep) -> Sweep:
-    """Return the sweep with the other preset of readings: as printed where it is corrected, else corrected."""
-    preset = "as_printed" if sweep.model.preset == "corrected" else "corrected"
-    return dataclasses.replace(sweep, model=dataclasses.replace(sweep.model, readings=ReadingChoice.of_preset(preset)))
-
-
 def uncertain_rows(sweep: Sweep, given: InputRows, start: int, stop: int) -> InputRows:
     """Return the rows ``[start, stop)`` of a sweep with the indices of their named soils and vehicles.
 

@@ -62,12 +62,6 @@ Examples:
     is_flag=True,
     help="Count only passes that stand under every second opinion, with --margin.",
 )
-@click.option(
-    "--other-readings",
-    "both_readings",
-    is_flag=True,
-    help="Also answer by the other readings of the paper: takes longer.",
-)
 @jobs_option
 @click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table of all answers.")
 @click.option("--plot", "picture", type=OUTPUT, metavar="F.png", help="Design chart (.png, .svg or .pdf).")

@@ -135,7 +135,7 @@ def test_a_margin_is_proved_to_last() -> None:
                 assert rows.verdict[0] == PASS
                 assert judges.holds(rows)[0] == holds
                 assert rows["margin"][0] >= 0.375 or not holds or sweep is long
-    question = {"margin": "36 %", "between": ("1.2 m", "1.4 m"), "both_readings": False}
+    question = {"margin": "36 %", "between": ("1.2 m", "1.4 m")}
     one, other = (need(sweep, "embedment_depth", **question).frame.iloc[0] for sweep in (brief, long))
     assert (one.found, one.passes_within) == (other.found, other.passes_within) == ("not_monotone", "1.2 to 1.219")
 
@@ -185,16 +185,6 @@ def test_rows_do_not_depend_on_their_neighbours() -> None:
             pd.testing.assert_series_equal(
                 frame[name].astype(str), whole[name][row : row + 1].astype(str).reset_index(drop=True)
             )
-
-
-def test_both_readings() -> None:
-    assert need(site()).others == []
-    found = need(site(), both_readings=True)
-    printed = need(site(readings="as_printed"))
-    assert found.others == ["as_printed"]
-    pd.testing.assert_series_equal(
-        found.frame.least_embedment_depth_m_as_printed, printed.frame.least_embedment_depth_m, check_names=False
-    )
 
 
 def test_progress_counts_rows_or_the_values_tried_for_a_probability() -> None:
@@ -333,7 +323,7 @@ def test_table_has_units_and_settings(tmp_path: Path) -> None:
 
 
 def test_chart_is_drawn(tmp_path: Path) -> None:
-    need(site(), both_readings=True).plot(tmp_path / "chart.png")
+    need(site()).plot(tmp_path / "chart.png")
     need(site(), "mass").plot(tmp_path / "mass.png")
     assert (tmp_path / "chart.png").stat().st_size > 10_000
     with pytest.raises(PictureError, match="no curve"):

@@ -25,10 +25,6 @@ def test_columns_of_the_table(sweep):
     head = out.splitlines()[0].split()
     assert head == ["H", "φ′", "depth", "ratio", "above", "mass", "margin", "second", "dig", "fill"]
     assert len(out.splitlines()) >= 3 + 12
-    assert "printed" not in out
-    _, out, _ = sweep("need", CONFIG, "-q", "--other-readings")
-    assert out.splitlines()[0].split()[8:] == ["printed", "dig", "fill"]
-    assert "printed: by the equations as the paper prints them, misprints included" in out
 
 
 def test_what_does_not_pass_is_counted_with_the_next_question(sweep):
