@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import ndtr
 
 from boulder_sweep.answers.trials import InputRows, Judges, rows_at
 from boulder_sweep.designs import block_of
@@ -47,20 +46,12 @@ class Draws:
         How designs are judged.
     parallel
         Threads or workers.
-    variants
-        Equally likely judges, one of which is chosen by the last coordinate of each point; if empty, `judges` is used.
     """
 
     rows: InputRows
     spread: Spread
     judges: Judges
     parallel: Pool
-    variants: tuple[Judges, ...] = ()
-
-    @property
-    def dimensions(self) -> int:
-        """Dimensions of a point."""
-        return len(self.spread.names) + bool(self.variants)
 
     def distance(self, index: np.ndarray, z: np.ndarray, **inputs: np.ndarray) -> np.ndarray:
         """Return the distance of designs from failing, positive where they pass, shape (m,).
@@ -122,19 +113,8 @@ class Draws:
         return self.spread.filled(rows_at(self.rows, index) | inputs, z)
 
     def _piece(self, index: np.ndarray, z: np.ndarray, inputs: dict[str, np.ndarray], reserve: bool) -> np.ndarray:
-        given = self.given(index, z, inputs)
-        if not self.variants:
-            return self._each(given, self.judges, reserve)
-        count = len(self.variants)
-        chosen = np.minimum((ndtr(z[:, -1]) * count).astype(np.int64), count - 1)
-        measures = np.empty((2, len(index)))
-        for k, judges in enumerate(self.variants):
-            rows = np.flatnonzero(chosen == k)
-            if len(rows):
-                measures[:, rows] = self._each(rows_at(given, rows), judges, reserve)
-        return measures
+        given, judges = self.given(index, z, inputs), self.judges
 
-    def _each(self, given: InputRows, judges: Judges, reserve: bool) -> np.ndarray:
         def judged_by(evaluation: Evaluation, rows: InputRows) -> tuple[Judged, np.ndarray]:
             block = block_of(rows)
             judged = evaluation(block)

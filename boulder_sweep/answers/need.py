@@ -26,7 +26,7 @@ from boulder_sweep.answers.result import (
     write_parquet,
 )
 from boulder_sweep.answers.search import BLOCKED, WORDS
-from boulder_sweep.answers.trials import NO_FACE, Judges, every_reading, judges_of, ranges
+from boulder_sweep.answers.trials import NO_FACE, Judges, judges_of, ranges
 from boulder_sweep.columns import INPUTS, SECOND_SPRING_COLUMNS
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
@@ -128,7 +128,6 @@ def need(
     margin: str | float = 0.0,
     probability: str | float | None = None,
     seed: int = 0,
-    open_readings: bool = False,
     between: Ends = None,
     robust: bool = False,
     jobs: int | None = None,
@@ -151,9 +150,6 @@ def need(
         Required probability of passing, ``0.95`` or ``"95 %"``, if inputs have distributions.
     seed
         Seed of the samples for it.
-    open_readings
-        Whether every sampled design uses one of the 32 combinations of readings, all equally likely, instead of the
-        readings of the sweep.
     between
         Search range, instead of the axis or the usual range.
     robust
@@ -207,22 +203,20 @@ def need(
             f"the vehicle of {sweep.name} has no second spring; give it both vehicle.second_spring and "
             f"vehicle.second_spring_from, of which {key.field.path} is then searched"
         )
-    least_margin, drawn = margin_asked(margin), probability is not None
-    if open_readings and probability is None:
-        raise QuestionError("--open-readings needs --probability")
-    variants: tuple[Judges, ...] = ()
-    if open_readings:
-        variants = tuple(judges_of(one, least_margin) for one in every_reading(sweep))
+    least_margin = margin_asked(margin)
+    chance = None if probability is None else share(probability, "--probability")
+    if chance is not None and not 0.0 < chance < 1.0:
+        raise QuestionError(f"--probability {probability}: must be more than 0 and less than 100 %")
     if robust and not can_be_asked(sweep):
         raise QuestionError(
             "--robust: second opinions know boxes of rock of given density, elastic, dry, level, uniform soil without "
             "cohesion, one spring of the vehicle and corrected readings only"
         )
-    if robust and drawn:
+    if robust and chance is not None:
         raise QuestionError(
             "--robust and --probability cannot be used together: second opinions are not asked of the designs drawn"
         )
-    asked = _question(sweep, key, between, judges_of(sweep, least_margin, robust=robust), probability, seed, variants)
+    asked = _question(sweep, key, between, judges_of(sweep, least_margin, robust=robust), chance, seed)
     asked.judges.final.warm_up()
     done = _Progress(progress, asked, local=backend == THREADING)
     pieces = list(ranges(asked.count, asked.rows_at_once))
@@ -232,7 +226,6 @@ def need(
             tables.append(table)
             simulated += count
             done.answered(len(table))
-    chance = None if probability is None else share(probability, "--probability")
     question = {"asked": key.answer, "margin": least_margin}
     question |= {} if chance is None else {"probability": chance}
     question |= {"robust": True} if robust else {}
@@ -281,27 +274,18 @@ class _Progress:
 
 
 def _question(
-    sweep: Sweep,
-    key: Key,
-    between: Ends,
-    judges: Judges,
-    probability: str | float | None,
-    seed: int,
-    variants: tuple[Judges, ...],
+    sweep: Sweep, key: Key, between: Ends, judges: Judges, probability: float | None, seed: int
 ) -> Question | LightestQuestion:
     """Return the question of the kind that is asked."""
     if probability is None:
         if key.name == BOULDER_MASS.name:
             return LightestQuestion(sweep, key, judges)
         return Question(sweep, key, between, judges)
-    chance = share(probability, "--probability")
-    if not 0.0 < chance < 1.0:
-        raise QuestionError(f"--probability {probability}: must be more than 0 and less than 100 %")
     from boulder_sweep.answers.probability import LikelyLightestQuestion, ProbabilityQuestion  # imports scipy.stats
 
     if key.name == BOULDER_MASS.name:
-        return LikelyLightestQuestion(sweep, key, judges, chance, seed, variants)
-    return ProbabilityQuestion(sweep, key, between, judges, chance, seed, variants)
+        return LikelyLightestQuestion(sweep, key, judges, probability, seed)
+    return ProbabilityQuestion(sweep, key, between, judges, probability, seed)
 
 
 def _table_of(asked: Question | LightestQuestion, start: int, stop: int) -> tuple[pa.Table, int]:

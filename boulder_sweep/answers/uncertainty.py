@@ -287,7 +287,7 @@ def rare_failing(asked: _Asked, draws: Draws, sampled: Sampled) -> Failing:
     def distance(index: np.ndarray, z: np.ndarray) -> np.ndarray:
         return sign[index] * draws.reserve(few[index], z)
 
-    small = subset_simulation(distance, len(few), draws.dimensions, seed=asked.seed, confidence=asked.confidence)
+    small = subset_simulation(distance, len(few), len(asked.spread.names), seed=asked.seed, confidence=asked.confidence)
     fails = sign > 0.0
     estimate, low, high = 1.0 - sampled.estimate, 1.0 - sampled.high, 1.0 - sampled.low
     estimate[few] = np.where(fails, small.estimate, 1.0 - small.estimate)

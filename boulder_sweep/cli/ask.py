@@ -48,9 +48,6 @@ Examples:
 @margin_option
 @click.option("--probability", metavar="P", help="Probability of passing, e.g. 0.95, if inputs have distributions.")
 @click.option(
-    "--open-readings", is_flag=True, help="With --probability: treat all readings of the paper as equally likely."
-)
-@click.option(
     "--between",
     nargs=2,
     type=Quantity(),

@@ -75,15 +75,6 @@ def doubts_of_site(root: Path) -> str:
     return _fenced(doubt_lines(doubts(load(root / UNCERTAIN))))
 
 
-def open_readings_words(root: Path) -> str:
-    """Return the depths for a chance of 95 % with the readings of the file, and with the readings left open."""
-    sweep = load(root / UNCERTAIN)
-    closed = need(sweep, probability=0.95).frame.passes_at[0]
-    open_ = need(sweep, probability=0.95, open_readings=True).frame.passes_at[0]
-    words = f"{open_:.2f} m" if open_ == open_ else "and no depth gives it"
-    return f"A chance of 95 % needs {closed:.2f} m by the corrected readings, {words} with the readings left open."
-
-
 def partial_factors(root: Path) -> str:
     """Return what chance of passing designs have whose depth is just enough with a partial factor on their soil."""
     table = Table(("partial factor on tan φ′", "designs", "mean P(pass)", "least", "largest"))

@@ -300,7 +300,6 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "need-probability": answers.need_with_probability,
     "doubts-site": answers.doubts_of_site,
     "moves": _moves,
-    "open-readings": answers.open_readings_words,
     "partial-factors": answers.partial_factors,
     "stone-shapes": lambda root: shapes.shapes_table(root / GRID).markdown(),
     "stone-example": stones.stone_of_example,

@@ -18,9 +18,7 @@ from boulder_sweep.answers.doubts import (
     indices,
     parted,
 )
-from boulder_sweep.answers.need import need
 from boulder_sweep.answers.trials import every_reading
-from boulder_sweep.errors import QuestionError
 from tests.answers.designs import site
 
 UNCERTAIN = {"height": "3.2 m", "site": "embedment_depth: 2.2 m", "friction": "{mean: 38 deg, sd: 3 deg}"}
@@ -95,15 +93,3 @@ def test_readings_outweigh_the_numerical_error(drawn: int, monkeypatch: pytest.M
     assert parts[LAW].alone > 0.01
     assert parts[NUMERICAL].total < 1e-6
     assert all(own.alone <= own.total + 1e-12 for own in parts.values())
-
-
-@pytest.mark.nightly
-def test_open_readings_need_another_depth() -> None:
-    sweep = site(**UNCERTAIN)
-    closed = need(sweep, probability=0.9).frame.iloc[0]
-    open_ = need(sweep, probability=0.9, open_readings=True).frame.iloc[0]
-    assert open_.found == "found"
-    assert open_.passes_at != closed.passes_at
-    assert open_.p_pass >= 0.9
-    with pytest.raises(QuestionError, match="--open-readings needs --probability"):
-        need(site(), open_readings=True)
