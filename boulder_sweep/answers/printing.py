@@ -6,7 +6,6 @@ import math
 import textwrap
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.answers.search import ALWAYS, BLOCKED, NEVER, NOT_MONOTONE, UNKNOWN, WORDS
@@ -23,7 +22,6 @@ from boulder_sweep.text import counted
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from boulder_sweep.answers.doubts import Doubt
     from boulder_sweep.answers.keys import Key
     from boulder_sweep.answers.reserves import Reserves
     from boulder_sweep.answers.result import Result
@@ -223,20 +221,6 @@ def _index_lines(result: Uncertainty) -> list[str]:
         (("total", ""), number("total")),
     ]
     return table_lines(columns, result.indices.to_pylist())
-
-
-def doubt_lines(doubts: Sequence[Doubt]) -> list[str]:
-    """Return the shares of uncertainty as lines."""
-    columns: list[Column] = [
-        (("uncertainty of the margin", ""), lambda row: str(row["cause"])),
-        (("alone", ""), lambda row: _share(row["alone"])),
-        (("with", "interactions"), lambda row: _share(row["total"])),
-    ]
-    return table_lines(columns, [asdict(doubt) for doubt in doubts])
-
-
-def _share(value: float) -> str:
-    return f"{value:.1%}" if value >= 5e-4 else "< 0.05%"
 
 
 def reserve_lines(result: Reserves, units: str = "si") -> list[str]:

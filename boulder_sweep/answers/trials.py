@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -17,7 +16,6 @@ from boulder_sweep.judge.judged import PASS, Judged, joined
 from boulder_sweep.judge.robustness import STANDS_UNDER_ALL
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.distributions import SetDistributions
-from boulder_sweep.settings.model import PRINTED, SWITCHES, ReadingChoice
 from boulder_sweep.settings.sweep import DesignList
 
 if TYPE_CHECKING:
@@ -180,13 +178,6 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0, *, robust: bool = False) 
     if not accuracy.error_estimate and accuracy.steps.step_s >= coarse.control.h:
         coarse = final
     return Judges(coarse, final, accuracy, least_margin, robust)
-
-
-def every_reading(sweep: Sweep) -> list[Sweep]:
-    """Return a sweep with every combination of the five readings."""
-    choices = itertools.product(*((PRINTED, corrected) for corrected in SWITCHES.values()))
-    readings = (ReadingChoice(**dict(zip(SWITCHES, choice, strict=True))) for choice in choices)
-    return [dataclasses.replace(sweep, model=dataclasses.replace(sweep.model, readings=one)) for one in readings]
 
 
 def uncertain_rows(sweep: Sweep, given: InputRows, start: int, stop: int) -> InputRows:

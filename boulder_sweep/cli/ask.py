@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
 from typing import Any
 
 import click
@@ -119,7 +118,6 @@ Examples:
   sweep uncertainty configs/uncertain_site.yaml
   sweep uncertainty configs/uncertain_site.yaml --plot chances.png
   sweep uncertainty configs/uncertain_site.yaml --rare -o chances.parquet
-  sweep uncertainty configs/uncertain_site.yaml --doubts
 """
 
 
@@ -131,16 +129,11 @@ Examples:
 @click.option("--confidence", default="95 %", metavar="SHARE", help="Confidence level of the interval [95 %].")
 @margin_option
 @click.option("--rare", is_flag=True, help="Also small probabilities, by subset simulation.")
-@click.option(
-    "--doubts", is_flag=True, help="Divide a design's uncertainty among inputs, readings and numerical error."
-)
 @click.option("--seed", type=click.IntRange(min=0), default=0, metavar="N", help="Seed of the random numbers [0].")
 @jobs_option
 @click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table; indices and samples next to it.")
 @click.option("--plot", "picture", type=OUTPUT, metavar="F.png", help="Picture (.png, .svg or .pdf) of one design.")
-@click.option(
-    "--design", type=click.IntRange(min=0), default=0, metavar="ID", help="The design of --plot and --doubts [0]."
-)
+@click.option("--design", type=click.IntRange(min=0), default=0, metavar="ID", help="The design of --plot [0].")
 @quiet_option
 @cluster_options
 @units_option
@@ -148,7 +141,6 @@ Examples:
 @json_option
 def uncertainty(
     grid: str,
-    doubts: bool,
     out: str | None,
     picture: str | None,
     design: int,
@@ -163,7 +155,7 @@ def uncertainty(
     An input takes a distribution instead of a value: {mean: 38 deg, sd: 3 deg}, or with cov: 5 %. Sampling continues
     until the interval is narrow enough.
     """
-    from boulder_sweep.answers.printing import doubt_lines, uncertainty_lines
+    from boulder_sweep.answers.printing import uncertainty_lines
     from boulder_sweep.answers.uncertainty import uncertainty as estimate
 
     refuse_units_of_json(units, as_json)
@@ -172,15 +164,7 @@ def uncertainty(
     refuse_unwritable(out, picture)
     with working(quiet) as progress:
         result = estimate(sweep, **question, progress=progress)
-    parts = []
-    if doubts:
-        from boulder_sweep.answers.doubts import doubts as divide
-
-        parts = divide(sweep, design=design, seed=question["seed"], jobs=question["jobs"])
-    if as_json:
-        show(json.dumps(result.to_dict() | ({"doubts": [asdict(part) for part in parts]} if doubts else {})))
-    else:
-        show(*uncertainty_lines(result, units=units), *(["", *doubt_lines(parts)] if doubts else []))
+    show(*([json.dumps(result.to_dict())] if as_json else uncertainty_lines(result, units=units)))
     if not quiet:
         drawn = sum(result.arrow["p_pass_designs"].to_pylist())
         say(f"{counted(len(result), 'row')}; {counted(drawn, 'design')} drawn for the chances; seed {question['seed']}")

@@ -8,9 +8,8 @@ import numpy as np
 from scipy.special import ndtri
 
 from boulder_sweep import load, need, uncertainty
-from boulder_sweep.answers.doubts import doubts
 from boulder_sweep.answers.need_printing import need_lines
-from boulder_sweep.answers.printing import doubt_lines, reserve_lines, uncertainty_lines
+from boulder_sweep.answers.printing import reserve_lines, uncertainty_lines
 from boulder_sweep.answers.reserves import reserves
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.settings import Sweep
@@ -68,11 +67,6 @@ def uncertainty_of_site(root: Path) -> str:
 def need_with_probability(root: Path) -> str:
     """Return the depth for a chance of 95 % as a terminal shows it."""
     return _fenced(need_lines(need(load(root / UNCERTAIN), probability=0.95)))
-
-
-def doubts_of_site(root: Path) -> str:
-    """Return what share of the doubt about the uncertain site each cause has."""
-    return _fenced(doubt_lines(doubts(load(root / UNCERTAIN))))
 
 
 def partial_factors(root: Path) -> str:

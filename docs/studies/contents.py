@@ -298,7 +298,6 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "uncertainty-site": answers.uncertainty_of_site,
     "uncertainty-cases": answers.uncertainty_of_cases,
     "need-probability": answers.need_with_probability,
-    "doubts-site": answers.doubts_of_site,
     "moves": _moves,
     "partial-factors": answers.partial_factors,
     "stone-shapes": lambda root: shapes.shapes_table(root / GRID).markdown(),

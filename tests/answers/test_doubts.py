@@ -1,27 +1,12 @@
-"""Sobol indices against cases of which the answer is known; three doubts, parted as they should be."""
+"""Sobol indices against cases of which the answer is known."""
 
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from scipy.stats import sobol_indices, uniform
 
 from boulder_sweep.answers.chance import FIRST, Points
-from boulder_sweep.answers.doubts import (
-    INPUTS,
-    LAW,
-    NUMERICAL,
-    READINGS,
-    doubts,
-    drivers,
-    estimators,
-    indices,
-    parted,
-)
-from boulder_sweep.answers.trials import every_reading
-from tests.answers.designs import site
-
-UNCERTAIN = {"height": "3.2 m", "site": "embedment_depth: 2.2 m", "friction": "{mean: 38 deg, sd: 3 deg}"}
+from boulder_sweep.answers.doubts import drivers, estimators, indices
 
 
 def ishigami(u: np.ndarray) -> np.ndarray:
@@ -60,36 +45,3 @@ def test_driver_is_the_input_that_decides() -> None:
     z = Points(3, 0).upto(FIRST).reshape(-1, 3)
     outputs = np.stack([z[:, 0] + 0.3 * z[:, 1], z[:, 2] ** 3 - z[:, 0], (z[:, 1] > 0.5).astype(float)])
     assert drivers(z, outputs).tolist() == [0, 2, 1]
-
-
-def test_made_up_margins_are_parted_exactly() -> None:
-    r, law, drawn = np.arange(4.0), np.array([0.0, 1.0]), np.linspace(-1.0, 1.0, 50)
-    margins = 2.0 * r[:, None, None] + law[None, :, None] + drawn[None, None, :]
-    parts = {own.cause: own for own in parted(margins)}
-    for cause, values in ((READINGS, 2.0 * r), (LAW, law), (INPUTS, drawn)):
-        assert parts[cause].alone == pytest.approx(values.var() / margins.var())
-        assert parts[cause].total == pytest.approx(parts[cause].alone), "what is added does not act upon the rest"
-    assert sum(own.alone for own in parts.values()) == pytest.approx(1.0)
-
-
-def test_products_act_upon_each_other() -> None:
-    margins = np.multiply.outer(np.array([-1.0, 1.0]), np.ones((2, 1)) * np.linspace(-1.0, 1.0, 51))
-    parts = {own.cause: own for own in parted(margins)}
-    assert parts[READINGS].alone == pytest.approx(0.0)
-    assert parts[READINGS].total == pytest.approx(1.0)
-
-
-def test_every_reading_once() -> None:
-    readings = {sweep.model.readings for sweep in every_reading(site())}
-    assert len(readings) == 32
-
-
-@pytest.mark.parametrize("drawn", [128, pytest.param(512, marks=pytest.mark.nightly)])
-def test_readings_outweigh_the_numerical_error(drawn: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("boulder_sweep.answers.doubts.DRAWN", drawn)
-    parts = {own.cause: own for own in doubts(site(**UNCERTAIN))}
-    assert list(parts) == [INPUTS, READINGS, LAW, NUMERICAL]
-    assert parts[READINGS].alone > 0.3
-    assert parts[LAW].alone > 0.01
-    assert parts[NUMERICAL].total < 1e-6
-    assert all(own.alone <= own.total + 1e-12 for own in parts.values())

@@ -96,21 +96,11 @@ def test_a_margin_that_no_design_has_is_refused(sweep, command, margin):
     assert f"--margin {margin}: must be 0 or more and less than 100 %" in err
 
 
-def test_doubts(sweep, monkeypatch):
-    monkeypatch.setattr("boulder_sweep.answers.doubts.DRAWN", 32)
-    code, out, _ = sweep("uncertainty", CONFIG, "--doubts", "-q")
-    assert code == 0
-    assert "readings of the paper" in out
-    assert all(len(line) <= 80 for line in out.splitlines())
-    assert len(json.loads(sweep("uncertainty", CONFIG, "--doubts", "--json", "-q")[1])["doubts"]) == 4
-
-
-@pytest.mark.parametrize("more", [(), ("--doubts",)])
 @pytest.mark.parametrize(
     ("design", "words"), [("1", "holds 1 design, numbered from 0; there is no 1"), ("-1", "is not in the range x>=0")]
 )
-def test_a_design_that_the_file_does_not_hold_is_refused_at_once(sweep, monkeypatch, design, words, more):
+def test_a_design_that_the_file_does_not_hold_is_refused_at_once(sweep, monkeypatch, design, words):
     monkeypatch.setattr("boulder_sweep.answers.uncertainty.uncertainty", lambda *_, **__: pytest.fail("sampled"))
-    code, out, err = sweep("uncertainty", CONFIG, "--design", design, *more)
+    code, out, err = sweep("uncertainty", CONFIG, "--design", design)
     assert (code, out) == (2, "")
     assert words in err
