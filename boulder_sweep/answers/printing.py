@@ -56,10 +56,6 @@ HEADS = {
     "bed_offset_m": ("bed", "m"),
 }
 """Name and unit above the column of an input."""
-NOT_FAILING = {
-    "no_progress": "no_progress: small steps lead no nearer to the rare designs; see P(pass)",
-    "contradicts": "contradicts: P(fail) would contradict P(pass), which is counted; see P(pass)",
-}
 WITHSTOOD = {
     WORDS[ALWAYS]: "≥, ≤: passes throughout, up to the worst value tried",
     WORDS[NOT_MONOTONE]: "*: up to here everything passes; it passes again beyond values that fail, which counts for "
@@ -186,21 +182,12 @@ def uncertainty_lines(result: Uncertainty, units: str = "si") -> list[str]:
         (("from", ""), lambda row: f"{row['p_pass_low']:.4f}"),
         (("to", ""), lambda row: f"{row['p_pass_high']:.4f}"),
         *undecided_columns(result.arrow),
-        *([(("P(fail)", ""), _failing)] if "p_fail" in result.arrow.column_names else []),
         (("decided", "by"), lambda row: row["p_pass_driver"] or "-"),
         (("designs", "drawn"), lambda row: f"{row['p_pass_designs']:,}"),
     ]
-    lines, rows = _rows_lines(result, columns, units)
-    occurring = {row.get("p_fail_by") for row in rows}
-    lines += [note for word, note in NOT_FAILING.items() if word in occurring]
+    lines, _ = _rows_lines(result, columns, units)
     lines += [*undecided_lines(result.arrow), *foot_lines(result.sweep.model, reasons_in(result.arrow), units)]
     return [*lines, "", *_index_lines(result)] if len(result) == 1 else lines
-
-
-def _failing(row: Row) -> str:
-    if row["p_fail"] is None:
-        return str(row["p_fail_by"])
-    return f"{row['p_fail']:.2g} ({row['p_fail_low']:.2g} to {row['p_fail_high']:.2g})"
 
 
 def _index_lines(result: Uncertainty) -> list[str]:

@@ -9,16 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_sweep.answers.chance import (
-    FEWEST,
-    FIRST,
-    SCRAMBLINGS,
-    Chance,
-    Points,
-    Sampled,
-    chance,
-    subset_simulation,
-)
+from boulder_sweep.answers.chance import FIRST, SCRAMBLINGS, Points, chance
 from boulder_sweep.answers.doubts import Indices, drivers, indices
 from boulder_sweep.answers.draws import Draws
 from boulder_sweep.answers.keys import margin_asked, share
@@ -49,13 +40,11 @@ if TYPE_CHECKING:
 
 ROWS_AT_ONCE = 256
 MOST_INDEXED = 100
-"""Most rows for which Sobol indices and rare probabilities are computed."""
+"""Most rows for which Sobol indices are computed."""
 SAMPLES = 4096
 """Samples kept of each row for plots and inspection."""
 OUTPUTS = ("passes", "margin")
 """Outputs of the indices: whether a design passes, and its distance from failing."""
-FAILING = ("drawn", "subset", "no_progress", "contradicts")
-"""How a probability of failing was found, or, the last two, why there is none."""
 
 Samples = tuple[Mapping[str, np.ndarray], np.ndarray]
 """Uncertain inputs of sampled designs, and their distances from failing."""
@@ -127,7 +116,6 @@ def uncertainty(
     margin: str | float = 0.0,
     seed: int = 0,
     most: int = 1 << 16,
-    rare: bool = False,
     jobs: int | None = None,
     backend: str = THREADING,
     scheduler: str | None = None,
@@ -149,9 +137,6 @@ def uncertainty(
         Seed of all random numbers; the same seed gives the same result, whatever the number of threads.
     most
         Most samples of a row; fewer than 512 are not drawn.
-    rare
-        Whether to compute the smaller of the probabilities of failing and passing by subset simulation as well, which
-        reaches 1e-6 and below. Null, with the reason in ``p_fail_by``, where that does not work.
     jobs
         Threads; all cores by default.
     backend, scheduler
@@ -174,9 +159,7 @@ def uncertainty(
         raise QuestionError(f"--confidence {confidence}: must be at least 50 % and less than 100 %")
     if seed < 0:
         raise QuestionError(f"--seed {seed}: must not be negative")
-    if rare and sweep.n_designs > MOST_INDEXED:
-        raise QuestionError(f"--rare takes up to {MOST_INDEXED} designs; this file has {sweep.n_designs:,}")
-    asked = _Asked(sweep, Spread(sweep), judges_of(sweep, least_margin), width, sure, seed, most, rare)
+    asked = _Asked(sweep, Spread(sweep), judges_of(sweep, least_margin), width, sure, seed, most)
     asked.judges.final.warm_up()
     names, points = asked.spread.names, Points(len(asked.spread.names), seed)
     with pool(jobs, backend, scheduler) as workers:
@@ -203,21 +186,6 @@ def uncertainty(
 
 
 @dataclass(frozen=True, eq=False)
-class Failing(Chance):
-    """Probabilities of failing of n rows.
-
-    Attributes
-    ----------
-    estimate, low, high
-        As of `Chance`.
-    by : ndarray of int32, shape (n,)
-        Index in `FAILING`.
-    """
-
-    by: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
 class _Asked:
     """The arguments of `uncertainty`."""
 
@@ -228,7 +196,6 @@ class _Asked:
     confidence: float
     seed: int
     most: int
-    rare: bool
 
     def draws(self, start: int, stop: int, parallel: Pool) -> Draws:
         """Return what samples the designs of the rows ``[start, stop)``."""
@@ -253,7 +220,6 @@ def _rows(asked: _Asked, points: Points, parallel: Pool, start: int, stop: int) 
     sampled = chance(event, n, points, half_width=asked.half_width, confidence=asked.confidence, most=asked.most)
     z = points.upto(FIRST).reshape(FIRST * SCRAMBLINGS, -1)
     driver = drivers(z, first[0])
-    failing = rare_failing(asked, draws, sampled) if asked.rare else None
     block = replace(block_of(draws.rows), labels=asked.sweep.block(start, stop).labels)
     judged = ungraded(asked.judges.final(block))
     driver_meaning = "most influential of the uncertain inputs; null where they change nothing"
@@ -262,45 +228,7 @@ def _rows(asked: _Asked, points: Points, parallel: Pool, start: int, stop: int) 
         ("p_pass_driver", "", driver_meaning, word_array(driver, tuple(asked.spread.words))),
         ("p_pass_designs", "1", "designs drawn for p_pass", sampled.points),
     ]
-    if failing is not None:
-        meaning = "chance that the design does not pass; null where p_fail_by says why"
-        by_meaning = (
-            "subset: by subset simulation; drawn: by the designs drawn for p_pass; no_progress: no step of the "
-            "simulation came nearer to the rare designs; contradicts: its interval and that of p_pass "
-            "exclude each other"
-        )
-        columns += [
-            ("p_fail", "1", meaning, failing.estimate),
-            ("p_fail_low", "1", "lower end of the interval of p_fail", failing.low),
-            ("p_fail_high", "1", "upper end of the interval of p_fail", failing.high),
-            ("p_fail_by", "", by_meaning, word_array(failing.by, FAILING)),
-        ]
     return rows_table(start, block, judged, columns)
-
-
-def rare_failing(asked: _Asked, draws: Draws, sampled: Sampled) -> Failing:
-    """Return the probabilities of failing: sampled if enough designs fall on each side, else from subset simulation."""
-    passing = sampled.estimate * sampled.points
-    few = np.flatnonzero(np.minimum(passing, sampled.points - passing) < FEWEST)
-    sign = np.where(sampled.estimate[few] >= 0.5, 1.0, -1.0)
-
-    def distance(index: np.ndarray, z: np.ndarray) -> np.ndarray:
-        return sign[index] * draws.reserve(few[index], z)
-
-    small = subset_simulation(distance, len(few), len(asked.spread.names), seed=asked.seed, confidence=asked.confidence)
-    fails = sign > 0.0
-    estimate, low, high = 1.0 - sampled.estimate, 1.0 - sampled.high, 1.0 - sampled.low
-    estimate[few] = np.where(fails, small.estimate, 1.0 - small.estimate)
-    apart = np.zeros(len(estimate), dtype=bool)
-    from_, to = np.where(fails, small.low, 1.0 - small.high), np.where(fails, small.high, 1.0 - small.low)
-    apart[few] = (from_ > high[few]) | (to < low[few])
-    low[few], high[few] = from_, to
-    by = np.full(len(estimate), FAILING.index("drawn"), dtype=np.int32)
-    by[few] = np.where(np.isnan(small.estimate), FAILING.index("no_progress"), FAILING.index("subset"))
-    by[apart] = FAILING.index("contradicts")
-    known = by < FAILING.index("no_progress")
-    estimate, low, high = (np.where(known, values, np.nan) for values in (estimate, low, high))
-    return Failing(estimate, low, high, by)
 
 
 def _sensitivity(asked: _Asked, points: Points, parallel: Pool, row: int) -> tuple[Indices, Samples]:

@@ -117,7 +117,7 @@ UNCERTAINTY_EXAMPLES = """\b
 Examples:
   sweep uncertainty configs/uncertain_site.yaml
   sweep uncertainty configs/uncertain_site.yaml --plot chances.png
-  sweep uncertainty configs/uncertain_site.yaml --rare -o chances.parquet
+  sweep uncertainty configs/uncertain_site.yaml -o chances.parquet
 """
 
 
@@ -128,7 +128,6 @@ Examples:
 @click.option("--half-width", default="0.01", metavar="P", help="Largest half-width of the interval [0.01].")
 @click.option("--confidence", default="95 %", metavar="SHARE", help="Confidence level of the interval [95 %].")
 @margin_option
-@click.option("--rare", is_flag=True, help="Also small probabilities, by subset simulation.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, metavar="N", help="Seed of the random numbers [0].")
 @jobs_option
 @click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table; indices and samples next to it.")

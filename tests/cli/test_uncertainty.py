@@ -12,7 +12,7 @@ CONFIG = Path(__file__).parents[2] / "configs" / "uncertain_site.yaml"
 
 
 def test_lines_fit_the_terminal(sweep):
-    code, out, err = sweep("uncertainty", CONFIG, "--rare")
+    code, out, err = sweep("uncertainty", CONFIG)
     assert code == 0
     assert all(len(line) <= 80 for line in out.splitlines())
     assert "P(pass)" in out
