@@ -176,7 +176,7 @@ class AnswerFile:
         Raises
         ------
         BoulderSweepError
-            The files beside them are those of other answers.
+            The samples beside them are those of other answers.
         """
         sweep = asked_sweep(self.identity, self.table)
         if self.kind == CAPACITY:
@@ -192,18 +192,16 @@ class AnswerFile:
         return Need(sweep, self.table, key, asked["margin"], 0, asked.get("probability"))
 
     def _chances(self, sweep: Sweep) -> Uncertainty:
-        """Return probabilities with the indices and samples that lie beside them."""
+        """Return probabilities with the samples that lie beside them."""
         from boulder_sweep.answers.uncertainty import Uncertainty
 
-        tables = {}
-        for name in ("indices", "samples"):
-            file = self.path.with_suffix(f".{name}.parquet")
-            tables[name] = pa.table({"design_id": pa.array([], pa.int64())})
-            if file.exists():
-                tables[name] = _rows(file, self._refusal)
-                if identity_in(tables[name].schema.metadata) != identity_in(self.table.schema.metadata):
-                    raise self._refusal(f"{file} belongs to other answers than {self.path}; write both again")
-        return Uncertainty(sweep, self.table, tables["indices"], tables["samples"], self.question["seed"])
+        file = self.path.with_suffix(".samples.parquet")
+        samples = pa.table({"design_id": pa.array([], pa.int64())})
+        if file.exists():
+            samples = _rows(file, self._refusal)
+            if identity_in(samples.schema.metadata) != identity_in(self.table.schema.metadata):
+                raise self._refusal(f"{file} belongs to other answers than {self.path}; write both again")
+        return Uncertainty(sweep, self.table, samples, self.question["seed"])
 
 
 def _identified(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[pa.Table, dict[str, Any], str]:

@@ -13,7 +13,6 @@ from boulder_sweep.columns import BY_NAME as COLUMNS
 from boulder_sweep.columns import GRADES, WAY_OUT
 from boulder_sweep.judge.quantities import BACKFILLED, EXCAVATED
 from boulder_sweep.judge.validity import NOT_A_RATING, flag_counts
-from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import FOOT_WORDS
 from boulder_sweep.settings.shown_units import number_text, quantity_text, shown_unit
 from boulder_sweep.stones.rock import ROCK_KG_M3
@@ -174,7 +173,7 @@ def uncertainty_lines(result: Uncertainty, units: str = "si") -> list[str]:
     Returns
     -------
     list of str
-        Header, one line for each row, and a legend; for a single design, its Sobol indices follow.
+        Header, one line for each row, and a legend.
     """
     columns: list[Column] = [
         (("at the", "means"), lambda row: str(row["verdict"])),
@@ -186,28 +185,7 @@ def uncertainty_lines(result: Uncertainty, units: str = "si") -> list[str]:
         (("designs", "drawn"), lambda row: f"{row['p_pass_designs']:,}"),
     ]
     lines, _ = _rows_lines(result, columns, units)
-    lines += [*undecided_lines(result.arrow), *foot_lines(result.sweep.model, reasons_in(result.arrow), units)]
-    return [*lines, "", *_index_lines(result)] if len(result) == 1 else lines
-
-
-def _index_lines(result: Uncertainty) -> list[str]:
-    """Return the Sobol indices of one design as lines."""
-
-    def number(name: str) -> Cell:
-        def cell(row: Row) -> str:
-            if row[name] is None:
-                return "-"
-            return f"{row[name]:.2f} ({row[f'{name}_low']:.2f} to {row[f'{name}_high']:.2f})"
-
-        return cell
-
-    columns: list[Column] = [
-        (("Sobol", "index of"), lambda row: str(row["output"])),
-        (("", "input"), lambda row: BY_NAME[row["input"]].path),
-        (("first order", ""), number("first")),
-        (("total", ""), number("total")),
-    ]
-    return table_lines(columns, result.indices.to_pylist())
+    return [*lines, *undecided_lines(result.arrow), *foot_lines(result.sweep.model, reasons_in(result.arrow), units)]
 
 
 def reserve_lines(result: Reserves, units: str = "si") -> list[str]:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from boulder_sweep.answers.chance import FIRST, SCRAMBLINGS, Points, chance
-from boulder_sweep.answers.doubts import Indices, drivers, indices
 from boulder_sweep.answers.draws import Draws
 from boulder_sweep.answers.keys import margin_asked, share
 from boulder_sweep.answers.result import (
@@ -39,15 +37,12 @@ if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
 
 ROWS_AT_ONCE = 256
-MOST_INDEXED = 100
-"""Most rows for which Sobol indices are computed."""
+STRATA = 8
+"""Strata of each input whose means are compared by `drivers`."""
+MOST_SAMPLED = 100
+"""Most rows of which samples are kept."""
 SAMPLES = 4096
 """Samples kept of each row for plots and inspection."""
-OUTPUTS = ("passes", "margin")
-"""Outputs of the indices: whether a design passes, and its distance from failing."""
-
-Samples = tuple[Mapping[str, np.ndarray], np.ndarray]
-"""Uncertain inputs of sampled designs, and their distances from failing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,29 +54,22 @@ class Uncertainty(Result):
     sweep, arrow
         As of `Result`: inputs with the means of the uncertain ones, the outcome at these means, the chance of passing
         with its interval, and the most influential input.
-    indices : pyarrow.Table
-        Sobol indices, one row for each design, output and input; none where there are more than `MOST_INDEXED` designs.
     samples : pyarrow.Table
-        Designs drawn: number of the design, uncertain inputs, distance to failing; empty likewise.
+        Designs drawn: number of the design, uncertain inputs, distance to failing; none where there are more than
+        `MOST_SAMPLED` designs.
     seed : int
         Seed of all random numbers.
     """
 
-    indices: pa.Table
     samples: pa.Table
     seed: int
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything except the samples as plain data."""
-        return {
-            "name": self.sweep.name,
-            "seed": self.seed,
-            "rows": self.arrow.to_pylist(),
-            "indices": self.indices.to_pylist(),
-        }
+        return {"name": self.sweep.name, "seed": self.seed, "rows": self.arrow.to_pylist()}
 
     def write(self, path: str | Location) -> list[Location]:
-        """Write the table to a Parquet file, with indices and samples next to it; return the paths.
+        """Write the table to a Parquet file, with the samples next to it; return the paths.
 
         Raises
         ------
@@ -90,11 +78,11 @@ class Uncertainty(Result):
         """
         target = checked_parquet(path)
         files = [write_parquet(self.arrow, target)]
-        identity = {key: value for key, value in self.arrow.schema.metadata.items() if key.startswith(PREFIX.encode())}
-        for name, table in (("indices", self.indices), ("samples", self.samples)):
-            if len(table):
-                table = table.replace_schema_metadata(identity)
-                files.append(write_parquet(table, target.with_suffix(f".{name}.parquet")))
+        if len(self.samples):
+            metadata = self.arrow.schema.metadata.items()
+            identity = {key: value for key, value in metadata if key.startswith(PREFIX.encode())}
+            samples = self.samples.replace_schema_metadata(identity)
+            files.append(write_parquet(samples, target.with_suffix(".samples.parquet")))
         return files
 
     def plot(self, path: str | Path, design_id: int = 0, *, units: str = "si") -> None:
@@ -159,15 +147,14 @@ def uncertainty(
         raise QuestionError(f"--confidence {confidence}: must be at least 50 % and less than 100 %")
     if seed < 0:
         raise QuestionError(f"--seed {seed}: must not be negative")
-    asked = _Asked(sweep, Spread(sweep), judges_of(sweep, least_margin), width, sure, seed, most)
+    asked = _Asked(sweep, Spread(sweep), judges_of(sweep, least_margin), width, sure, most)
     asked.judges.final.warm_up()
-    names, points = asked.spread.names, Points(len(asked.spread.names), seed)
+    points = Points(len(asked.spread.names), seed)
     with pool(jobs, backend, scheduler) as workers:
         pieces = ranges(sweep.n_designs, ROWS_AT_ONCE)
         parts = (_rows(asked, points, workers, start, stop) for start, stop in pieces)
         tables = collected(parts, sweep.n_designs, progress)
-        few = sweep.n_designs if sweep.n_designs <= MOST_INDEXED else 0
-        each = [_sensitivity(asked, points, workers, row) for row in range(few)]
+        samples = _sample_table(asked, points, workers, sweep.n_designs if sweep.n_designs <= MOST_SAMPLED else 0)
     question = {
         "asked": "p_pass",
         "half_width": width,
@@ -176,13 +163,8 @@ def uncertainty(
         "seed": seed,
         "most": most,
     }
-    return Uncertainty(
-        sweep,
-        joined_tables(tables, sweep, asked.judges, "boulder_sweep.uncertainty", question),
-        _index_table(names, [one for one, _ in each]),
-        _sample_table(names, [drawn for _, drawn in each]),
-        seed,
-    )
+    table = joined_tables(tables, sweep, asked.judges, "boulder_sweep.uncertainty", question)
+    return Uncertainty(sweep, table, samples, seed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +176,6 @@ class _Asked:
     judges: Judges
     half_width: float
     confidence: float
-    seed: int
     most: int
 
     def draws(self, start: int, stop: int, parallel: Pool) -> Draws:
@@ -231,47 +212,37 @@ def _rows(asked: _Asked, points: Points, parallel: Pool, start: int, stop: int) 
     return rows_table(start, block, judged, columns)
 
 
-def _sensitivity(asked: _Asked, points: Points, parallel: Pool, row: int) -> tuple[Indices, Samples]:
-    """Return the indices of one design, and samples of it."""
-    draws = asked.draws(row, row + 1, parallel)
+def drivers(z: np.ndarray, output: np.ndarray) -> np.ndarray:
+    """Return the most influential input of each row, from the means of an output over strata of each input.
 
-    def outputs(z: np.ndarray) -> np.ndarray:
-        distance = draws.distance(np.zeros(len(z), dtype=np.int64), z)
-        return np.stack([(distance > 0.0).astype(float), distance])
+    Parameters
+    ----------
+    z
+        Standard normal numbers, shape (m, d), the same for all rows.
+    output
+        An output at these points, shape (n, m).
 
-    decided = indices(outputs, len(asked.spread.names), seed=asked.seed, confidence=asked.confidence)
-    z = points.upto(SAMPLES // SCRAMBLINGS).reshape(SAMPLES, -1)
-    index = np.zeros(SAMPLES, dtype=np.int64)
+    Returns
+    -------
+    ndarray of int64, shape (n,)
+        Index of the input; -1 where the output does not vary.
+    """
+    shares = np.empty((len(output), z.shape[1]))
+    for k in range(z.shape[1]):
+        order = np.argsort(z[:, k], kind="stable")
+        strata = np.array_split(order, STRATA)
+        means = np.stack([output[:, stratum].mean(axis=1) for stratum in strata], axis=1)
+        shares[:, k] = means.var(axis=1)
+    return np.where(output.var(axis=1) > 0.0, shares.argmax(axis=1), -1)
+
+
+def _sample_table(asked: _Asked, points: Points, parallel: Pool, rows: int) -> pa.Table:
+    """Return samples of the first rows as a table: number of the design, uncertain inputs, distance from failing."""
+    import pyarrow as pa
+
+    draws = asked.draws(0, rows, parallel)
+    index = np.repeat(np.arange(rows), SAMPLES)
+    z = np.tile(points.upto(SAMPLES // SCRAMBLINGS).reshape(SAMPLES, -1), (rows, 1))
     given = draws.given(index, z, {})
-    return decided, ({name: given[name] for name in asked.spread.names}, draws.distance(index, z))
-
-
-def _index_table(names: Sequence[str], estimates: Sequence[Indices]) -> pa.Table:
-    """Return Sobol indices as a table, one row for each design, output and input."""
-    import pyarrow as pa
-
-    from boulder_sweep.store.schema import number_array
-
-    rows = [(design, output, name) for design in range(len(estimates)) for output in OUTPUTS for name in names]
-    designs, outputs, inputs = (list(column) for column in zip(*rows, strict=True)) if rows else ([], [], [])
-    columns = {
-        "design_id": pa.array(designs, pa.int64()),
-        "output": pa.array(outputs, pa.string()).dictionary_encode(),
-        "input": pa.array(inputs, pa.string()).dictionary_encode(),
-    }
-    for field in fields(Indices):
-        values = np.concatenate([*(getattr(one, field.name).ravel() for one in estimates), np.empty(0)])
-        columns[field.name] = number_array(values, np.isnan(values))
-    return pa.table(columns)
-
-
-def _sample_table(names: Sequence[str], drawn: Sequence[Samples]) -> pa.Table:
-    """Return sampled designs as a table: number of the design, uncertain inputs, distance from failing."""
-    import pyarrow as pa
-
-    counts = [len(distance) for _, distance in drawn]
-    columns = {"design_id": pa.array(np.repeat(np.arange(len(drawn)), counts))}
-    for name in names:
-        columns[name] = pa.array(np.concatenate([*(inputs[name] for inputs, _ in drawn), np.empty(0)]))
-    columns["distance"] = pa.array(np.concatenate([*(distance for _, distance in drawn), np.empty(0)]))
-    return pa.table(columns)
+    inputs = {name: given[name] for name in asked.spread.names}
+    return pa.table({"design_id": index, **inputs, "distance": draws.distance(index, z)})

@@ -130,7 +130,7 @@ Examples:
 @margin_option
 @click.option("--seed", type=click.IntRange(min=0), default=0, metavar="N", help="Seed of the random numbers [0].")
 @jobs_option
-@click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table; indices and samples next to it.")
+@click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table; samples next to it.")
 @click.option("--plot", "picture", type=OUTPUT, metavar="F.png", help="Picture (.png, .svg or .pdf) of one design.")
 @click.option("--design", type=click.IntRange(min=0), default=0, metavar="ID", help="The design of --plot [0].")
 @quiet_option

@@ -102,7 +102,7 @@ def chances_with_factor(root: Path, factor: float) -> np.ndarray:
 
 def uncertainty_of_cases(root: Path) -> str:
     """Return the chances of the crash tests and of a boulder from the grid, their soils uncertain."""
-    table = Table(("design", "readings", "P(pass)", "interval", "decided by", "its total index of the margin"))
+    table = Table(("design", "readings", "P(pass)", "interval", "decided by"))
     for name, (path, single) in CASES.items():
         for readings in ("corrected", "as_printed"):
             overrides = [f"{key}={value}" for key, value in single.items()] + [f"model.readings={readings}"]
@@ -110,11 +110,10 @@ def uncertainty_of_cases(root: Path) -> str:
             spreads = [spread.format(**values) for spread in SPREADS]
             found = uncertainty(load(root / path, [*overrides, *spreads]), half_width=0.005)
             row = found.arrow.to_pylist()[0]
-            indices = {(own["output"], own["input"]): own["total"] for own in found.indices.to_pylist()}
-            best = max((value, key[1]) for key, value in indices.items() if key[0] == "margin")
             interval = f"{row['p_pass_low']:.3f} to {row['p_pass_high']:.3f}"
-            words = best[1].rpartition("_")[0].replace("_", " ")
-            table.add(name, readings.replace("_", " "), f"{row['p_pass']:.3f}", interval, words, f"{best[0]:.2f}")
+            driver = (row["p_pass_driver"] or "").partition(".")[2].replace("_", " ")
+            words = driver or f"undecided: {row['p_undecided_reason']}"
+            table.add(name, readings.replace("_", " "), f"{row['p_pass']:.3f}", interval, words)
     return table.markdown()
 
 

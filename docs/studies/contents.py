@@ -318,6 +318,6 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
 LONG = {
     *("readings-crash-tests", "readings-grid", "readings-words", "coverage", "box-shares", "front-face"),
     *(name for name in CONTENTS if name.startswith("forms-")),
-    *("wild-families", "uncertainty-cases", "moves", "partial-factors", "stone-site"),
+    *("wild-families", "moves", "partial-factors", "stone-site"),
 }
 """Blocks that take more than ten seconds, or share what does: computed again every night, not with every change."""

@@ -12,9 +12,10 @@ import pytest
 from scipy.special import ndtr
 
 import boulder_sweep
+from boulder_sweep.answers.chance import FIRST, Points
 from boulder_sweep.answers.need import need
 from boulder_sweep.answers.printing import uncertainty_lines
-from boulder_sweep.answers.uncertainty import uncertainty
+from boulder_sweep.answers.uncertainty import drivers, uncertainty
 from boulder_sweep.errors import PictureError, QuestionError
 from tests.answers.designs import site
 
@@ -44,7 +45,6 @@ def test_every_row_has_its_chance() -> None:
 def test_does_not_depend_on_threads() -> None:
     one, two = (uncertainty(site(**UNCERTAIN), jobs=jobs) for jobs in (1, 2))
     assert one.arrow.equals(two.arrow)
-    assert one.indices.equals(two.indices)
     assert one.samples.equals(two.samples)
     assert not uncertainty(site(**UNCERTAIN), seed=1).arrow.equals(one.arrow)
 
@@ -54,16 +54,22 @@ def test_margin_lowers_the_chance() -> None:
     assert more < plain - 0.1
 
 
-def test_indices_name_what_decides() -> None:
+def test_a_varying_input_is_named_that_decides() -> None:
     sweep = site(**UNCERTAIN | {"subgrade": "{distribution: lognormal, mean: 60 MN/m^3, cov: 40 %}"})
     found = uncertainty(sweep)
-    table = found.indices.to_pandas().set_index(["output", "input"])
-    assert table.loc[("margin", "friction_angle_deg"), "total"] > 0.8
-    assert table.loc[("margin", "subgrade_reaction_MN_m3"), "total"] < 0.2
-    assert (table.first_low <= table["first"]).all()
-    assert (table.total_high >= table["total"]).all()
-    assert any("soil.subgrade_reaction" in line for line in uncertainty_lines(found))
+    assert found.frame.p_pass_driver[0] == "soil.friction_angle"
+    assert any("soil.friction_angle" in line for line in uncertainty_lines(found))
     assert all(len(line) <= 80 for line in uncertainty_lines(found))
+
+
+def test_driver_is_the_input_that_decides() -> None:
+    z = Points(3, 0).upto(FIRST).reshape(-1, 3)
+    outputs = np.stack([z[:, 0] + 0.3 * z[:, 1], z[:, 2] ** 3 - z[:, 0], (z[:, 1] > 0.5).astype(float)])
+    assert drivers(z, outputs).tolist() == [0, 2, 1]
+
+
+def test_what_does_not_vary_has_no_driver() -> None:
+    assert drivers(np.random.default_rng(1).standard_normal((512, 2)), np.ones((1, 512))).tolist() == [-1]
 
 
 def test_depth_for_a_probability() -> None:
@@ -81,11 +87,11 @@ def test_depth_for_a_probability() -> None:
 def test_files(tmp_path: Path) -> None:
     found = uncertainty(site(**UNCERTAIN))
     files = found.write(tmp_path / "chance.parquet")
-    assert [file.name for file in files] == ["chance.parquet", "chance.indices.parquet", "chance.samples.parquet"]
+    assert [file.name for file in files] == ["chance.parquet", "chance.samples.parquet"]
     frame = pd.read_parquet(files[0])
     assert frame.attrs["meanings"]["p_pass"].startswith("chance")
     assert json.loads(pq.read_schema(files[0]).metadata[b"boulder_sweep.question"])["seed"] == 0
-    samples = pd.read_parquet(files[2])
+    samples = pd.read_parquet(files[1])
     assert (samples.distance > 0).mean() == pytest.approx(frame.p_pass[0], abs=0.02)
 
 

@@ -16,7 +16,7 @@ def test_lines_fit_the_terminal(sweep):
     assert code == 0
     assert all(len(line) <= 80 for line in out.splitlines())
     assert "P(pass)" in out
-    assert "Sobol" in out
+    assert "soil.friction_angle" in out
     assert "seed 0" in err
 
 
@@ -27,7 +27,6 @@ def test_json_and_files(sweep, tmp_path):
     assert 0.0 < json.loads(out)["rows"][0]["p_pass"] < 1.0
     assert {file.name for file in tmp_path.iterdir()} >= {
         "c.parquet",
-        "c.indices.parquet",
         "c.samples.parquet",
         "c.png",
     }

@@ -334,7 +334,7 @@ def test_one_changed_place_in_the_settings_ends_in_words(
 
 def test_files_beside_answers_belong_to_them(files: dict[str, Path], tmp_path: Path, sweep: Command) -> None:
     """Samples of other answers, and of none."""
-    for name in ("uncertainty.parquet", "uncertainty.indices.parquet", "uncertainty.samples.parquet"):
+    for name in ("uncertainty.parquet", "uncertainty.samples.parquet"):
         shutil.copy(files["uncertainty"].with_name(name), tmp_path / name)
     assert sweep("plot", tmp_path / "uncertainty.parquet", "-o", tmp_path / "chance.png")[0] == 0
     samples = tmp_path / "uncertainty.samples.parquet"
