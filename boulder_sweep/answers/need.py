@@ -14,7 +14,7 @@ from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.answers.keys import BOULDER_MASS, Ends, Key, key_of, margin_asked, share
-from boulder_sweep.answers.lightest import SIDES, LightestQuestion
+from boulder_sweep.answers.lightest import LightestQuestion
 from boulder_sweep.answers.questions import Question
 from boulder_sweep.answers.result import (
     Result,
@@ -28,6 +28,7 @@ from boulder_sweep.answers.result import (
 from boulder_sweep.answers.search import BLOCKED, WORDS
 from boulder_sweep.answers.trials import NO_FACE, Judges, judges_of, ranges
 from boulder_sweep.columns import INPUTS, SECOND_SPRING_COLUMNS
+from boulder_sweep.designs import SIDES
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.quantiles import at_values

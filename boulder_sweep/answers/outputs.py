@@ -13,12 +13,12 @@ import numpy as np
 import pyarrow as pa
 
 from boulder_sweep.answers.keys import key_of
-from boulder_sweep.answers.lightest import DEPTH, SIDES
+from boulder_sweep.answers.lightest import DEPTH
 from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.trials import Open
 from boulder_sweep.columns import BOULDER_MASS, COLUMNS
 from boulder_sweep.columns import BY_NAME as COLUMN_OF
-from boulder_sweep.designs import Label
+from boulder_sweep.designs import SIDES, Label
 from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning
 from boulder_sweep.impact.explanation import model_of
 from boulder_sweep.judge.accuracy import known_control

@@ -15,7 +15,7 @@ import numpy as np
 from boulder_sweep.answers.chance import SCRAMBLINGS, Points, Sampled, chance
 from boulder_sweep.answers.draws import WORST, Draws
 from boulder_sweep.answers.keys import Ends, Key, range_of
-from boulder_sweep.answers.lightest import DEPTH, RATIO, SIDES, Boulders, LightestQuestion, Sides
+from boulder_sweep.answers.lightest import DEPTH, RATIO, Boulders, LightestQuestion, Sides
 from boulder_sweep.answers.questions import CHECKED_AT_ONCE, Answers, Question, Trial
 from boulder_sweep.answers.search import BEYOND, FAILS, HOLDS, Search
 from boulder_sweep.answers.spread import Spread
@@ -29,6 +29,7 @@ from boulder_sweep.answers.trials import (
     uncertain_rows,
     ungraded,
 )
+from boulder_sweep.designs import SIDES
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.judged import OVERRIDE
 from boulder_sweep.runner.pool import Pool

@@ -88,7 +88,7 @@ def need(
     criterion.min_overlap), `undecided` if the last value tried is, and `never` if neither.
     """
     from boulder_sweep.answers.need import need as find
-    from boulder_sweep.answers.need_printing import need_lines
+    from boulder_sweep.answers.printing import need_lines
 
     refuse_units_of_json(units, as_json)
     sweep = load_sweep(grid, overrides, quiet, units)

@@ -8,8 +8,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from boulder_sweep import load, need, uncertainty
-from boulder_sweep.answers.need_printing import need_lines
-from boulder_sweep.answers.printing import reserve_lines, uncertainty_lines
+from boulder_sweep.answers.printing import need_lines, reserve_lines, uncertainty_lines
 from boulder_sweep.answers.reserves import reserves
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.settings import Sweep

@@ -15,7 +15,7 @@ import pytest
 import boulder_sweep
 from boulder_sweep.answers.keys import key_of
 from boulder_sweep.answers.need import Need, need
-from boulder_sweep.answers.need_printing import need_lines
+from boulder_sweep.answers.printing import need_lines
 from boulder_sweep.answers.trials import Remembered, judges_of
 from boulder_sweep.designs import DesignBlock, some
 from boulder_sweep.errors import PictureError, QuestionError

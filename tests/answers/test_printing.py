@@ -8,8 +8,7 @@ import pytest
 
 from boulder_sweep import uncertainty
 from boulder_sweep.answers.need import need
-from boulder_sweep.answers.need_printing import need_lines
-from boulder_sweep.answers.printing import HEADS, reserve_lines, uncertainty_lines
+from boulder_sweep.answers.printing import HEADS, need_lines, reserve_lines, uncertainty_lines
 from boulder_sweep.answers.reserves import reserves
 from boulder_sweep.settings import load_text
 from boulder_sweep.settings.fields import INPUTS
@@ -95,7 +94,7 @@ def test_many_answers_stand_boulder_by_soil_and_none_is_left_out(many) -> None:
 
 
 def test_of_too_many_answers_whole_tables_are_shown(many, monkeypatch) -> None:
-    monkeypatch.setattr("boulder_sweep.answers.need_printing.MOST_IN_ALL", 20)
+    monkeypatch.setattr("boulder_sweep.answers.printing.MOST_IN_ALL", 20)
     lines = need_lines(many)
     assert sum(line.startswith("─") for line in lines) == 1
     assert "(the first 1 of 2 tables; -o writes all 96 rows)" in lines
