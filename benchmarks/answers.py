@@ -96,7 +96,9 @@ def draw_one(drawn: int) -> float:
     sweep = load(SITE)
     draws = Draws(sweep.plan.given_rows(0, 1), Spread(sweep), judges_of(sweep), Pool(None))
     points = Points(len(draws.spread.names), 0)
-    found = chance(draws.passes, 1, points, half_width=0.0, most=drawn, first=drawn // 16)
+    found = chance(
+        lambda index, z: draws.distance(index, z) > 0.0, 1, points, half_width=0.0, most=drawn, first=drawn // 16
+    )
     return float(found.estimate[0])
 
 

@@ -116,7 +116,6 @@ def main() -> None:
                 Path(folder) / "out",
                 backend="dask",
                 scheduler=address,
-                force=True,
                 progress=begin,
             )
         after, seconds = spent(), time.monotonic() - begun[0]

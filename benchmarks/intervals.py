@@ -78,10 +78,15 @@ def simulated(inputs: int, seeds: int, probabilities: tuple[float, ...] = SIMULA
     given = sweep.plan.given_rows(0, 1)
     rows = {name: np.repeat(values, len(depths)) for name, values in given.items()} | {"embedment_depth_m": depths}
     draws = Draws(rows, Spread(sweep), judges_of(sweep), Pool(None))
-    many = Points(draws.dimensions, seeds)
+    dimensions = len(draws.spread.names)
+    many = Points(dimensions, seeds)
     first = REFERENCE // SCRAMBLINGS
-    exact = chance(draws.passes, len(depths), many, half_width=0.0, most=REFERENCE, first=first).estimate
-    return held(draws.passes, draws.dimensions, exact, seeds, HALF_WIDTHS[0])
+
+    def passes(index: np.ndarray, z: np.ndarray) -> np.ndarray:
+        return draws.distance(index, z) > 0.0
+
+    exact = chance(passes, len(depths), many, half_width=0.0, most=REFERENCE, first=first).estimate
+    return held(passes, dimensions, exact, seeds, HALF_WIDTHS[0])
 
 
 def measure(seeds: int = SEEDS) -> tuple[Table, bool]:

@@ -80,7 +80,7 @@ def main() -> None:
                 started.append(time.process_time())
 
         with tempfile.TemporaryDirectory() as folder:
-            summary = run(sweep, Path(folder) / "out", force=True, progress=begin)
+            summary = run(sweep, Path(folder) / "out", progress=begin)
         total, found = time.process_time() - started[0], clock.seconds
         alone = found["committing"] + found["messages"]
         between = found["blocks"] - found["kernels"] + found["parts"] - found["encoding"]

@@ -1,4 +1,4 @@
-"""What can be asked for: an input by its name, its bounds and its tolerance."""
+"""What can be asked for: an input by its name, its bounds and the step of its search."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from boulder_sweep.settings.tree import Scalar
 from boulder_sweep.settings.values import NumberError, outside, read_quantity, read_single, refuse_bare
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Mapping
 
     from boulder_sweep.settings import Sweep
 
 Ends = tuple[str | float, str | float] | None
 """Search range given by the user."""
-TOLERANCES = {
+STEPS = {
     "m": 1e-3,
     "1": 1e-3,
     "deg": 0.01,
@@ -35,7 +35,7 @@ TOLERANCES = {
     "N/m": 1000.0,
     "N*s/m": 100.0,
 }
-"""Default tolerance, by unit."""
+"""Spacing of the values tried, by unit."""
 LEAST_RATIO = 0.35
 """Smallest embedment tried where the file sets no range, as a share of the height. A boulder that is hardly embedded
 may slide a metre instead of turning, and pass; buried deeper, it is held at its foot and overturns."""
@@ -43,8 +43,6 @@ MILDEST = {"impact_speed_m_s": 0.0, "vehicle_mass_kg": 100.0}
 """A barrier must hold every smaller value of these inputs; a search for the largest begins at these (table units)."""
 STRONGEST = ("friction_angle_deg", "embedment_depth_m", "embedment_ratio")
 """A barrier must pass at every greater value of these inputs. What passes between two that fail is no answer."""
-MOST_PLACES = 2**53
-"""Multiples of the tolerance up to which every one is a number of its own."""
 
 
 @dataclass(frozen=True)
@@ -57,13 +55,10 @@ class Key:
         The input.
     most
         Whether its largest value is wanted instead of its smallest.
-    tolerance
-        Spacing of the values tried, in the unit of the table. Answers are multiples of it.
     """
 
     field: fields.Field
     most: bool
-    tolerance: float
 
     @property
     def name(self) -> str:
@@ -76,9 +71,9 @@ class Key:
         return self.name in (MILDEST if self.most else STRONGEST)
 
     @property
-    def is_coarse(self) -> bool:
-        """Whether the tolerance is larger than the usual one."""
-        return self.tolerance > TOLERANCES[self.field.unit]
+    def step(self) -> float:
+        """Spacing of the values tried, in the unit of the table; answers are multiples of it."""
+        return STEPS[self.field.unit]
 
     @property
     def answer(self) -> str:
@@ -87,10 +82,9 @@ class Key:
 
     def values(self, positions: np.ndarray) -> np.ndarray:
         """Return the values at some positions (whole numbers) of the search lattice."""
-        per_unit = round(1.0 / self.tolerance)
-        if per_unit > 1 and math.isclose(per_unit * self.tolerance, 1.0, rel_tol=1e-12):
-            return positions / per_unit  # the float nearest to 1.234, as a file would give it
-        return positions * self.tolerance
+        per_unit = round(1.0 / self.step)
+        # A quotient is the float nearest to 1.234, as a file would give it.
+        return positions / per_unit if per_unit > 1 else positions * self.step
 
     def ends(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the outermost lattice positions within a range; the next one above its start where none is within."""
@@ -99,11 +93,11 @@ class Key:
 
     def within(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the outermost lattice positions within a range, the first behind the last where there is none."""
-        first = np.ceil(low / self.tolerance - 1e-6).astype(np.int64)
-        return first, np.floor(high / self.tolerance + 1e-6).astype(np.int64)
+        first = np.ceil(low / self.step - 1e-6).astype(np.int64)
+        return first, np.floor(high / self.step + 1e-6).astype(np.int64)
 
 
-def key_of(word: str, *, most: bool = False, tolerance: str | float | None = None) -> Key:
+def key_of(word: str, *, most: bool = False) -> Key:
     """Return the input that a word names.
 
     Parameters
@@ -112,58 +106,33 @@ def key_of(word: str, *, most: bool = False, tolerance: str | float | None = Non
         As of `boulder_sweep.settings.fields.named`; ``mass`` is that of the boulder.
     most
         Whether its largest value is wanted.
-    tolerance
-        Spacing of the values tried, ``"1 mm"`` or a number in the unit of the table; from `TOLERANCES` by default.
 
     Raises
     ------
     QuestionError
-        The word names no input or several, or the tolerance is not a positive value of the right kind.
+        The word names no input or several.
     """
     try:
         field = BOULDER_MASS if word == BOULDER_MASS.key else named(word)
     except UnknownNameError as problem:
         raise QuestionError(str(problem)) from None
-    value = TOLERANCES[field.unit] if tolerance is None else quantity(tolerance, field.unit, "--tolerance")
-    if not 0.0 < value < math.inf:
-        raise QuestionError(f"--tolerance {tolerance}: must be positive")
-    return Key(field, most, value)
-
-
-def quantity(text: str | float, unit: str, option: str) -> float:
-    """Return a number with its unit, or in the unit of the table where it is no text.
-
-    Raises
-    ------
-    QuestionError
-        It is not a number of that kind, or text without a unit.
-    """
-    if not isinstance(text, str):
-        return float(text)
-    _refuse_bare(option, (text,), unit)
-    try:
-        return float(read_quantity(Scalar(Position(option), text), unit).value)
-    except LeafError as problem:
-        raise QuestionError(f"{option} {text}: {problem}") from None
-
-
-def _refuse_bare(option: str, given: Sequence[str | float], unit: str) -> None:
-    """Refuse text that is a number without a unit.
-
-    Raises
-    ------
-    QuestionError
-        There is such a text, and the unit is not 1.
-    """
-    try:
-        refuse_bare(option, [one for one in given if isinstance(one, str)], unit)
-    except NumberError as problem:
-        raise QuestionError(str(problem)) from None
+    return Key(field, most)
 
 
 def share(text: str | float, option: str) -> float:
-    """Return a number such as 0.25 or ``25 %``."""
-    return quantity(text, "1", option)
+    """Return a number such as 0.25 or ``25 %``.
+
+    Raises
+    ------
+    QuestionError
+        It is not a number.
+    """
+    if not isinstance(text, str):
+        return float(text)
+    try:
+        return float(read_quantity(Scalar(Position(option), text), "1").value)
+    except LeafError as problem:
+        raise QuestionError(f"{option} {text}: {problem}") from None
 
 
 def margin_asked(text: str | float) -> float:
@@ -236,7 +205,7 @@ def range_of(sweep: Sweep, key: Key, given: Mapping[str, np.ndarray], between: E
         The range is empty, or the distribution of the input cannot take the means of the range.
     """
     low, high = _whole_range(sweep, key, given, between)
-    return narrowed(sweep, key.name, low, high, least=key.tolerance, given=between is not None)
+    return narrowed(sweep, key.name, low, high, least=key.step, given=between is not None)
 
 
 def _whole_range(
@@ -245,7 +214,10 @@ def _whole_range(
     """Return the search range, whatever the distribution of the input; arguments: see `range_of`."""
     one = np.ones(len(next(iter(given.values()))))
     if between is not None:
-        _refuse_bare("--between", between, key.field.unit)
+        try:
+            refuse_bare("--between", [end for end in between if isinstance(end, str)], key.field.unit)
+        except NumberError as problem:
+            raise QuestionError(str(problem)) from None
         low, high = (bound(end, key.field) for end in between)
         if not low < high:
             raise QuestionError(f"--between {between[0]} {between[1]}: the first must be less than the second")
@@ -288,12 +260,12 @@ def _mildest(key: Key, low: float) -> float:
     return min(low, MILDEST[key.name]) if key.most and key.name in MILDEST else low
 
 
-def refuse_coarse(sweep: Sweep, key: Key, pieces: Iterable[Mapping[str, np.ndarray]], between: Ends) -> None:
-    """Refuse a tolerance that leaves nothing to search in the ranges of `range_of`, or too many values to count.
+def refuse_narrow(sweep: Sweep, key: Key, pieces: Iterable[Mapping[str, np.ndarray]], between: Ends) -> None:
+    """Refuse ranges of `range_of` in which there is nothing to search.
 
     A range may be as narrow as it likes where it ends because the truck goes over the boulder beyond. Otherwise a
-    multiple of the tolerance must lie within it. Where the user chose the range or a larger tolerance than the usual
-    one, at least one range must hold two, a value that passes and the next.
+    multiple of the step must lie within it. Where the user chose the range, at least one must hold two, a value that
+    passes and the next.
 
     Parameters
     ----------
@@ -305,26 +277,22 @@ def refuse_coarse(sweep: Sweep, key: Key, pieces: Iterable[Mapping[str, np.ndarr
     Raises
     ------
     QuestionError
-        The tolerance is too coarse or too fine for a range.
+        A range is too narrow.
     """
-    chosen = between is not None or key.is_coarse
     most, widest = 0, (0.0, 0.0)
     for given in pieces:
         low, high = range_of(sweep, key, given, between)
-        far = np.flatnonzero(np.maximum(low, high) > MOST_PLACES * key.tolerance)
-        if len(far):
-            raise _unsearchable(key, low[far[0]], high[far[0]], "too many multiples", "give a larger --tolerance")
         first, last = key.within(low, high)
         reach = math.inf if between is not None else reach_of(key, given)
-        by_nature = (key.values(first) > reach) & (high - low < TOLERANCES[key.field.unit])
-        none = np.flatnonzero((first > last) & ~by_nature & ((low < high) | ((low == high) & chosen)))
+        by_nature = (key.values(first) > reach) & (high - low < key.step)
+        none = np.flatnonzero((first > last) & ~by_nature & (low < high))
         if len(none):
             raise _unsearchable(key, low[none[0]], high[none[0]], "no multiple")
         held = np.where(low < high, last - first + 1, 0)
         if held.max(initial=0) > most:
             row = held.argmax()
             most, widest = held[row], (low[row], high[row])
-    if chosen and most == 1:
+    if between is not None and most == 1:
         raise _unsearchable(key, *widest, "only one multiple")
 
 
@@ -364,16 +332,10 @@ def reach_of(key: Key, given: Mapping[str, np.ndarray]) -> np.ndarray | float:
     return 1.0 - given["bumper_height_m"] / given["boulder_height_m"] if key.name == "embedment_ratio" else math.inf
 
 
-def _unsearchable(
-    key: Key,
-    low: float,
-    high: float,
-    held: str,
-    remedy: str = "give a smaller --tolerance or a wider range (--between)",
-) -> QuestionError:
-    """Return the error for a range that cannot be searched in steps of the tolerance."""
+def _unsearchable(key: Key, low: float, high: float, held: str) -> QuestionError:
+    """Return the error for a range that is too narrow."""
     unit = "" if key.field.unit == "1" else f" {key.field.unit}"
     return QuestionError(
-        f"the range to search, {low:.10g} to {high:.10g}{unit}, holds {held} of the tolerance, "
-        f"{key.tolerance:.10g}{unit}; {remedy}"
+        f"the range to search, {low:.10g} to {high:.10g}{unit}, holds {held} of its step, {key.step:.10g}{unit}; "
+        "give a wider range (--between)"
     )

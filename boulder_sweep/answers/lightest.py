@@ -29,6 +29,7 @@ from boulder_sweep.answers.search import (
     searched_again,
 )
 from boulder_sweep.answers.trials import InputRows, Judges, Open, Remembered, beyond_reach, block_at, rows_at
+from boulder_sweep.designs import SIDES
 from boulder_sweep.errors import QuestionError
 
 if TYPE_CHECKING:
@@ -41,7 +42,6 @@ SHARE = "share"
 """Depth between the shallowest (0) and the deepest (1) that a boulder may have, searched like a side."""
 SCALE = "scale"
 """Scale of all sides together, searched where the file gives a single boulder."""
-SIDES = ("boulder_length_m", "boulder_width_m", "boulder_height_m")
 HEIGHT, DEPTH, RATIO = "boulder_height_m", "embedment_depth_m", "embedment_ratio"
 MILLIMETRES = 1000
 """Sides and depths are whole millimetres."""

@@ -8,14 +8,13 @@ run`` would judge them. If that disagrees, the row is searched again with the ac
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.answers.keys import BOULDER_MASS, Ends, Key, key_of, margin_asked, share
-from boulder_sweep.answers.lightest import SIDES, LightestQuestion
+from boulder_sweep.answers.lightest import LightestQuestion
 from boulder_sweep.answers.questions import Question
 from boulder_sweep.answers.result import (
     Result,
@@ -27,8 +26,9 @@ from boulder_sweep.answers.result import (
     write_parquet,
 )
 from boulder_sweep.answers.search import BLOCKED, WORDS
-from boulder_sweep.answers.trials import NO_FACE, Judges, every_reading, judges_of, other_readings, ranges
+from boulder_sweep.answers.trials import NO_FACE, Judges, judges_of, ranges
 from boulder_sweep.columns import INPUTS, SECOND_SPRING_COLUMNS
+from boulder_sweep.designs import SIDES
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.quantiles import at_values
@@ -68,12 +68,6 @@ class Need(Result):
     probability: float | None = None
 
     @property
-    def others(self) -> list[str]:
-        """Names of the other readings for which the question was answered as well."""
-        before = f"{self.key.answer}_"
-        return [name.removeprefix(before) for name in self.arrow.column_names if name.startswith(before)]
-
-    @property
     def derived(self) -> tuple[str, ...]:
         """Input columns that follow from others or from the answer."""
         given = self.sweep.plan.given
@@ -100,7 +94,6 @@ class Need(Result):
             "name": self.sweep.name,
             "asked": self.key.answer,
             "unit": self.key.field.unit,
-            "tolerance": self.key.tolerance,
             "margin": self.least_margin,
             "simulated": self.simulated,
             "found": self.counts(),
@@ -136,11 +129,8 @@ def need(
     margin: str | float = 0.0,
     probability: str | float | None = None,
     seed: int = 0,
-    open_readings: bool = False,
     between: Ends = None,
-    tolerance: str | float | None = None,
     robust: bool = False,
-    both_readings: bool = False,
     jobs: int | None = None,
     backend: str = THREADING,
     scheduler: str | None = None,
@@ -161,18 +151,11 @@ def need(
         Required probability of passing, ``0.95`` or ``"95 %"``, if inputs have distributions.
     seed
         Seed of the samples for it.
-    open_readings
-        Whether every sampled design uses one of the 32 combinations of readings, all equally likely, instead of the
-        readings of the sweep.
     between
         Search range, instead of the axis or the usual range.
-    tolerance
-        Spacing of the values tried; 1 mm for lengths.
     robust
         Whether only a pass counts that is robust, see `boulder_sweep.judge.robustness`. The readings as printed have
         none.
-    both_readings
-        Whether to answer for the other preset of readings as well.
     jobs
         Threads; all cores by default. The answers do not depend on it.
     backend, scheduler
@@ -200,12 +183,12 @@ def need(
     if least and most:
         raise QuestionError("use either --least or --most, not both")
     word = most or least or "embedment_depth"
-    if (between is not None or tolerance is not None) and key_of(word).name == BOULDER_MASS.name:
+    key = key_of(word, most=bool(most))
+    if between is not None and key.name == BOULDER_MASS.name:
         raise QuestionError(
-            "--least mass takes neither --between nor --tolerance; the sides and the embedment in the file are its "
-            "bounds, in whole millimetres"
+            "--least mass takes no --between; the sides and the embedment in the file are its bounds, in whole "
+            "millimetres"
         )
-    key = key_of(word, most=bool(most), tolerance=tolerance)
     if key.name == "friction_angle_deg" and sweep.partial_factor != 1.0:
         raise QuestionError(
             "the friction angle is asked for, and partial_factor would not be applied to the answer; remove it from "
@@ -221,39 +204,33 @@ def need(
             f"the vehicle of {sweep.name} has no second spring; give it both vehicle.second_spring and "
             f"vehicle.second_spring_from, of which {key.field.path} is then searched"
         )
-    least_margin, drawn = margin_asked(margin), probability is not None
-    if open_readings and probability is None:
-        raise QuestionError("--open-readings needs --probability")
-    variants: tuple[Judges, ...] = ()
-    if open_readings:
-        variants = tuple(judges_of(one, least_margin) for one in every_reading(sweep))
+    least_margin = margin_asked(margin)
+    chance = None if probability is None else share(probability, "--probability")
+    if chance is not None and not 0.0 < chance < 1.0:
+        raise QuestionError(f"--probability {probability}: must be more than 0 and less than 100 %")
     if robust and not can_be_asked(sweep):
         raise QuestionError(
             "--robust: second opinions know boxes of rock of given density, elastic, dry, level, uniform soil without "
             "cohesion, one spring of the vehicle and corrected readings only"
         )
-    if robust and drawn:
+    if robust and chance is not None:
         raise QuestionError(
             "--robust and --probability cannot be used together: second opinions are not asked of the designs drawn"
         )
-    sweeps = [sweep, other_readings(sweep)] if both_readings and not open_readings and not robust else [sweep]
-    judges = [judges_of(one, least_margin, robust=robust) for one in sweeps]
-    pairs = zip(sweeps, judges, strict=True)
-    asked = [_question(one, key, between, judge, probability, seed, variants) for one, judge in pairs]
-    asked[0].judges.final.warm_up()
+    asked = _question(sweep, key, between, judges_of(sweep, least_margin, robust=robust), chance, seed)
+    asked.judges.final.warm_up()
     done = _Progress(progress, asked, local=backend == THREADING)
-    pieces = list(ranges(asked[0].count, asked[0].rows_at_once))
+    pieces = list(ranges(asked.count, asked.rows_at_once))
     tables, simulated = [], 0
     with pool(jobs, backend, scheduler) as workers:
         for table, count in workers(call(_table_of, asked, start, stop) for start, stop in pieces):
             tables.append(table)
             simulated += count
             done.answered(len(table))
-    chance = None if probability is None else share(probability, "--probability")
-    question = {"asked": key.answer, "tolerance": key.tolerance, "margin": least_margin}
+    question = {"asked": key.answer, "margin": least_margin}
     question |= {} if chance is None else {"probability": chance}
     question |= {"robust": True} if robust else {}
-    table = joined_tables(tables, sweep, judges[0], "boulder_sweep.need", question)
+    table = joined_tables(tables, sweep, asked.judges, "boulder_sweep.need", question)
     return Need(sweep, table, key, least_margin, simulated, chance)
 
 
@@ -265,22 +242,20 @@ class _Progress:
     report
         Called with how many of how many are done, first with none; None for no reports.
     asked
-        The questions.
+        The question.
     local
-        Whether they are answered in this process.
+        Whether it is answered in this process.
     """
 
-    def __init__(self, report: ProgressCallback | None, asked: Sequence[Question | LightestQuestion], *, local: bool):
-        self._report, self._rows = report, asked[0].count
+    def __init__(self, report: ProgressCallback | None, asked: Question | LightestQuestion, *, local: bool):
+        self._report, self._rows = report, asked.count
         self._done, self._rows_done, self._total = 0, 0, self._rows
         self._lock = Lock()  # values are tried by several threads
         if report is None:
             return
-        slow = [question for question in asked if isinstance(question, Question) and question.values_to_try()]
-        if local and slow:
-            self._total = sum(question.values_to_try() for question in slow)
-            for question in slow:
-                question.tried = self._tried
+        if local and isinstance(asked, Question) and (values := asked.values_to_try()):
+            self._total = values
+            asked.tried = self._tried
         report(0, self._total)
 
     def answered(self, count: int) -> None:
@@ -300,56 +275,39 @@ class _Progress:
 
 
 def _question(
-    sweep: Sweep,
-    key: Key,
-    between: Ends,
-    judges: Judges,
-    probability: str | float | None,
-    seed: int,
-    variants: tuple[Judges, ...],
+    sweep: Sweep, key: Key, between: Ends, judges: Judges, probability: float | None, seed: int
 ) -> Question | LightestQuestion:
     """Return the question of the kind that is asked."""
     if probability is None:
         if key.name == BOULDER_MASS.name:
             return LightestQuestion(sweep, key, judges)
         return Question(sweep, key, between, judges)
-    chance = share(probability, "--probability")
-    if not 0.0 < chance < 1.0:
-        raise QuestionError(f"--probability {probability}: must be more than 0 and less than 100 %")
     from boulder_sweep.answers.probability import LikelyLightestQuestion, ProbabilityQuestion  # imports scipy.stats
 
     if key.name == BOULDER_MASS.name:
-        return LikelyLightestQuestion(sweep, key, judges, chance, seed, variants)
-    return ProbabilityQuestion(sweep, key, between, judges, chance, seed, variants)
+        return LikelyLightestQuestion(sweep, key, judges, probability, seed)
+    return ProbabilityQuestion(sweep, key, between, judges, probability, seed)
 
 
-def _table_of(asked: Sequence[Question | LightestQuestion], start: int, stop: int) -> tuple[pa.Table, int]:
-    """Answer some rows for all readings asked about; the table and the designs simulated.
+def _table_of(asked: Question | LightestQuestion, start: int, stop: int) -> tuple[pa.Table, int]:
+    """Answer some rows; the table and the designs simulated.
 
     The table has the inputs, the answer and its bracket, and the outcome at the answer.
     """
     from boulder_sweep.store.schema import word_array
 
-    answers = [question.answered(start, stop) for question in asked]
-    first, key, sweep = answers[0], asked[0].key, asked[0].sweep
+    answers, key = asked.answered(start, stop), asked.key
     unit = key.field.unit
     what = f"{'largest' if key.most else 'smallest'} value of {key.field.path} that passes"
     next_to_it = f"value next to it of {key.field.path} that does not pass; where none passes, the last one tried"
     columns: list[TableColumn] = [
-        (key.answer, unit, f"{what}; null where none does", first.passes),
-        ("fails_at", unit, next_to_it, first.fails),
-        ("passes_at", unit, "the same as the answer: judged as a run judges it", first.passes),
-        ("found", "", ", ".join(WORDS), word_array(first.kind, WORDS)),
-        ("passes_within", unit, "where it is not monotone: all stretches that pass", first.stretches),
-        *to_build(first.block, sweep),
+        (key.answer, unit, f"{what}; null where none does", answers.passes),
+        ("fails_at", unit, next_to_it, answers.fails),
+        ("passes_at", unit, "the same as the answer: judged as a run judges it", answers.passes),
+        ("found", "", ", ".join(WORDS), word_array(answers.kind, WORDS)),
+        ("passes_within", unit, "where it is not monotone: all stretches that pass", answers.stretches),
+        *to_build(answers.block, asked.sweep),
     ]
-    for question, other in zip(asked[1:], answers[1:], strict=True):
-        name = question.sweep.model.preset
-        columns += [
-            (f"{key.answer}_{name}", unit, f"{what} by the readings {name}", other.passes),
-            (f"found_{name}", "", f"as found, by the readings {name}", word_array(other.kind, WORDS)),
-        ]
-    if first.chances is not None:
-        columns += chance_columns(first.chances, "chance of passing at the answer, or at the value tried last")
-    table = rows_table(start, first.block, first.judged, columns, at=1 + len(INPUTS))
-    return table, sum(answer.simulated for answer in answers)
+    if answers.chances is not None:
+        columns += chance_columns(answers.chances, "chance of passing at the answer, or at the value tried last")
+    return rows_table(start, answers.block, answers.judged, columns, at=1 + len(INPUTS)), answers.simulated

@@ -13,12 +13,12 @@ import numpy as np
 import pyarrow as pa
 
 from boulder_sweep.answers.keys import key_of
-from boulder_sweep.answers.lightest import DEPTH, SIDES
+from boulder_sweep.answers.lightest import DEPTH
 from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.trials import Open
 from boulder_sweep.columns import BOULDER_MASS, COLUMNS, DESIGN_ID, GRADES, RATINGS, VERDICTS
 from boulder_sweep.columns import BY_NAME as COLUMN_OF
-from boulder_sweep.designs import Label
+from boulder_sweep.designs import SIDES, Label
 from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning
 from boulder_sweep.impact.explanation import model_of
 from boulder_sweep.judge.accuracy import known_control
@@ -62,7 +62,6 @@ class _Need:
     """What `sweep need` is asked."""
 
     asked: str
-    tolerance: float
     margin: float
     probability: float | None = None
     robust: bool = False
@@ -147,7 +146,7 @@ class AnswerFile:
         try:
             if self.kind in _QUESTIONS:
                 check_entries(self.question, _QUESTIONS[self.kind], "question")
-            if self.kind == NEED and not (self.question["asked"] in names and self.question["tolerance"] > 0.0):
+            if self.kind == NEED and self.question["asked"] not in names:
                 raise ValueError("question.asked is no answer of the file")
         except ValueError as problem:
             raise self._refusal(f"{self.path} is damaged ({problem}); write it again") from None
@@ -197,7 +196,7 @@ class AnswerFile:
         Raises
         ------
         BoulderSweepError
-            The files beside them are those of other answers.
+            The samples beside them are those of other answers.
         """
         sweep = asked_sweep(self.identity, self.table)
         if self.kind == CAPACITY:
@@ -209,22 +208,20 @@ class AnswerFile:
         asked = self.question
         sense, _, name = asked["asked"].partition("_")
         word = BY_NAME[name].key if name == BOULDER_MASS else name
-        key = key_of(word, most=sense == "most", tolerance=asked["tolerance"])
+        key = key_of(word, most=sense == "most")
         return Need(sweep, self.table, key, asked["margin"], 0, asked.get("probability"))
 
     def _chances(self, sweep: Sweep) -> Uncertainty:
-        """Return probabilities with the indices and samples that lie beside them."""
+        """Return probabilities with the samples that lie beside them."""
         from boulder_sweep.answers.uncertainty import Uncertainty
 
-        tables = {}
-        for name in ("indices", "samples"):
-            file = self.path.with_suffix(f".{name}.parquet")
-            tables[name] = pa.table({"design_id": pa.array([], pa.int64())})
-            if file.exists():
-                tables[name] = _rows(file, self._refusal)
-                if identity_in(tables[name].schema.metadata) != identity_in(self.table.schema.metadata):
-                    raise self._refusal(f"{file} belongs to other answers than {self.path}; write both again")
-        return Uncertainty(sweep, self.table, tables["indices"], tables["samples"], self.question["seed"])
+        file = self.path.with_suffix(".samples.parquet")
+        samples = pa.table({"design_id": pa.array([], pa.int64())})
+        if file.exists():
+            samples = _rows(file, self._refusal)
+            if identity_in(samples.schema.metadata) != identity_in(self.table.schema.metadata):
+                raise self._refusal(f"{file} belongs to other answers than {self.path}; write both again")
+        return Uncertainty(sweep, self.table, samples, self.question["seed"])
 
 
 def _identified(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[pa.Table, dict[str, Any], str]:

@@ -15,7 +15,7 @@ import numpy as np
 from boulder_sweep.answers.chance import SCRAMBLINGS, Points, Sampled, chance
 from boulder_sweep.answers.draws import WORST, Draws
 from boulder_sweep.answers.keys import Ends, Key, range_of
-from boulder_sweep.answers.lightest import DEPTH, RATIO, SIDES, Boulders, LightestQuestion, Sides
+from boulder_sweep.answers.lightest import DEPTH, RATIO, Boulders, LightestQuestion, Sides
 from boulder_sweep.answers.questions import CHECKED_AT_ONCE, Answers, Question, Trial
 from boulder_sweep.answers.search import BEYOND, FAILS, HOLDS, Search
 from boulder_sweep.answers.spread import Spread
@@ -29,6 +29,7 @@ from boulder_sweep.answers.trials import (
     uncertain_rows,
     ungraded,
 )
+from boulder_sweep.designs import SIDES
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.judged import OVERRIDE
 from boulder_sweep.runner.pool import Pool
@@ -64,22 +65,18 @@ class Sampling:
         The required probability of passing.
     seed
         Seed of the points.
-    variants
-        Readings of which every sampled design uses one.
     """
 
-    def __init__(
-        self, spread: Spread, judges: Judges, probability: float, seed: int, variants: tuple[Judges, ...]
-    ) -> None:
-        self.spread, self.judges, self.variants = spread, judges, variants
+    def __init__(self, spread: Spread, judges: Judges, probability: float, seed: int) -> None:
+        self.spread, self.judges = spread, judges
         self.probability, self.seed = probability, seed
-        points = Points(len(spread.names) + bool(variants), seed).upto(DRAWN // SCRAMBLINGS)
+        points = Points(len(spread.names), seed).upto(DRAWN // SCRAMBLINGS)
         self.points = points.reshape(DRAWN, -1)
         self.few = points[:, : FEW // SCRAMBLINGS].reshape(FEW, -1)
 
     def draws(self, rows: InputRows) -> Draws:
         """Return what draws the designs of some rows."""
-        return Draws(rows, self.spread, self.judges, Pool(1), self.variants)
+        return Draws(rows, self.spread, self.judges, Pool(1))
 
     def codes(self, draws: Draws, index: np.ndarray, inputs: InputRows, points: np.ndarray) -> np.ndarray:
         """Return the predicate of `search` for designs, by some of the points, shape (m,).
@@ -113,7 +110,7 @@ class Sampling:
         def event(index: np.ndarray, z: np.ndarray) -> np.ndarray:
             return draws.drawn(index, z, **rows_at(inputs, index))[1]
 
-        count, points = len(next(iter(inputs.values()))), Points(draws.dimensions, self.seed)
+        count, points = len(next(iter(inputs.values()))), Points(len(self.spread.names), self.seed)
         return chance(event, count, points, half_width=HALF_WIDTH, first=DRAWN // SCRAMBLINGS)
 
 
@@ -124,7 +121,7 @@ class ProbabilityQuestion(Question):
     ----------
     sweep, key, between, judges
         As of `Question`.
-    probability, seed, variants
+    probability, seed
         As of `Sampling`.
 
     Raises
@@ -136,18 +133,9 @@ class ProbabilityQuestion(Question):
     rows_at_once = 4
     cells = 6
 
-    def __init__(
-        self,
-        sweep: Sweep,
-        key: Key,
-        between: Ends,
-        judges: Judges,
-        probability: float,
-        seed: int,
-        variants: tuple[Judges, ...] = (),
-    ) -> None:
+    def __init__(self, sweep: Sweep, key: Key, between: Ends, judges: Judges, probability: float, seed: int) -> None:
         super().__init__(sweep, key, between, judges)
-        self.sampling = Sampling(Spread(sweep, key.name), judges, probability, seed, variants)
+        self.sampling = Sampling(Spread(sweep, key.name), judges, probability, seed)
 
     def trial(self, rows: InputRows) -> Trial:
         """Return the object that tries values in some rows."""
@@ -204,7 +192,7 @@ class LikelyLightestQuestion(LightestQuestion):
     ----------
     sweep, key, judges
         As of `LightestQuestion`.
-    probability, seed, variants
+    probability, seed
         As of `Sampling`.
 
     Raises
@@ -216,16 +204,14 @@ class LikelyLightestQuestion(LightestQuestion):
     rows_at_once = 1
     neighbours = 256
 
-    def __init__(
-        self, sweep: Sweep, key: Key, judges: Judges, probability: float, seed: int, variants: tuple[Judges, ...] = ()
-    ) -> None:
+    def __init__(self, sweep: Sweep, key: Key, judges: Judges, probability: float, seed: int) -> None:
         super().__init__(sweep, key, judges)
         spread = Spread(sweep)
         for name in (*SIDES, DEPTH, RATIO):
             if name in spread.names:
                 path = BY_NAME[name].path
                 raise QuestionError(f"--least mass searches for {path}, which has a distribution; give it values")
-        self.sampling = Sampling(spread, judges, probability, seed, variants)
+        self.sampling = Sampling(spread, judges, probability, seed)
 
     def given(self, start: int, stop: int) -> InputRows:
         """Return the other inputs of some rows, with the indices of named sets that have distributions."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_sweep.answers.keys import Ends, Key, range_of, refuse_coarse, refuse_deep
+from boulder_sweep.answers.keys import Ends, Key, range_of, refuse_deep, refuse_narrow
 from boulder_sweep.answers.search import (
     BEYOND,
     BLOCKED,
@@ -219,8 +219,7 @@ class Question(ValueSearch):
     Raises
     ------
     QuestionError
-        The search range is empty or not admitted, the tolerance does not suit it, or it reaches below the readings of
-        the soil that count.
+        The search range is empty, too narrow or not admitted, or it reaches below the readings of the soil that count.
     """
 
     rows_at_once = 2048
@@ -233,7 +232,7 @@ class Question(ValueSearch):
         self.between = between
         self.open = Open(sweep, (key.name,))
         pieces = (self.open.rows(start, stop) for start, stop in ranges(self.count, CHECKED_AT_ONCE))
-        refuse_coarse(sweep, key, pieces, between)  # also refuses a wrong range, before anything is computed
+        refuse_narrow(sweep, key, pieces, between)  # also refuses a wrong range, before anything is computed
         if covered_depth(sweep.derived) < math.inf:
             self._refuse_deep()
 

@@ -1,4 +1,4 @@
-"""Uncertain inputs: from independent standard normal numbers to values, and what sources publish about their spread.
+"""Uncertain inputs: from independent standard normal numbers to values.
 
 Where the mean of a distribution is searched, its ends move with it. The distribution keeps its shape: where it has a
 coefficient of variation, its ends keep their ratio to the mean, otherwise their distance from it. The ends that a file
@@ -8,11 +8,12 @@ does not name are those of the admitted range, and stay.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from boulder_sweep.errors import QuestionError
+from boulder_sweep.judge.quantiles import values_of
 from boulder_sweep.settings.distributions import Distribution, SetDistributions
 from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT
 
@@ -93,7 +94,6 @@ def _draw_values(
     spread: Distribution | SetDistributions, given: InputRows, mean: np.ndarray, z: np.ndarray, moving: Moving | None
 ) -> np.ndarray:
     """Return the values of an input at standard normal numbers; of named sets each from its own distribution."""
-    from boulder_sweep.judge.quantiles import values_of  # loads the kernels, which a list of spreads need not
 
     def drawn(one: Distribution, mean: np.ndarray, z: np.ndarray) -> np.ndarray:
         return values_of(one, mean, z, None if moving is None else moving.ends(one, mean))
@@ -246,30 +246,3 @@ def _admitted(name: str) -> Bound:
     bound = BY_NAME[name].admitted
     assert bound is not None
     return bound
-
-
-class Published(NamedTuple):
-    """A coefficient of variation as stated by a source."""
-
-    input: str
-    """Key of the input."""
-    cov: str
-    """Coefficient of variation, as stated."""
-    of: str
-    """What it applies to."""
-    source: str
-
-
-JCSS = "JCSS Probabilistic Model Code, part 3.7, indicative standard deviations of soil properties"
-DUNCAN = "Duncan (2000), J. Geotech. Geoenviron. Eng. 126(4), Table 3, as quoted by others"
-PHOON = "Phoon & Kulhawy (1999), Can. Geotech. J. 36, 612-624, Tables 1 and 2, as quoted by others"
-PUBLISHED = (
-    Published("soil.friction_angle", "10 to 20 %", "tan φ′, drained, from point to point", JCSS),
-    Published("soil.friction_angle", "2 to 13 %", "φ′", DUNCAN),
-    Published("soil.friction_angle", "5 to 11 %", "φ′ of sand with a mean of 35 to 41°", PHOON),
-    Published("soil.density", "5 to 10 %", "unit weight, from point to point", JCSS),
-    Published("soil.density", "3 to 7 %", "unit weight", DUNCAN),
-    Published("soil.density", "3 to 20 %", "unit weight of 14 to 20 kN/m³", PHOON),
-    Published("soil.subgrade_reaction", "20 to 100 %", "stiffness, from point to point", JCSS),
-)
-"""Published coefficients of variation of the inputs, with their sources; offered, never assumed."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -17,7 +16,6 @@ from boulder_sweep.judge.judged import PASS, Judged, joined
 from boulder_sweep.judge.robustness import STANDS_UNDER_ALL
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.distributions import SetDistributions
-from boulder_sweep.settings.model import PRINTED, SWITCHES, ReadingChoice
 from boulder_sweep.settings.sweep import DesignList
 
 if TYPE_CHECKING:
@@ -31,7 +29,7 @@ ends below the impact height of the file."""
 ROUNDING_M = 1e-9
 """What sums of heights may be off by [m]."""
 PLACEHOLDER = 0.5
-SEARCHED = ("verdict", "reason", "margin", "time_to_limit_s", "max_displacement_m", "vehicle_crush_m")
+SEARCHED = ("verdict", "reason", "margin", "time_to_limit_s", "max_displacement_m")
 GRADED = ("robustness", "stands_under")
 """Outcomes that searches look at; others are not worked out for the many designs that are only tried."""
 
@@ -180,19 +178,6 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0, *, robust: bool = False) 
     if not accuracy.error_estimate and accuracy.steps.step_s >= coarse.control.h:
         coarse = final
     return Judges(coarse, final, accuracy, least_margin, robust)
-
-
-def every_reading(sweep: Sweep) -> list[Sweep]:
-    """Return a sweep with every combination of the five readings."""
-    choices = itertools.product(*((PRINTED, corrected) for corrected in SWITCHES.values()))
-    readings = (ReadingChoice(**dict(zip(SWITCHES, choice, strict=True))) for choice in choices)
-    return [dataclasses.replace(sweep, model=dataclasses.replace(sweep.model, readings=one)) for one in readings]
-
-
-def other_readings(sweep: Sweep) -> Sweep:
-    """Return the sweep with the other preset of readings: as printed where it is corrected, else corrected."""
-    preset = "as_printed" if sweep.model.preset == "corrected" else "corrected"
-    return dataclasses.replace(sweep, model=dataclasses.replace(sweep.model, readings=ReadingChoice.of_preset(preset)))
 
 
 def uncertain_rows(sweep: Sweep, given: InputRows, start: int, stop: int) -> InputRows:

@@ -2,24 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_sweep.answers.chance import (
-    FEWEST,
-    FIRST,
-    SCRAMBLINGS,
-    Chance,
-    Points,
-    Sampled,
-    chance,
-    subset_simulation,
-)
-from boulder_sweep.answers.doubts import Indices, drivers, indices
+from boulder_sweep.answers.chance import FIRST, SCRAMBLINGS, Points, chance
 from boulder_sweep.answers.draws import Draws
 from boulder_sweep.answers.keys import margin_asked, share
 from boulder_sweep.answers.result import (
@@ -48,17 +37,12 @@ if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
 
 ROWS_AT_ONCE = 256
-MOST_INDEXED = 100
-"""Most rows for which Sobol indices and rare probabilities are computed."""
+STRATA = 8
+"""Strata of each input whose means are compared by `drivers`."""
+MOST_SAMPLED = 100
+"""Most rows of which samples are kept."""
 SAMPLES = 4096
 """Samples kept of each row for plots and inspection."""
-OUTPUTS = ("passes", "margin")
-"""Outputs of the indices: whether a design passes, and its distance from failing."""
-FAILING = ("drawn", "subset", "no_progress", "contradicts")
-"""How a probability of failing was found, or, the last two, why there is none."""
-
-Samples = tuple[Mapping[str, np.ndarray], np.ndarray]
-"""Uncertain inputs of sampled designs, and their distances from failing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,29 +54,22 @@ class Uncertainty(Result):
     sweep, arrow
         As of `Result`: inputs with the means of the uncertain ones, the outcome at these means, the chance of passing
         with its interval, and the most influential input.
-    indices : pyarrow.Table
-        Sobol indices, one row for each design, output and input; none where there are more than `MOST_INDEXED` designs.
     samples : pyarrow.Table
-        Designs drawn: number of the design, uncertain inputs, distance to failing; empty likewise.
+        Designs drawn: number of the design, uncertain inputs, distance to failing; none where there are more than
+        `MOST_SAMPLED` designs.
     seed : int
         Seed of all random numbers.
     """
 
-    indices: pa.Table
     samples: pa.Table
     seed: int
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything except the samples as plain data."""
-        return {
-            "name": self.sweep.name,
-            "seed": self.seed,
-            "rows": self.arrow.to_pylist(),
-            "indices": self.indices.to_pylist(),
-        }
+        return {"name": self.sweep.name, "seed": self.seed, "rows": self.arrow.to_pylist()}
 
     def write(self, path: str | Location) -> list[Location]:
-        """Write the table to a Parquet file, with indices and samples next to it; return the paths.
+        """Write the table to a Parquet file, with the samples next to it; return the paths.
 
         Raises
         ------
@@ -101,11 +78,11 @@ class Uncertainty(Result):
         """
         target = checked_parquet(path)
         files = [write_parquet(self.arrow, target)]
-        identity = {key: value for key, value in self.arrow.schema.metadata.items() if key.startswith(PREFIX.encode())}
-        for name, table in (("indices", self.indices), ("samples", self.samples)):
-            if len(table):
-                table = table.replace_schema_metadata(identity)
-                files.append(write_parquet(table, target.with_suffix(f".{name}.parquet")))
+        if len(self.samples):
+            metadata = self.arrow.schema.metadata.items()
+            identity = {key: value for key, value in metadata if key.startswith(PREFIX.encode())}
+            samples = self.samples.replace_schema_metadata(identity)
+            files.append(write_parquet(samples, target.with_suffix(".samples.parquet")))
         return files
 
     def plot(self, path: str | Path, design_id: int = 0, *, units: str = "si") -> None:
@@ -127,7 +104,6 @@ def uncertainty(
     margin: str | float = 0.0,
     seed: int = 0,
     most: int = 1 << 16,
-    rare: bool = False,
     jobs: int | None = None,
     backend: str = THREADING,
     scheduler: str | None = None,
@@ -149,9 +125,6 @@ def uncertainty(
         Seed of all random numbers; the same seed gives the same result, whatever the number of threads.
     most
         Most samples of a row; fewer than 512 are not drawn.
-    rare
-        Whether to compute the smaller of the probabilities of failing and passing by subset simulation as well, which
-        reaches 1e-6 and below. Null, with the reason in ``p_fail_by``, where that does not work.
     jobs
         Threads; all cores by default.
     backend, scheduler
@@ -174,17 +147,14 @@ def uncertainty(
         raise QuestionError(f"--confidence {confidence}: must be at least 50 % and less than 100 %")
     if seed < 0:
         raise QuestionError(f"--seed {seed}: must not be negative")
-    if rare and sweep.n_designs > MOST_INDEXED:
-        raise QuestionError(f"--rare takes up to {MOST_INDEXED} designs; this file has {sweep.n_designs:,}")
-    asked = _Asked(sweep, Spread(sweep), judges_of(sweep, least_margin), width, sure, seed, most, rare)
+    asked = _Asked(sweep, Spread(sweep), judges_of(sweep, least_margin), width, sure, most)
     asked.judges.final.warm_up()
-    names, points = asked.spread.names, Points(len(asked.spread.names), seed)
+    points = Points(len(asked.spread.names), seed)
     with pool(jobs, backend, scheduler) as workers:
         pieces = ranges(sweep.n_designs, ROWS_AT_ONCE)
         parts = (_rows(asked, points, workers, start, stop) for start, stop in pieces)
         tables = collected(parts, sweep.n_designs, progress)
-        few = sweep.n_designs if sweep.n_designs <= MOST_INDEXED else 0
-        each = [_sensitivity(asked, points, workers, row) for row in range(few)]
+        samples = _sample_table(asked, points, workers, sweep.n_designs if sweep.n_designs <= MOST_SAMPLED else 0)
     question = {
         "asked": "p_pass",
         "half_width": width,
@@ -193,28 +163,8 @@ def uncertainty(
         "seed": seed,
         "most": most,
     }
-    return Uncertainty(
-        sweep,
-        joined_tables(tables, sweep, asked.judges, "boulder_sweep.uncertainty", question),
-        _index_table(names, [one for one, _ in each]),
-        _sample_table(names, [drawn for _, drawn in each]),
-        seed,
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class Failing(Chance):
-    """Probabilities of failing of n rows.
-
-    Attributes
-    ----------
-    estimate, low, high
-        As of `Chance`.
-    by : ndarray of int32, shape (n,)
-        Index in `FAILING`.
-    """
-
-    by: np.ndarray
+    table = joined_tables(tables, sweep, asked.judges, "boulder_sweep.uncertainty", question)
+    return Uncertainty(sweep, table, samples, seed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,9 +176,7 @@ class _Asked:
     judges: Judges
     half_width: float
     confidence: float
-    seed: int
     most: int
-    rare: bool
 
     def draws(self, start: int, stop: int, parallel: Pool) -> Draws:
         """Return what samples the designs of the rows ``[start, stop)``."""
@@ -253,7 +201,6 @@ def _rows(asked: _Asked, points: Points, parallel: Pool, start: int, stop: int) 
     sampled = chance(event, n, points, half_width=asked.half_width, confidence=asked.confidence, most=asked.most)
     z = points.upto(FIRST).reshape(FIRST * SCRAMBLINGS, -1)
     driver = drivers(z, first[0])
-    failing = rare_failing(asked, draws, sampled) if asked.rare else None
     block = replace(block_of(draws.rows), labels=asked.sweep.block(start, stop).labels)
     judged = ungraded(asked.judges.final(block))
     driver_meaning = "most influential of the uncertain inputs; null where they change nothing"
@@ -262,88 +209,40 @@ def _rows(asked: _Asked, points: Points, parallel: Pool, start: int, stop: int) 
         ("p_pass_driver", "", driver_meaning, word_array(driver, tuple(asked.spread.words))),
         ("p_pass_designs", "1", "designs drawn for p_pass", sampled.points),
     ]
-    if failing is not None:
-        meaning = "chance that the design does not pass; null where p_fail_by says why"
-        by_meaning = (
-            "subset: by subset simulation; drawn: by the designs drawn for p_pass; no_progress: no step of the "
-            "simulation came nearer to the rare designs; contradicts: its interval and that of p_pass "
-            "exclude each other"
-        )
-        columns += [
-            ("p_fail", "1", meaning, failing.estimate),
-            ("p_fail_low", "1", "lower end of the interval of p_fail", failing.low),
-            ("p_fail_high", "1", "upper end of the interval of p_fail", failing.high),
-            ("p_fail_by", "", by_meaning, word_array(failing.by, FAILING)),
-        ]
     return rows_table(start, block, judged, columns)
 
 
-def rare_failing(asked: _Asked, draws: Draws, sampled: Sampled) -> Failing:
-    """Return the probabilities of failing: sampled if enough designs fall on each side, else from subset simulation."""
-    passing = sampled.estimate * sampled.points
-    few = np.flatnonzero(np.minimum(passing, sampled.points - passing) < FEWEST)
-    sign = np.where(sampled.estimate[few] >= 0.5, 1.0, -1.0)
+def drivers(z: np.ndarray, output: np.ndarray) -> np.ndarray:
+    """Return the most influential input of each row, from the means of an output over strata of each input.
 
-    def distance(index: np.ndarray, z: np.ndarray) -> np.ndarray:
-        return sign[index] * draws.reserve(few[index], z)
+    Parameters
+    ----------
+    z
+        Standard normal numbers, shape (m, d), the same for all rows.
+    output
+        An output at these points, shape (n, m).
 
-    small = subset_simulation(distance, len(few), draws.dimensions, seed=asked.seed, confidence=asked.confidence)
-    fails = sign > 0.0
-    estimate, low, high = 1.0 - sampled.estimate, 1.0 - sampled.high, 1.0 - sampled.low
-    estimate[few] = np.where(fails, small.estimate, 1.0 - small.estimate)
-    apart = np.zeros(len(estimate), dtype=bool)
-    from_, to = np.where(fails, small.low, 1.0 - small.high), np.where(fails, small.high, 1.0 - small.low)
-    apart[few] = (from_ > high[few]) | (to < low[few])
-    low[few], high[few] = from_, to
-    by = np.full(len(estimate), FAILING.index("drawn"), dtype=np.int32)
-    by[few] = np.where(np.isnan(small.estimate), FAILING.index("no_progress"), FAILING.index("subset"))
-    by[apart] = FAILING.index("contradicts")
-    known = by < FAILING.index("no_progress")
-    estimate, low, high = (np.where(known, values, np.nan) for values in (estimate, low, high))
-    return Failing(estimate, low, high, by)
+    Returns
+    -------
+    ndarray of int64, shape (n,)
+        Index of the input; -1 where the output does not vary.
+    """
+    shares = np.empty((len(output), z.shape[1]))
+    for k in range(z.shape[1]):
+        order = np.argsort(z[:, k], kind="stable")
+        strata = np.array_split(order, STRATA)
+        means = np.stack([output[:, stratum].mean(axis=1) for stratum in strata], axis=1)
+        shares[:, k] = means.var(axis=1)
+    return np.where(output.var(axis=1) > 0.0, shares.argmax(axis=1), -1)
 
 
-def _sensitivity(asked: _Asked, points: Points, parallel: Pool, row: int) -> tuple[Indices, Samples]:
-    """Return the indices of one design, and samples of it."""
-    draws = asked.draws(row, row + 1, parallel)
+def _sample_table(asked: _Asked, points: Points, parallel: Pool, rows: int) -> pa.Table:
+    """Return samples of the first rows as a table: number of the design, uncertain inputs, distance from failing."""
+    import pyarrow as pa
 
-    def outputs(z: np.ndarray) -> np.ndarray:
-        distance = draws.distance(np.zeros(len(z), dtype=np.int64), z)
-        return np.stack([(distance > 0.0).astype(float), distance])
-
-    decided = indices(outputs, len(asked.spread.names), seed=asked.seed, confidence=asked.confidence)
-    z = points.upto(SAMPLES // SCRAMBLINGS).reshape(SAMPLES, -1)
-    index = np.zeros(SAMPLES, dtype=np.int64)
+    draws = asked.draws(0, rows, parallel)
+    index = np.repeat(np.arange(rows), SAMPLES)
+    z = np.tile(points.upto(SAMPLES // SCRAMBLINGS).reshape(SAMPLES, -1), (rows, 1))
     given = draws.given(index, z, {})
-    return decided, ({name: given[name] for name in asked.spread.names}, draws.distance(index, z))
-
-
-def _index_table(names: Sequence[str], estimates: Sequence[Indices]) -> pa.Table:
-    """Return Sobol indices as a table, one row for each design, output and input."""
-    import pyarrow as pa
-
-    from boulder_sweep.store.schema import number_array
-
-    rows = [(design, output, name) for design in range(len(estimates)) for output in OUTPUTS for name in names]
-    designs, outputs, inputs = (list(column) for column in zip(*rows, strict=True)) if rows else ([], [], [])
-    columns = {
-        "design_id": pa.array(designs, pa.int64()),
-        "output": pa.array(outputs, pa.string()).dictionary_encode(),
-        "input": pa.array(inputs, pa.string()).dictionary_encode(),
-    }
-    for field in fields(Indices):
-        values = np.concatenate([*(getattr(one, field.name).ravel() for one in estimates), np.empty(0)])
-        columns[field.name] = number_array(values, np.isnan(values))
-    return pa.table(columns)
-
-
-def _sample_table(names: Sequence[str], drawn: Sequence[Samples]) -> pa.Table:
-    """Return sampled designs as a table: number of the design, uncertain inputs, distance from failing."""
-    import pyarrow as pa
-
-    counts = [len(distance) for _, distance in drawn]
-    columns = {"design_id": pa.array(np.repeat(np.arange(len(drawn)), counts))}
-    for name in names:
-        columns[name] = pa.array(np.concatenate([*(inputs[name] for inputs, _ in drawn), np.empty(0)]))
-    columns["distance"] = pa.array(np.concatenate([*(distance for _, distance in drawn), np.empty(0)]))
-    return pa.table(columns)
+    inputs = {name: given[name] for name in asked.spread.names}
+    return pa.table({"design_id": index, **inputs, "distance": draws.distance(index, z)})

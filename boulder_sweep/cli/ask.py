@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
 from typing import Any
 
 import click
@@ -48,9 +47,6 @@ Examples:
 @margin_option
 @click.option("--probability", metavar="P", help="Probability of passing, e.g. 0.95, if inputs have distributions.")
 @click.option(
-    "--open-readings", is_flag=True, help="With --probability: treat all readings of the paper as equally likely."
-)
-@click.option(
     "--between",
     nargs=2,
     type=Quantity(),
@@ -58,22 +54,9 @@ Examples:
     help="Range to search, with units, e.g. '5 ft' '9 ft' [default: the axis of the file, or the usual].",
 )
 @click.option(
-    "--tolerance",
-    type=Quantity(),
-    metavar="T",
-    help="Spacing of the values tried, with its unit [1 mm, 0.01 deg, 0.01 m/s, ...].",
-)
-@click.option(
     "--robust",
     is_flag=True,
     help="Count only passes that stand under every second opinion, with --margin.",
-)
-@click.option("--under", type=click.Choice(["all"]), help="Under all laws of the soil's resistance: as --robust.")
-@click.option(
-    "--other-readings",
-    "both_readings",
-    is_flag=True,
-    help="Also answer by the other readings of the paper: takes longer.",
 )
 @jobs_option
 @click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table of all answers.")
@@ -93,7 +76,6 @@ def need(
     quiet: bool,
     overrides: tuple[str, ...],
     as_json: bool,
-    under: str | None,
     **question: Any,
 ) -> int:
     """Find the least KEY that passes, for every combination of the other inputs of GRID.
@@ -106,7 +88,7 @@ def need(
     criterion.min_overlap), `undecided` if the last value tried is, and `never` if neither.
     """
     from boulder_sweep.answers.need import need as find
-    from boulder_sweep.answers.need_printing import need_lines
+    from boulder_sweep.answers.printing import need_lines
 
     refuse_units_of_json(units, as_json)
     sweep = load_sweep(grid, overrides, quiet, units)
@@ -115,7 +97,6 @@ def need(
     elif at is not None:
         raise click.UsageError("--at and --probability cannot be used together")
     refuse_unwritable(out, picture)
-    question["robust"] |= under is not None
     with working(quiet, of="designs" if question["probability"] is None else "values") as progress:
         result = find(sweep, **question, progress=progress)
     if as_json:
@@ -136,43 +117,32 @@ UNCERTAINTY_EXAMPLES = """\b
 Examples:
   sweep uncertainty configs/uncertain_site.yaml
   sweep uncertainty configs/uncertain_site.yaml --plot chances.png
-  sweep uncertainty configs/uncertain_site.yaml --rare -o chances.parquet
-  sweep uncertainty configs/uncertain_site.yaml --doubts
-  sweep uncertainty --published
+  sweep uncertainty configs/uncertain_site.yaml -o chances.parquet
 """
 
 
 @click.command(
     "uncertainty", short_help="The probability of passing with uncertain inputs.", epilog=UNCERTAINTY_EXAMPLES
 )
-@click.argument("grid", type=click.Path(), required=False)
+@grid_argument
 @click.option("--half-width", default="0.01", metavar="P", help="Largest half-width of the interval [0.01].")
 @click.option("--confidence", default="95 %", metavar="SHARE", help="Confidence level of the interval [95 %].")
 @margin_option
-@click.option("--rare", is_flag=True, help="Also small probabilities, by subset simulation.")
-@click.option(
-    "--doubts", is_flag=True, help="Divide a design's uncertainty among inputs, readings and numerical error."
-)
 @click.option("--seed", type=click.IntRange(min=0), default=0, metavar="N", help="Seed of the random numbers [0].")
 @jobs_option
-@click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table; indices and samples next to it.")
+@click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table; samples next to it.")
 @click.option("--plot", "picture", type=OUTPUT, metavar="F.png", help="Picture (.png, .svg or .pdf) of one design.")
-@click.option(
-    "--design", type=click.IntRange(min=0), default=0, metavar="ID", help="The design of --plot and --doubts [0]."
-)
-@click.option("--published", is_flag=True, help="List published spreads with their sources; takes no GRID.")
+@click.option("--design", type=click.IntRange(min=0), default=0, metavar="ID", help="The design of --plot [0].")
 @quiet_option
 @cluster_options
 @units_option
 @set_option
 @json_option
 def uncertainty(
-    grid: str | None,
-    doubts: bool,
+    grid: str,
     out: str | None,
     picture: str | None,
     design: int,
-    published: bool,
     units: str,
     quiet: bool,
     overrides: tuple[str, ...],
@@ -184,11 +154,7 @@ def uncertainty(
     An input takes a distribution instead of a value: {mean: 38 deg, sd: 3 deg}, or with cov: 5 %. Sampling continues
     until the interval is narrow enough.
     """
-    if published:
-        return _show_published(grid, units, as_json)
-    if grid is None:
-        raise click.MissingParameter(param_hint="'GRID'", param_type="argument")
-    from boulder_sweep.answers.printing import doubt_lines, uncertainty_lines
+    from boulder_sweep.answers.printing import uncertainty_lines
     from boulder_sweep.answers.uncertainty import uncertainty as estimate
 
     refuse_units_of_json(units, as_json)
@@ -197,15 +163,7 @@ def uncertainty(
     refuse_unwritable(out, picture)
     with working(quiet) as progress:
         result = estimate(sweep, **question, progress=progress)
-    parts = []
-    if doubts:
-        from boulder_sweep.answers.doubts import doubts as divide
-
-        parts = divide(sweep, design=design, seed=question["seed"], jobs=question["jobs"])
-    if as_json:
-        show(json.dumps(result.to_dict() | ({"doubts": [asdict(part) for part in parts]} if doubts else {})))
-    else:
-        show(*uncertainty_lines(result, units=units), *(["", *doubt_lines(parts)] if doubts else []))
+    show(*([json.dumps(result.to_dict())] if as_json else uncertainty_lines(result, units=units)))
     if not quiet:
         drawn = sum(result.arrow["p_pass_designs"].to_pylist())
         say(f"{counted(len(result), 'row')}; {counted(drawn, 'design')} drawn for the chances; seed {question['seed']}")
@@ -214,21 +172,6 @@ def uncertainty(
             say(f"written  {file}")
     if picture is not None:
         result.plot(picture, design, units=units)
-    return 0
-
-
-def _show_published(grid: str | None, units: str, as_json: bool) -> int:
-    """List published spreads with their sources."""
-    if grid is not None or units != "si":
-        other = "GRID" if grid is not None else f"--units {units}"
-        raise click.UsageError(f"--published lists spreads as their sources state them; leave out {other}")
-    from boulder_sweep.answers.spread import PUBLISHED
-
-    if as_json:
-        show(json.dumps({"published": [spread._asdict() for spread in PUBLISHED]}))
-        return 0
-    for spread in PUBLISHED:
-        show(f"{spread.input:<24}{spread.cov:<14}{spread.of}", f"{'':<38}{spread.source}")
     return 0
 
 

@@ -47,10 +47,8 @@ Examples:
 @grid_argument
 @click.option("-o", "--output", "out", type=OUTPUT, help="Folder for the table [default: NAME.sweep].")
 @click.option("--jobs", type=JOBS, help="Workers [default: all cores].")
-@click.option("--dashboard", metavar="ADDRESS", help="Where Dask's dashboard listens [default: this machine only].")
 @click.option("--resume", is_flag=True, help="Resume an interrupted run.")
 @click.option("--overwrite", is_flag=True, help="Replace the table of an earlier run.")
-@click.option("--force", is_flag=True, help="Run even if disk or memory seem too small.")
 @click.option("--dry-run", is_flag=True, help="Show designs, settings and cost; write nothing.")
 @click.option("--accuracy", type=Quantity("deg"), metavar="NAME", help="fast, balanced, fine, or '0.01 deg'.")
 @second_opinion_option
@@ -77,8 +75,6 @@ def run(
 
     if options["resume"] and options["overwrite"]:
         raise click.UsageError("--resume and --overwrite cannot be used together")
-    if options["dashboard"] and (options["scheduler"] or options["backend"] != "dask"):
-        raise click.UsageError("--dashboard needs --backend dask, without --scheduler, which has its own dashboard")
     chosen = overrides if accuracy is None else (*overrides, f"--accuracy={accuracy}")
     sweep = take_values(load_sweep(grid, chosen, quiet, second_opinion=second_opinion), at, quiet)
     target = location_of(out or f"{sweep.name.replace(' ', '-')}.sweep")

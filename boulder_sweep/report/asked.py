@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from boulder_sweep.answers.lightest import SIDES
 from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.outputs import CAPACITY, NEED, UNCERTAINTY, AnswerFile
 from boulder_sweep.answers.search import BLOCKED, NEVER, NOT_MONOTONE, UNKNOWN, WORDS
 from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS
+from boulder_sweep.designs import SIDES
 from boulder_sweep.report.rows import CONDITIONS, DEPTH, RATIO, ResultRows, condition_of, label_of
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.text import counted

@@ -33,14 +33,9 @@ class Cluster:
         Threads of the worker to start where no scheduler is given.
     scheduler
         Address of a running scheduler; None to start one in this process, reachable from this machine only.
-    dashboard
-        Where the dashboard of a scheduler in this process listens, such as ``0.0.0.0:8787``; a free port of
-        127.0.0.1 by default.
 
     Attributes
     ----------
-    dashboard : str or None
-        Address of the dashboard, if there is one.
     silent : set of str
         Workers that did not answer at the beginning, or were silent when they were last looked at.
 
@@ -50,22 +45,19 @@ class Cluster:
         Dask is not installed, the scheduler does not answer, it has no worker, or a worker has other versions.
     """
 
-    def __init__(self, jobs: int, scheduler: str | None, dashboard: str | None = None):
+    def __init__(self, jobs: int, scheduler: str | None):
         self.address = scheduler
         self._levels: dict[str, int] = {}
         self._local: Any = None
         self.client: Any = None
         self.silent: set[str] = set()
         try:
-            self.client = self._connected(jobs, scheduler, dashboard or _LOOPBACK)
-            port = self.client.scheduler_info()["services"].get("dashboard")
-            link = f"http://127.0.0.1:{port}/status" if scheduler is None and dashboard is None else None
-            self.dashboard: str | None = (link or self.client.dashboard_link) if port else None
+            self.client = self._connected(jobs, scheduler)
         except BaseException:
             self.close()
             raise
 
-    def _connected(self, jobs: int, scheduler: str | None, dashboard: str) -> Any:
+    def _connected(self, jobs: int, scheduler: str | None) -> Any:
         """Connect, or start a scheduler and a worker of threads in this process."""
         try:
             distributed = import_module("distributed")  # an extra: most users have no cluster
@@ -79,7 +71,7 @@ class Cluster:
                     processes=False,
                     n_workers=1,
                     threads_per_worker=jobs,
-                    dashboard_address=dashboard,
+                    dashboard_address=_LOOPBACK,
                     worker_dashboard_address=_LOOPBACK,
                 )
                 return distributed.Client(self._local, set_as_default=False)

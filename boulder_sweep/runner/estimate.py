@@ -63,6 +63,7 @@ class RowCost(NamedTuple):
 
 _GUESS = RowCost(seconds_per_row=1e-5, bytes_per_row=50.0, bytes_per_part=30_000.0)
 """For a sweep none of whose sampled rows can be computed."""
+_ROOM = "Free some space, or choose another folder (-o)"
 
 
 @dataclass(frozen=True)
@@ -107,12 +108,12 @@ class Estimate:
         if self.disk_free_bytes is not None and self.disk_bytes > self.disk_free_bytes:
             objections.append(
                 f"the table of {self.rows:,} rows needs about {size_text(self.disk_bytes)} of disk, "
-                f"and {size_text(self.disk_free_bytes)} are free"
+                f"and {size_text(self.disk_free_bytes)} are free. {_ROOM}"
             )
         if self.memory_free_bytes is not None and self.memory_bytes > self.memory_free_bytes:
             objections.append(
                 f"{self.jobs} workers need about {size_text(self.memory_bytes)} of memory, "
-                f"and {size_text(self.memory_free_bytes)} are available"
+                f"and {size_text(self.memory_free_bytes)} are available. Free some memory, or use fewer --jobs"
             )
         return objections
 
@@ -265,7 +266,7 @@ def refuse_hopeless(sweep: Sweep, rows_to_compute: int, out: Location) -> None:
     if least > free:
         raise DoesNotFitError(
             f"the table of {rows:,} rows needs at least {size_text(least)} of disk, and {size_text(free)} are free. "
-            f"Use --force to run anyway"
+            f"{_ROOM}"
         )
 
 

@@ -197,14 +197,14 @@ class Run:
         """What is recorded of the folder."""
         return self._folder.manifest
 
-    def prepare(self, backend: str, jobs: int, scheduler: str | None, dashboard: str | None, force: bool) -> None:
+    def prepare(self, backend: str, jobs: int, scheduler: str | None) -> None:
         """Connect to workers, warm up the kernels, and check that the result will fit."""
         self.jobs = jobs
         try:
             if backend == DASK:
                 from boulder_sweep.runner.cluster import Cluster
 
-                self._cluster = self._signals.call(lambda: Cluster(jobs, scheduler, dashboard), Cluster.close)
+                self._cluster = self._signals.call(lambda: Cluster(jobs, scheduler), Cluster.close)
                 self.jobs = max(sum(self._signals.call(self._cluster.threads).values()), 1)
                 self.manifest.sessions[-1].jobs = self.jobs
             self.firmness = self._signals.call(lambda: firmness_of(self._sweep).to_dict())
@@ -212,9 +212,8 @@ class Run:
             self._metadata = file_metadata(identity, command, self.firmness)
             if self._rows_before < self._sweep.n_designs:
                 self._estimate = self._signals.call(self._estimated)
-                objections = self._estimate.objections
-                if objections and not force:
-                    raise DoesNotFitError("; ".join(objections) + ". Use --force to run anyway")
+                if self._estimate.objections:
+                    raise DoesNotFitError("; ".join(self._estimate.objections))
         except BaseException:
             self._discard()
             raise
@@ -224,8 +223,6 @@ class Run:
         evaluation = self._evaluation
         computation = Computation(evaluation, self._sweep.block, self._metadata, evaluation.warm_up, evaluation.columns)
         workers = self._workers(computation, commit_every_s)
-        if progress is not None and self._cluster is not None and self._cluster.dashboard:
-            self.notes.append(f"dashboard of the cluster: {self._cluster.dashboard}")
         committer = Committer(self._folder, computation, workers)
         try:
             with telling_start_failure(self.jobs):

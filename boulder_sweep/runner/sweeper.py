@@ -44,10 +44,8 @@ def run(
     jobs: int | None = None,
     backend: str = "threading",
     scheduler: str | None = None,
-    dashboard: str | None = None,
     resume: bool = False,
     overwrite: bool = False,
-    force: bool = False,
     progress: Report | None = None,
     command: str | None = None,
     resume_command: str | None = None,
@@ -69,16 +67,11 @@ def run(
         ``threading`` or ``dask``.
     scheduler
         Address of a Dask scheduler; with ``dask`` only.
-    dashboard
-        Where the dashboard of a cluster that the run starts itself listens, such as ``0.0.0.0:8787``; by default on a
-        free port of this machine only. Its address is a note of `progress`.
     resume
         Continue what `out` holds, if it is the same sweep; damaged parts are computed again. Starts from the
         beginning if `out` does not exist.
     overwrite
         Replace what a sweep wrote into `out` before.
-    force
-        Run even if the result is not expected to fit on the disk or in memory.
     progress
         Called up to ten times a second, from the calling thread.
     command
@@ -138,8 +131,7 @@ def run(
 
         try:
             with telling_start_failure(jobs):
-                if not force:
-                    refuse_hopeless(sweep, sweep.n_designs - claimed.rows_done, out)
+                refuse_hopeless(sweep, sweep.n_designs - claimed.rows_done, out)
                 accuracy = signals.call(lambda: accuracy_of(sweep))
                 evaluation = evaluation_of(sweep, accuracy, simulate)
                 manifest = Manifest(
@@ -152,7 +144,7 @@ def run(
                 begin = partial(claimed.open, manifest, session)
                 folder = signals.call(begin, lambda late: late.close("interrupted")) if remote else begin()
                 whole = Run(sweep, evaluation, folder, signals)
-                whole.prepare(backend, jobs, scheduler, dashboard, force)
+                whole.prepare(backend, jobs, scheduler)
                 whole.compute(progress, commit_every_s)
         except Interrupted as stop:
             done = ended(f"interrupted by signal {stop.signum}")

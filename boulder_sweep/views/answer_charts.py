@@ -222,7 +222,7 @@ def _curves(
 def _curve(
     axes: Axes, need: Need, rows: pd.DataFrame, across: str, style: tuple[str, Any], words: str, units: str
 ) -> None:
-    """Draw the answers of one soil, and the band to those by other readings."""
+    """Draw the answers of one soil."""
     colour, dashes = style
     size = sized(need.key.field.unit, units)[1]
     x = rows[across].to_numpy(dtype=float) / size_of(across, units)
@@ -231,10 +231,6 @@ def _curve(
     axes.plot(x, y, color=colour, linestyle=dashes, label=words or need.sweep.model.preset.replace("_", " "))
     axes.plot(x[~bound], y[~bound], "o", color=colour, markersize=4)
     axes.plot(x[bound], y[bound], "o", color=colour, markersize=4, markerfacecolor="white")
-    for name in need.others:
-        other = rows[f"{need.key.answer}_{name}"].to_numpy(dtype=float) / size
-        axes.fill_between(x, y, other, color=colour, alpha=0.13, linewidth=0)
-        axes.plot(x, other, color=colour, linewidth=0.9, linestyle=":")
 
 
 def _title(need: Need) -> str:
@@ -261,9 +257,6 @@ def _caption(need: Need, held: Mapping[str, float | str], units: str) -> str:
     if need.least_margin:
         parts.append(f"margin {need.least_margin:.0%} or more")
     parts.append("hollow: passes in the whole range searched; no point: nothing passes")
-    if need.others:
-        ours, other = (name.replace("_", " ") for name in (need.sweep.model.preset, need.others[0]))
-        parts.append(f"solid: {ours}, dotted: {other}, the band shows the spread between them")
     return "; ".join(parts)
 
 

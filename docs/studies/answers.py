@@ -8,11 +8,8 @@ import numpy as np
 from scipy.special import ndtri
 
 from boulder_sweep import load, need, uncertainty
-from boulder_sweep.answers.doubts import doubts
-from boulder_sweep.answers.need_printing import need_lines
-from boulder_sweep.answers.printing import doubt_lines, reserve_lines, uncertainty_lines
+from boulder_sweep.answers.printing import need_lines, reserve_lines, uncertainty_lines
 from boulder_sweep.answers.reserves import reserves
-from boulder_sweep.answers.spread import PUBLISHED
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.distributions import Distribution, SetDistributions
@@ -71,20 +68,6 @@ def need_with_probability(root: Path) -> str:
     return _fenced(need_lines(need(load(root / UNCERTAIN), probability=0.95)))
 
 
-def doubts_of_site(root: Path) -> str:
-    """Return what share of the doubt about the uncertain site each cause has."""
-    return _fenced(doubt_lines(doubts(load(root / UNCERTAIN))))
-
-
-def open_readings_words(root: Path) -> str:
-    """Return the depths for a chance of 95 % with the readings of the file, and with the readings left open."""
-    sweep = load(root / UNCERTAIN)
-    closed = need(sweep, probability=0.95).frame.passes_at[0]
-    open_ = need(sweep, probability=0.95, open_readings=True).frame.passes_at[0]
-    words = f"{open_:.2f} m" if open_ == open_ else "and no depth gives it"
-    return f"A chance of 95 % needs {closed:.2f} m by the corrected readings, {words} with the readings left open."
-
-
 def partial_factors(root: Path) -> str:
     """Return what chance of passing designs have whose depth is just enough with a partial factor on their soil."""
     table = Table(("partial factor on tan φ′", "designs", "mean P(pass)", "least", "largest"))
@@ -118,7 +101,7 @@ def chances_with_factor(root: Path, factor: float) -> np.ndarray:
 
 def uncertainty_of_cases(root: Path) -> str:
     """Return the chances of the crash tests and of a boulder from the grid, their soils uncertain."""
-    table = Table(("design", "readings", "P(pass)", "interval", "decided by", "its total index of the margin"))
+    table = Table(("design", "readings", "P(pass)", "interval", "decided by"))
     for name, (path, single) in CASES.items():
         for readings in ("corrected", "as_printed"):
             overrides = [f"{key}={value}" for key, value in single.items()] + [f"model.readings={readings}"]
@@ -126,19 +109,10 @@ def uncertainty_of_cases(root: Path) -> str:
             spreads = [spread.format(**values) for spread in SPREADS]
             found = uncertainty(load(root / path, [*overrides, *spreads]), half_width=0.005)
             row = found.arrow.to_pylist()[0]
-            indices = {(own["output"], own["input"]): own["total"] for own in found.indices.to_pylist()}
-            best = max((value, key[1]) for key, value in indices.items() if key[0] == "margin")
             interval = f"{row['p_pass_low']:.3f} to {row['p_pass_high']:.3f}"
-            words = best[1].rpartition("_")[0].replace("_", " ")
-            table.add(name, readings.replace("_", " "), f"{row['p_pass']:.3f}", interval, words, f"{best[0]:.2f}")
-    return table.markdown()
-
-
-def published_spreads(_: Path) -> str:
-    """Return the published coefficients of variation with their sources."""
-    table = Table(("input", "coefficient of variation", "of", "source"))
-    for own in PUBLISHED:
-        table.add(f"`{own.input}`", own.cov, own.of, own.source)
+            driver = (row["p_pass_driver"] or "").partition(".")[2].replace("_", " ")
+            words = driver or f"undecided: {row['p_undecided_reason']}"
+            table.add(name, readings.replace("_", " "), f"{row['p_pass']:.3f}", interval, words)
     return table.markdown()
 
 

@@ -298,11 +298,8 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "uncertainty-site": answers.uncertainty_of_site,
     "uncertainty-cases": answers.uncertainty_of_cases,
     "need-probability": answers.need_with_probability,
-    "doubts-site": answers.doubts_of_site,
     "moves": _moves,
-    "open-readings": answers.open_readings_words,
     "partial-factors": answers.partial_factors,
-    "published-spreads": answers.published_spreads,
     "stone-shapes": lambda root: shapes.shapes_table(root / GRID).markdown(),
     "stone-example": stones.stone_of_example,
     "stone-settings": stones.settings_of_example,
@@ -321,6 +318,6 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
 LONG = {
     *("readings-crash-tests", "readings-grid", "readings-words", "coverage", "box-shares", "front-face"),
     *(name for name in CONTENTS if name.startswith("forms-")),
-    *("wild-families", "uncertainty-cases", "moves", "partial-factors", "stone-site"),
+    *("wild-families", "moves", "partial-factors", "stone-site"),
 }
 """Blocks that take more than ten seconds, or share what does: computed again every night, not with every change."""

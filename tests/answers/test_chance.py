@@ -1,13 +1,12 @@
-"""Chances and small probabilities against cases of which the answer is known."""
+"""Chances against cases of which the answer is known."""
 
 from __future__ import annotations
 
 import numpy as np
-import pystra
 import pytest
 from scipy.special import ndtr, ndtri
 
-from boulder_sweep.answers.chance import FIRST, SCRAMBLINGS, Points, chance, interval, subset_simulation
+from boulder_sweep.answers.chance import FIRST, SCRAMBLINGS, Points, chance, interval
 
 
 def linear(z: np.ndarray) -> np.ndarray:
@@ -89,68 +88,3 @@ def test_stated_intervals_hold_for_whatever_number_of_inputs_decides(weights: tu
 def test_scramblings_that_agree_are_not_certain() -> None:
     low, high = interval(np.full((1, SCRAMBLINGS), 16.0), 32, 0.95)
     assert (high - low)[0] == pytest.approx(2.0 * (1.0 - 0.05 ** (1 / 16)) / 32)
-
-
-@pytest.mark.parametrize("dimensions", [1, 4])
-def test_small_probability_of_a_linear_limit_state(dimensions: int) -> None:
-    betas = np.array([4.753424, 3.0902])
-    found = subset_simulation(lambda row, z: betas[row] - linear(z), 2, dimensions, seed=3)
-    for row, exact in enumerate((1e-6, 1e-3)):
-        assert found.low[row] <= exact <= found.high[row]
-        assert found.high[row] < 2.5 * found.low[row]
-
-
-@pytest.mark.parametrize("curvature", [0.05, -0.03])
-def test_small_probability_of_a_curved_limit_state_is_that_of_pystra(curvature: float) -> None:
-    """Second order reliability method of pystra: another method, another package."""
-
-    def limit_state(X1, X2):
-        return 6.8 - X1 - X2 + curvature * (X1 - X2) ** 2
-
-    model = pystra.StochasticModel()
-    for name in ("X1", "X2"):
-        model.addVariable(pystra.Normal(name, 0.0, 1.0))
-    options = pystra.AnalysisOptions()
-    options.setPrintOutput(False)
-    arguments = {
-        "stochastic_model": model,
-        "limit_state": pystra.LimitState(limit_state),
-        "analysis_options": options,
-    }
-    first = pystra.Form(**arguments)
-    first.run()
-    second = pystra.Sorm(**arguments, form=first)
-    second.run()
-    known = float(np.squeeze(second.pf2_breitung_m))
-    found = subset_simulation(lambda row, z: limit_state(z[:, 0], z[:, 1]), 1, 2, seed=1)
-    assert 1e-8 < known < 1e-5
-    assert 0.95 * found.low[0] <= known <= 1.05 * found.high[0]
-
-
-def test_what_cannot_happen_has_an_upper_end_only() -> None:
-    found = subset_simulation(lambda row, z: 1.0 + ndtr(linear(z)), 1, 2, seed=0, points=100)
-    assert (found.estimate[0], found.low[0]) == (0.0, 0.0)
-    assert 0.0 < found.high[0] <= 1e-11
-
-
-@pytest.mark.parametrize("height", [1.0, np.finfo(float).tiny])
-def test_where_no_level_comes_nearer_there_is_no_probability(height: float) -> None:
-    """All other points are equally far from the event, which a seventh or a hundredth of them meet, or none."""
-    events = np.array([-1.1, -2.33, -99.0])
-    found = subset_simulation(lambda row, z: np.where(linear(z) <= events[row], -1.0, height), 3, 2, seed=0, points=100)
-    assert found.estimate[0] == pytest.approx(ndtr(-1.1), abs=0.03)
-    assert np.isnan([found.estimate[1:], found.low[1:], found.high[1:]]).all()
-
-
-def test_what_always_happens_is_certain() -> None:
-    assert subset_simulation(lambda row, z: -np.ones(len(z)), 1, 2, seed=0, points=100).estimate[0] == 1.0
-
-
-def test_intervals_of_small_probabilities_hold_at_their_rate() -> None:
-    held, found = 0, []
-    for seed in range(200):
-        rare = subset_simulation(lambda row, z: 4.753424 - linear(z), 1, 3, seed=seed)
-        held += int(rare.low[0] <= 1e-6 <= rare.high[0])
-        found.append(rare.estimate[0])
-    assert held >= 180
-    assert np.mean(found) == pytest.approx(1e-6, rel=0.04), "without bias"

@@ -31,14 +31,3 @@ def test_what_is_known_of_a_design_is_its_verdict_and_the_reason_of_an_undecided
     assert known.tolist() == [0, 1, -OVERRIDE, 0]
     assert (distance > 0.0).tolist() == [False, True, False, False]
     assert distance[3] == WORST
-
-
-def test_the_reserve_shrinks_towards_the_bumper_and_goes_on_shrinking_beyond():
-    uncertain = {"site": "embedment_depth: {mean: 2.5 m, sd: 0.5 m}", "height": "3.2 m", "friction": "44 deg"}
-    sweep = site(**uncertain)
-    draws = Draws(sweep.plan.given_rows(0, 1), Spread(sweep), judges_of(sweep), Pool(1))
-    depths = np.linspace(2.25, 3.6, 271)  # held at first, then little overlap, no contact, buried
-    index, z = np.zeros(len(depths), dtype=int), ((depths - 2.5) / 0.5)[:, None]
-    found = draws.reserve(index, z)
-    assert (np.diff(found) < 0.0).all()
-    assert np.array_equal(found > 0.0, draws.passes(index, z))

@@ -75,7 +75,7 @@ def test_rows_do_not_depend_on_how_many_designs_are_drawn_at_once(found, monkeyp
 
 
 def test_the_table_shows_the_probability(found):
-    from boulder_sweep.answers.need_printing import need_lines
+    from boulder_sweep.answers.printing import need_lines
 
     lines = need_lines(found)
     assert lines[0].split() == ["mass", "L", "W", "H", "depth", "P(pass)", "dig", "fill"]

@@ -15,7 +15,7 @@ import pytest
 import boulder_sweep
 from boulder_sweep.answers.keys import key_of
 from boulder_sweep.answers.need import Need, need
-from boulder_sweep.answers.need_printing import need_lines
+from boulder_sweep.answers.printing import need_lines
 from boulder_sweep.answers.trials import Remembered, judges_of
 from boulder_sweep.designs import DesignBlock, some
 from boulder_sweep.errors import PictureError, QuestionError
@@ -44,7 +44,7 @@ def certify(found: Need) -> int:
     bracketed = frame[frame.fails_at.notna()]
     assert not passes(found, bracketed, bracketed.fails_at, column).any()
     both = frame[frame.passes_at.notna() & frame.fails_at.notna()]
-    assert np.allclose((both.passes_at - both.fails_at).abs(), found.key.tolerance, rtol=1e-6)
+    assert np.allclose((both.passes_at - both.fails_at).abs(), found.key.step, rtol=1e-6)
     return len(both)
 
 
@@ -135,7 +135,7 @@ def test_a_margin_is_proved_to_last() -> None:
                 assert rows.verdict[0] == PASS
                 assert judges.holds(rows)[0] == holds
                 assert rows["margin"][0] >= 0.375 or not holds or sweep is long
-    question = {"margin": "36 %", "between": ("1.2 m", "1.4 m"), "both_readings": False}
+    question = {"margin": "36 %", "between": ("1.2 m", "1.4 m")}
     one, other = (need(sweep, "embedment_depth", **question).frame.iloc[0] for sweep in (brief, long))
     assert (one.found, one.passes_within) == (other.found, other.passes_within) == ("not_monotone", "1.2 to 1.219")
 
@@ -187,16 +187,6 @@ def test_rows_do_not_depend_on_their_neighbours() -> None:
             )
 
 
-def test_both_readings() -> None:
-    assert need(site()).others == []
-    found = need(site(), both_readings=True)
-    printed = need(site(readings="as_printed"))
-    assert found.others == ["as_printed"]
-    pd.testing.assert_series_equal(
-        found.frame.least_embedment_depth_m_as_printed, printed.frame.least_embedment_depth_m, check_names=False
-    )
-
-
 def test_progress_counts_rows_or_the_values_tried_for_a_probability() -> None:
     """One row of many samples takes long: its progress moves, up to the end."""
     seen: list[tuple[int, int]] = []
@@ -226,11 +216,8 @@ def test_progress_counts_rows_or_the_values_tried_for_a_probability() -> None:
         ({"between": ("1 m", "50 m")}, "admitted range"),
         ({"margin": "120 %"}, "less than 100 %"),
         ({"margin": "-1"}, "less than 100 %"),
-        ({"tolerance": "0 mm"}, "must be positive"),
-        ({"tolerance": "1 deg"}, "a length is needed"),
         ({"most": "mass"}, "use --least mass"),
-        ({"least": "mass", "between": ("1 kg", "2 kg")}, "neither --between nor --tolerance"),
-        ({"least": "mass", "tolerance": "1 mm"}, "neither --between nor --tolerance"),
+        ({"least": "mass", "between": ("1 kg", "2 kg")}, "--least mass takes no --between"),
     ],
 )
 def test_questions_that_make_no_sense_are_refused(question: dict, message: str) -> None:
@@ -242,31 +229,31 @@ def test_questions_that_make_no_sense_are_refused(question: dict, message: str) 
     ("question", "message"),
     [
         (
-            {"most": "speed", "between": ("12 m/s", "18 m/s"), "tolerance": "20 m/s"},
-            "the range to search, 12 to 18 m/s, holds no multiple of the tolerance, 20 m/s; give a smaller --tolerance",
+            {"most": "speed", "between": ("12.001 m/s", "12.009 m/s")},
+            r"12\.001 to 12\.009 m/s, holds no multiple of its",
         ),
-        ({"most": "speed", "between": ("12 m/s", "18 m/s"), "tolerance": "15 m/s"}, "holds only one multiple"),
-        ({"between": ("1.9491 m", "1.9499 m")}, r"1\.9491 to 1\.9499 m, holds no multiple of the tolerance, 0\.001 m"),
-        ({"tolerance": "2 m"}, r"0\.91 to 2\.1 m, holds only one multiple of the tolerance, 2 m"),
-        ({"tolerance": "20 m"}, "holds no multiple of the tolerance, 20 m"),
-        ({"tolerance": "1e-20 m"}, "too many multiples of the tolerance, 1e-20 m; give a larger --tolerance"),
-        ({"least": "embedment_ratio", "between": (0.61, 0.69), "tolerance": 0.1}, r"0\.61 to 0\.69, holds no multiple"),
+        ({"most": "speed", "between": ("12.001 m/s", "12.015 m/s")}, r"holds only one multiple of its step, 0\.01 m/s"),
+        (
+            {"between": ("1.9491 m", "1.9499 m")},
+            r"1\.9491 to 1\.9499 m, holds no multiple of its step, 0\.001 m; give",
+        ),
+        ({"least": "embedment_ratio", "between": (0.6101, 0.6109)}, r"0\.6101 to 0\.6109, holds no multiple"),
     ],
 )
 @pytest.mark.filterwarnings("error")
-def test_a_tolerance_that_does_not_suit_the_range_is_refused(question: dict, message: str) -> None:
+def test_a_range_that_is_too_narrow_is_refused(question: dict, message: str) -> None:
     with pytest.raises(QuestionError, match=message):
         need(site(height="2.6 m"), **question)
 
 
-def test_an_axis_between_two_multiples_is_refused_and_searched_with_a_finer_tolerance() -> None:
+def test_an_axis_between_two_multiples_is_refused() -> None:
     sweep = site(height="3 m", friction="40 deg", site="embedment_depth: [1.9491, 1.9499] m")
     with pytest.raises(QuestionError, match="holds no multiple"):
         need(sweep)
-    assert need(sweep, tolerance="0.1 mm").frame.passes_at[0] == 1.9491
+    assert need(sweep, between=("1.94 m", "1.96 m")).frame.passes_at[0] == 1.949
 
 
-@pytest.mark.parametrize("question", [{}, {"least": "embedment_ratio"}, {"tolerance": "1 in"}])
+@pytest.mark.parametrize("question", [{}, {"least": "embedment_ratio"}])
 def test_the_end_of_the_range_tells_what_is_blocked_and_not_the_last_multiple_before_it(question: dict) -> None:
     found = need(site(height="2.6 m"), **question).frame
     assert found.found.tolist() == ["blocked_by_overlap", "blocked_by_overlap"]
@@ -302,8 +289,6 @@ def test_ranges_that_are_narrow_by_themselves_are_searched() -> None:
     assert found.found.tolist() == ["blocked_by_overlap", "blocked_by_overlap", "found"]
     one = need(site(height="2.999 m", friction="40 deg", site="embedment_ratio: [0.7]")).frame
     assert one.found.tolist() == ["always"]
-    coarse = need(site(height="[0.7, 3] m", friction="40 deg"), tolerance="5 cm").frame
-    assert coarse.found.tolist() == ["blocked_by_overlap", "found"]
 
 
 def test_a_partial_factor_on_the_angle_that_is_asked_for_is_refused() -> None:
@@ -317,8 +302,7 @@ def test_distributions_are_taken_at_their_unfavourable_quantiles() -> None:
     assert need(uncertain).arrow.equals(need(at_values(uncertain)).arrow)
 
 
-def test_tolerance_makes_the_lattice() -> None:
-    assert need(site(), tolerance="5 cm").frame.passes_at.dropna().mul(20).mod(1).abs().max() < 1e-9
+def test_values_of_the_lattice_are_those_that_a_file_would_give() -> None:
     assert key_of("embedment_depth").values(np.array([1234]))[0] == 1.234
 
 
@@ -339,7 +323,7 @@ def test_table_has_units_and_settings(tmp_path: Path) -> None:
 
 
 def test_chart_is_drawn(tmp_path: Path) -> None:
-    need(site(), both_readings=True).plot(tmp_path / "chart.png")
+    need(site()).plot(tmp_path / "chart.png")
     need(site(), "mass").plot(tmp_path / "mass.png")
     assert (tmp_path / "chart.png").stat().st_size > 10_000
     with pytest.raises(PictureError, match="no curve"):

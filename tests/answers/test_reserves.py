@@ -49,7 +49,7 @@ def test_a_design_passes_at_what_it_withstands_and_not_beyond(reserves_of_many: 
     inside = there[there[f"{reserve.word}_found"] != "always"]
     assert not passes(inside, **{own: inside[f"{reserve.word}_fails_at"].to_numpy()}).any()
     beside = (inside[f"{reserve.word}_fails_at"] - inside[reserve.column]).abs()
-    assert np.allclose(beside, reserve.key.tolerance, rtol=1e-6)
+    assert np.allclose(beside, reserve.key.step, rtol=1e-6)
 
 
 @pytest.mark.parametrize("reserve", RESERVES)

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from boulder_sweep.answers.need import need
-from boulder_sweep.answers.need_printing import need_lines
-from boulder_sweep.answers.printing import reserve_lines, uncertainty_lines
+from boulder_sweep.answers.printing import need_lines, reserve_lines, uncertainty_lines
 from boulder_sweep.answers.reserves import reserves
 from boulder_sweep.answers.uncertainty import uncertainty
 from boulder_sweep.errors import QuestionError

@@ -3,7 +3,7 @@
 import pytest
 
 from boulder_sweep import load, need, uncertainty
-from boulder_sweep.answers.need_printing import need_lines
+from boulder_sweep.answers.printing import need_lines
 from boulder_sweep.errors import QuestionError
 
 STAGES = "vehicle.spring=[{stiffness: 3103.3 kN/m}, {beyond: 0.5 m, stiffness: %s}]"

@@ -9,16 +9,15 @@ import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtr
 
 import boulder_sweep
-from boulder_sweep.answers.chance import Chance
+from boulder_sweep.answers.chance import FIRST, Points
 from boulder_sweep.answers.need import need
 from boulder_sweep.answers.printing import uncertainty_lines
-from boulder_sweep.answers.uncertainty import uncertainty
+from boulder_sweep.answers.uncertainty import drivers, uncertainty
 from boulder_sweep.errors import PictureError, QuestionError
-from boulder_sweep.settings import load_text
-from tests.answers.designs import DEFAULTS, SITE, site
+from tests.answers.designs import site
 
 UNCERTAIN = {"height": "3.2 m", "site": "embedment_depth: 2.2 m", "friction": "{mean: 38 deg, sd: 3 deg}"}
 
@@ -33,86 +32,6 @@ def test_chance_follows_from_the_least_friction_angle() -> None:
     assert found.p_pass_driver == "soil.friction_angle"
 
 
-def test_rare_failures_by_subset_simulation() -> None:
-    least = need(site(**UNCERTAIN | {"friction": "38 deg"}), "friction_angle").frame.passes_at[0]
-    spread = (43.0 - least) / -ndtri(1e-6)
-    sweep = site(**UNCERTAIN | {"friction": f"{{mean: 43 deg, sd: {spread:.6f} deg}}"})
-    found = uncertainty(sweep, rare=True).frame.iloc[0]
-    assert found.p_pass == 1.0
-    assert found.p_fail_low * 0.9 <= 1e-6 <= found.p_fail_high * 1.1
-    assert found.p_fail_high < 3.0 * found.p_fail_low
-
-
-def test_rare_passes_by_subset_simulation() -> None:
-    least = need(site(**UNCERTAIN | {"friction": "38 deg"}), "friction_angle").frame.passes_at[0]
-    spread = (least - 33.0) / -ndtri(1e-5)
-    sweep = site(**UNCERTAIN | {"friction": f"{{mean: 33 deg, sd: {spread:.6f} deg}}"})
-    found = uncertainty(sweep, rare=True).frame.iloc[0]
-    assert found.p_pass == 0.0
-    assert 1.0 - found.p_fail == pytest.approx(1e-5, rel=0.5)
-
-
-@pytest.mark.parametrize(
-    ("friction", "depth", "sd", "exact"),
-    [
-        # From 2.45 m on the boulder overlaps the bumper by less than 0.25 m, from 2.7 m on not at all.
-        ("46 deg", 2.2, 0.0595, ndtr(-0.25 / 0.0595)),
-        ("44 deg", 2.5, 0.03, ndtr(0.05 / 0.03)),
-        pytest.param("44 deg", 2.6, 0.03, ndtr(0.15 / 0.03), marks=pytest.mark.nightly),
-        ("44 deg", 2.72, 0.15, ndtr(0.27 / 0.15)),
-        ("44 deg", 3.3, 0.15, ndtr(0.85 / 0.15)),  # mostly buried: refused
-    ],
-)
-def test_failures_by_too_little_overlap(friction: str, depth: float, sd: float, exact: float) -> None:
-    uncertain = {"site": f"embedment_depth: {{mean: {depth} m, sd: {sd} m}}", "friction": friction}
-    found = uncertainty(site(**UNCERTAIN | uncertain), rare=True).frame.iloc[0]
-    assert found.p_fail_by in ("subset", "drawn")
-    if found.p_fail_by == "drawn":
-        assert (found.p_fail, found.p_fail_low, found.p_fail_high) == pytest.approx(
-            (1.0 - found.p_pass, 1.0 - found.p_pass_high, 1.0 - found.p_pass_low)
-        )
-        assert found.p_fail == pytest.approx(exact, abs=0.01)
-    elif exact < 0.5:
-        assert 0.9 * found.p_fail_low <= exact <= 1.1 * found.p_fail_high
-    else:
-        assert 0.9 * (1.0 - found.p_fail_high) <= 1.0 - exact <= 1.1 * (1.0 - found.p_fail_low)
-
-
-def test_failures_by_too_much_crush() -> None:
-    text = SITE.replace("speed: 30 mph", "speed: {speed}, bed_offset: 0.5 m")
-    plain = DEFAULTS | UNCERTAIN | {"friction": "46 deg"}
-    fast = need(load_text(text.format(**plain, speed="9 m/s"), Path("site.yaml")), most="speed").frame.passes_at[0]
-    uncertain = text.format(**plain, speed=f"{{mean: {fast - 2.0} m/s, sd: 0.5 m/s}}")
-    found = uncertainty(load_text(uncertain, Path("site.yaml")), rare=True).frame.iloc[0]
-    assert found.p_fail_by == "subset"
-    assert found.p_fail_low * 0.9 <= ndtr(-4.0) <= found.p_fail_high * 1.1
-
-
-def test_no_probability_of_failing_is_better_than_a_wrong_one() -> None:
-    """The truck goes over the boulder whatever the soil, so that nothing says how far a design is from passing."""
-    over = site(**UNCERTAIN | {"site": "embedment_depth: 2.75 m"})
-    found = uncertainty(over, rare=True)
-    row = found.frame.iloc[0]
-    assert (row.p_pass, row.p_fail_by) == (0.0, "no_progress")
-    assert np.isnan([row.p_fail, row.p_fail_low, row.p_fail_high]).all()
-    lines = uncertainty_lines(found)
-    assert any(line.startswith("no_progress: ") for line in lines)
-    assert all(len(line) <= 80 for line in lines)
-
-
-@pytest.mark.parametrize("estimate", [0.0, 0.5])
-def test_a_probability_that_contradicts_what_was_drawn_is_not_given(
-    estimate: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    rare = Chance(*(np.array([value]) for value in (estimate, estimate, estimate + 1e-12)))
-    monkeypatch.setattr("boulder_sweep.answers.uncertainty.subset_simulation", lambda *_, **__: rare)
-    few = site(**UNCERTAIN | {"friction": "{mean: 43.5 deg, sd: 2.5 deg}"})  # some of 512 designs fail
-    found = uncertainty(few, rare=True).frame.iloc[0]
-    assert 0.0 < 1.0 - found.p_pass < 32 / 512
-    assert found.p_fail_by == "contradicts"
-    assert np.isnan(found.p_fail)
-
-
 def test_every_row_has_its_chance() -> None:
     sweep = site(**UNCERTAIN | {"height": "[3.1, 3.3, 3.5] m", "friction": "{mean: [34, 38, 42] deg, sd: 3 deg}"})
     frame = uncertainty(sweep).frame
@@ -124,9 +43,8 @@ def test_every_row_has_its_chance() -> None:
 
 
 def test_does_not_depend_on_threads() -> None:
-    one, two = (uncertainty(site(**UNCERTAIN), jobs=jobs, rare=True) for jobs in (1, 2))
+    one, two = (uncertainty(site(**UNCERTAIN), jobs=jobs) for jobs in (1, 2))
     assert one.arrow.equals(two.arrow)
-    assert one.indices.equals(two.indices)
     assert one.samples.equals(two.samples)
     assert not uncertainty(site(**UNCERTAIN), seed=1).arrow.equals(one.arrow)
 
@@ -136,16 +54,22 @@ def test_margin_lowers_the_chance() -> None:
     assert more < plain - 0.1
 
 
-def test_indices_name_what_decides() -> None:
+def test_a_varying_input_is_named_that_decides() -> None:
     sweep = site(**UNCERTAIN | {"subgrade": "{distribution: lognormal, mean: 60 MN/m^3, cov: 40 %}"})
     found = uncertainty(sweep)
-    table = found.indices.to_pandas().set_index(["output", "input"])
-    assert table.loc[("margin", "friction_angle_deg"), "total"] > 0.8
-    assert table.loc[("margin", "subgrade_reaction_MN_m3"), "total"] < 0.2
-    assert (table.first_low <= table["first"]).all()
-    assert (table.total_high >= table["total"]).all()
-    assert any("soil.subgrade_reaction" in line for line in uncertainty_lines(found))
+    assert found.frame.p_pass_driver[0] == "soil.friction_angle"
+    assert any("soil.friction_angle" in line for line in uncertainty_lines(found))
     assert all(len(line) <= 80 for line in uncertainty_lines(found))
+
+
+def test_driver_is_the_input_that_decides() -> None:
+    z = Points(3, 0).upto(FIRST).reshape(-1, 3)
+    outputs = np.stack([z[:, 0] + 0.3 * z[:, 1], z[:, 2] ** 3 - z[:, 0], (z[:, 1] > 0.5).astype(float)])
+    assert drivers(z, outputs).tolist() == [0, 2, 1]
+
+
+def test_what_does_not_vary_has_no_driver() -> None:
+    assert drivers(np.random.default_rng(1).standard_normal((512, 2)), np.ones((1, 512))).tolist() == [-1]
 
 
 def test_depth_for_a_probability() -> None:
@@ -163,11 +87,11 @@ def test_depth_for_a_probability() -> None:
 def test_files(tmp_path: Path) -> None:
     found = uncertainty(site(**UNCERTAIN))
     files = found.write(tmp_path / "chance.parquet")
-    assert [file.name for file in files] == ["chance.parquet", "chance.indices.parquet", "chance.samples.parquet"]
+    assert [file.name for file in files] == ["chance.parquet", "chance.samples.parquet"]
     frame = pd.read_parquet(files[0])
     assert frame.attrs["meanings"]["p_pass"].startswith("chance")
     assert json.loads(pq.read_schema(files[0]).metadata[b"boulder_sweep.question"])["seed"] == 0
-    samples = pd.read_parquet(files[2])
+    samples = pd.read_parquet(files[1])
     assert (samples.distance > 0).mean() == pytest.approx(frame.p_pass[0], abs=0.02)
 
 

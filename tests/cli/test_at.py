@@ -33,7 +33,7 @@ def test_every_command_takes_the_file(sweep, words, tmp_path, monkeypatch):
 
 def test_the_file_is_checked_and_asked_for_probabilities_as_before(sweep):
     assert sweep("check", SITE)[0] == 0
-    code, _, err = sweep("need", SITE, "--probability", "0.5", "-q", "--tolerance", "0.2 m")
+    code, _, err = sweep("need", SITE, "--probability", "0.5", "-q", "--between", "2 m", "2.02 m")
     assert (code, err) == (0, "")
 
 

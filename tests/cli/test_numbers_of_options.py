@@ -17,7 +17,6 @@ from boulder_sweep.settings.fields import BY_PATH
 SITE, GRID = "configs/site.yaml", "configs/m30_sizing.yaml"
 BARE = {
     ("need", "--between"): (["need", SITE, "--between", "5", "9", "--units", "us"], "--between '5 ft' '9 ft'"),
-    ("need", "--tolerance"): (["need", SITE, "--tolerance", "1"], "--tolerance '1 m' or --tolerance '1 ft'"),
     ("stone", "--mass"): (["stone", "rock.ply", "--mass", "18.2"], "--mass '18.2 kg' or --mass '18.2 lb'"),
     ("run", "--accuracy"): (["run", GRID, "--accuracy", "0.01"], "--accuracy '0.01 deg'"),
     ("plot", "--at"): (["plot", "out.sweep", "--at", "width=1.8"], "--at width='1.8 m' or --at width='1.8 ft'"),
@@ -30,7 +29,7 @@ BARE = {
 """Every such option: a command with a bare number, and a part of what is to be written in its place."""
 PLAIN = {
     *("--set", "--at", "--least", "--most", "--across", "--up", "--facing", "--columns", "--rows", "--case", "--class"),
-    *("--unit", "--scheduler", "--dashboard", "--project", "--client", "--author", "--date"),
+    *("--unit", "--scheduler", "--project", "--client", "--author", "--date"),
     *("--margin", "--probability", "--half-width", "--confidence"),
 }
 """Options that take words, or numbers without a dimension."""

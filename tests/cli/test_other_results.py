@@ -127,7 +127,7 @@ def test_a_settings_file_in_place_of_a_result(sweep, grid, words):
 
 
 def test_a_file_of_answers_in_place_of_a_result(sweep, possible_grid):
-    assert sweep("need", possible_grid, "-q", "-o", "depths.parquet", "--tolerance", "1 cm")[0] == 0
+    assert sweep("need", possible_grid, "-q", "-o", "depths.parquet")[0] == 0
     for words in (["status"], ["explain", "0"]):
         code, out, err = sweep(words[0], "depths.parquet", *words[1:])
         assert (code, out) == (2, "")

@@ -18,7 +18,7 @@ WORDS = {
     "check": (CONFIGS / "m30_sizing.yaml",),
     "stone": (CONFIGS.parent / "docs" / "examples" / "rock.ply", "--mass", "23.5 t"),
     "need": (SITE, *US),
-    "uncertainty": (CONFIGS / "uncertain_site.yaml", "--half-width", "0.2", "--doubts", *US),
+    "uncertainty": (CONFIGS / "uncertain_site.yaml", "--half-width", "0.2", *US),
     "capacity": (SITE, *US),
     "simulate": (SITE, "--design", "11"),
     "explore": (SITE, "-o", "page.html"),

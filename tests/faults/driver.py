@@ -33,7 +33,6 @@ def main() -> int:
     parser.add_argument("--stuck", action="store_true", help="never return from a report of rows")
     parser.add_argument("--resume", action="store_true")
     parser.add_argument("--overwrite", action="store_true")
-    parser.add_argument("--force", action="store_true")
     options = parser.parse_args()
 
     def report(progress: Progress) -> None:
@@ -49,7 +48,6 @@ def main() -> int:
             backend=options.backend,
             resume=options.resume,
             overwrite=options.overwrite,
-            force=options.force,
             progress=report,
             rows_per_part=options.rows_per_part,
             commit_every_s=options.commit_every,

@@ -11,7 +11,6 @@ import threading
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
-from urllib.request import urlopen
 
 import pytest
 from distributed import Future, LocalCluster
@@ -327,19 +326,6 @@ def test_a_worker_makes_itself_ready_once_and_refuses_other_versions():
     assert len(calls) == 1
 
 
-def test_the_dashboard_is_named_and_answers(tmp_path):
-    told = []
-
-    def look(progress):
-        (address,) = [note.split()[-1] for note in progress.notes if note.startswith("dashboard of the cluster: ")]
-        with urlopen(address) as page:
-            told.append((address, page.status))
-
-    run(grid_of(2000), tmp_path / "out", backend="dask", progress=look, jobs=1, simulate=plausible)
-    assert told[-1][0].startswith("http://127.0.0.1:")
-    assert told[-1][1] == 200
-
-
 def test_workers_that_do_not_share_the_folder_send_their_parts(tmp_path, monkeypatch):
     """Their bytes are written here, and are the same."""
     monkeypatch.setattr(remote, "LOCK_NAME", "a file that no worker sees")
@@ -352,7 +338,7 @@ def test_workers_that_do_not_share_the_folder_send_their_parts(tmp_path, monkeyp
 
 
 def test_whatever_dask_opens_here_is_bound_to_loopback(tmp_path):
-    """Scheduler, worker and dashboards of a cluster that is started by the run itself."""
+    """Ports of a cluster that is started by the run itself."""
     before = _listening()
     cluster = backend.Cluster(1, None)
     try:

@@ -66,9 +66,7 @@ def test_a_need_is_read_back_as_it_was(files: dict[str, Path], name: str) -> Non
     assert isinstance(found, Need)
     assert file.asked == len(found) == file.rows
     asked = json.loads(found.arrow.schema.metadata[b"boulder_sweep.question"])
-    assert (found.key.answer, found.key.tolerance, found.least_margin) == tuple(
-        asked[key] for key in ("asked", "tolerance", "margin")
-    )
+    assert (found.key.answer, found.least_margin) == (asked["asked"], asked["margin"])
     assert found.probability == (0.9 if name == "chance" else None)
     assert file.question.get("robust", False) == (name == "depth of a ratio")
     settings = file.identity["settings"]
@@ -80,7 +78,7 @@ def test_a_need_is_read_back_as_it_was(files: dict[str, Path], name: str) -> Non
 
 def test_axes_too_long_for_the_settings_are_read_from_the_table(tmp_path: Path) -> None:
     many = ", ".join(f"{30 + place / 100:g}" for place in range(1001))
-    found = need(site(height="3.4 m", friction=f"[{many}] deg"), tolerance="1 cm")
+    found = need(site(height="3.4 m", friction=f"[{many}] deg"))
     found.write(tmp_path / "many.parquet")
     rows = read_rows(tmp_path / "many.parquet")
     assert rows.shape == (1001,)
@@ -336,7 +334,7 @@ def test_one_changed_place_in_the_settings_ends_in_words(
 
 def test_files_beside_answers_belong_to_them(files: dict[str, Path], tmp_path: Path, sweep: Command) -> None:
     """Samples of other answers, and of none."""
-    for name in ("uncertainty.parquet", "uncertainty.indices.parquet", "uncertainty.samples.parquet"):
+    for name in ("uncertainty.parquet", "uncertainty.samples.parquet"):
         shutil.copy(files["uncertainty"].with_name(name), tmp_path / name)
     assert sweep("plot", tmp_path / "uncertainty.parquet", "-o", tmp_path / "chance.png")[0] == 0
     samples = tmp_path / "uncertainty.samples.parquet"

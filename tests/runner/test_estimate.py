@@ -230,7 +230,7 @@ def test_a_grid_of_ten_to_the_twelve_is_refused_before_memory_grows(tmp_path):
     estimate(grid_of(10), simulate=plausible)  # what is imported counts for nothing here
     tracemalloc.start()
     try:
-        with pytest.raises(DoesNotFitError, match=r"1,000,000,000,000 rows.*TB.*free.*--force"):
+        with pytest.raises(DoesNotFitError, match=r"1,000,000,000,000 rows.*TB.*free.*another folder"):
             run(sweep, tmp_path / "out", simulate=plausible)
         _, peak = tracemalloc.get_traced_memory()
     finally:

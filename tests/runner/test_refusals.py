@@ -37,7 +37,7 @@ def nothing_may_be_computed(monkeypatch):
 def test_a_grid_that_fits_on_no_disk(tmp_path):
     sweep = grid(**HUGE)
     assert sweep.n_designs == 10**15
-    with pytest.raises(DoesNotFitError, match=r"1,000,000,000,000,000 rows needs at least 1 PB.*free.*--force"):
+    with pytest.raises(DoesNotFitError, match=r"1,000,000,000,000,000 rows needs at least 1 PB.*free.*another folder"):
         run(sweep, tmp_path / "out")
     assert list(tmp_path.iterdir()) == []
 
