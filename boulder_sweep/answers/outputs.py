@@ -197,7 +197,7 @@ class AnswerFile:
         Raises
         ------
         BoulderSweepError
-            The files beside them are those of other answers.
+            The samples or indices beside the file belong to other answers.
         """
         sweep = asked_sweep(self.identity, self.table)
         if self.kind == CAPACITY:
