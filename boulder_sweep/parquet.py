@@ -152,7 +152,7 @@ class TableFile:
             self._opened(empty, metadata=self._file.metadata, pre_buffer=True).read(use_threads=False)
 
     def _check_bytes(self, columns: Sequence[str] | None) -> set[str]:
-        """Add up what columns take unpacked, before any is; return those of words that pyarrow cannot read as codes."""
+        """Add up the unpacked bytes of columns before reading; return text that pyarrow cannot read as codes."""
         spelled = set()
         wanted = self.schema.names if columns is None else set(columns)
         for index, field in enumerate(self.schema):

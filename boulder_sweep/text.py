@@ -63,8 +63,9 @@ def script_data(data: Any) -> str:
 
 
 def one_line(problem: BaseException) -> str:
-    """Return the words of an exception in one line of bounded length."""
-    text = " ".join(str(problem).split()) or "it gives no reason"
+    """Describe an exception in one line of bounded length."""
+    words = " ".join(str(problem).split())
+    text = f"{type(problem).__name__}: {words}" if words else type(problem).__name__
     return text if len(text) <= _LONGEST_LINE else f"{text[: _LONGEST_LINE - 3]}..."
 
 

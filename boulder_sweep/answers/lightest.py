@@ -99,7 +99,7 @@ class LightestQuestion:
         self.bounds |= {name: (value, value) for name, value in sweep.constants.items()}
         self.free = [side for side in SIDES if self.bounds[side][0] < self.bounds[side][1]]
         self.open = Open(sweep, (*SIDES, DEPTH))
-        if not self.free and RATIO in self.bounds:  # else every boulder stands between those of the file
+        if not self.free and RATIO in self.bounds:  # with a free side no boulder is taller than one of the file
             foot = self.bounds[RATIO][1] * self.bounds[HEIGHT][1] * SCALES[1]
             refuse_deep(sweep, foot, "boulder.height a range, which bounds the search")
 

@@ -196,7 +196,7 @@ class AnswerFile:
         Raises
         ------
         BoulderSweepError
-            The samples beside them are those of other answers.
+            The samples beside the file belong to other answers.
         """
         sweep = asked_sweep(self.identity, self.table)
         if self.kind == CAPACITY:

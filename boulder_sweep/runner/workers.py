@@ -88,7 +88,7 @@ class Computation:
                 return self._evaluate(self._make_block(start, stop))
             except Exception as problem:
                 self._failures += 1
-                reason = f"{type(problem).__name__}: {one_line(problem)}"  # a mistake of the program
+                reason = one_line(problem)
         if self._failures >= _FAILURES_BUDGET:
             raise ComputationError(f"{self._failures:,} attempts to compute designs failed, the last with: {reason}")
         if stop - start > 1:

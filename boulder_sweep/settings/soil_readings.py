@@ -280,9 +280,9 @@ def soil_of(
     Parameters
     ----------
     node, method, density_kg_m3
-        As of `readings_of`.
+        The readings, the kind of test, and the density of the soil [kg/m^3] if the file gives it.
     lacking : collection of str
-        Those of `SOIL_KEYS` that the file does not give; with none, the readings are kept as they are.
+        Soil constants (`SOIL_KEYS`) that the file does not give. If it gives all, the readings are only recorded.
     foot_m : float
         The deepest foot of all designs [m].
     topsoil_m : float

@@ -150,7 +150,8 @@ def check_entries(entries: Any, kind: type[Any], path: str) -> None:
     Raises
     ------
     ValueError
-        As of `check_stored`; `path` names the data.
+        An entry is missing, unknown, of another kind, or has a value that a settings file may not hold. The text
+        names the entry, beginning with `path`.
     """
     if wrong := next(_mistakes(entries, kind, path), ""):
         raise ValueError(shorten(wrong, 200))

@@ -446,7 +446,8 @@ def _glb(data: bytes) -> list[Part]:
             raise ScanError("is damaged: a node has two parents")
         seen.add(number)
         node = nodes[number]
-        placing = placing @ _placing(node)
+        with np.errstate(all="ignore"):  # points in places that are no finite numbers are refused
+            placing = placing @ _placing(node)
         waiting += [(child, placing) for child in reversed(node.get("children", []))]
         if "mesh" in node:
             if node["mesh"] not in meshes:

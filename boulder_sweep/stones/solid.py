@@ -117,6 +117,8 @@ def solid_of(scan: ScannedSurface) -> Solid:
         faces, volume = faces[:, ::-1], -volume
         repairs.append("its inside was outside; turned")
     largest = float(np.ptp(vertices[faces].reshape(-1, 3), axis=0).max())
+    if volume > np.prod(np.ptp(vertices[np.unique(faces)], axis=0)) * (1.0 + 1e-6):
+        raise ScanError(f"{scan.file}: encloses more than the box around it: its surface crosses itself; repair it")
     if not volume > LEAST_VOLUME * largest**3:
         raise ScanError(
             f"{scan.file}: encloses no volume to speak of ({volume:.2g} m³); it is flat, or no closed surface"
