@@ -109,7 +109,7 @@ def _signal(axes: Axes, name: str, trajectories: Mapping[str, Trajectory], measu
     """Draw one signal under all presets."""
     title, label = next((title, label) for signal, title, label in MEASURED if signal == name)
     for preset, trajectory in trajectories.items():
-        style = STYLES.get(preset, {"color": BLACK})
+        style = STYLES[preset]
         words = f"simulated, {preset.replace('_', ' ')}"
         axes.plot(trajectory.time_s, simulated_signal(trajectory, name), label=words, **style)
         when = trajectory.motion.outcome.t_limit
