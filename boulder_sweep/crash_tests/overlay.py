@@ -98,7 +98,13 @@ class Overlay:
         return {"peaks": [asdict(peak) for peak in self.peaks], "notes": self.notes}
 
     def plot(self, folder: Path) -> Path:
-        """Draw the curves into a folder, and return the picture; see `validate`."""
+        """Draw the curves into a folder, and return the picture.
+
+        Raises
+        ------
+        PictureError
+            The picture cannot be written, or matplotlib is not installed.
+        """
         target = folder / f"measured_{self.measured.path.stem}.png"
         draw("crash_curves", "draw_crash_test", self.name, self.trajectories, target, self.measured)
         return target
