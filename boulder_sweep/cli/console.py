@@ -161,7 +161,7 @@ def dry_run_lines(sweep: Sweep, out: Location, effort: Estimate) -> list[str]:
         "",
         f"would simulate {effort.rows_to_compute:,} of {counted(effort.rows, 'design')} into {out}",
         f"about {duration_text(effort.seconds)} with {counted(effort.jobs, 'worker')}, "
-        f"{size_text(effort.disk_bytes)} on disk, {size_text(effort.memory_bytes)} of memory",
+        f"{size_text(effort.disk_bytes)} on disk",
         *(f"does not fit: {objection}" for objection in effort.objections),
     ]
 

@@ -198,9 +198,11 @@ def refuse_unwritable_history(
         checked_history(trajectory)
     refuse_unwritable(None, energy)
     if animation is not None:
-        from boulder_sweep.views.side_view import checked_animation
+        from boulder_sweep.views.pictures import checked_kind, require_matplotlib
+        from boulder_sweep.views.side_view import KINDS
 
-        checked_animation(animation)
+        require_matplotlib()
+        checked_kind(animation, KINDS)
 
 
 def quantity_of(option: str, text: str, unit: str) -> float:

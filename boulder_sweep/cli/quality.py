@@ -26,12 +26,8 @@ from boulder_sweep.cli.options import (
 from boulder_sweep.cli.output import say, show, working
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rich.table import Table as RichTable
 
-    from boulder_sweep.crash_tests.score import Score
-    from boulder_sweep.impact.trajectory import Trajectory
     from boulder_sweep.tradeoff.points import Method
     from boulder_sweep.tradeoff.study import Tradeoff
 
@@ -197,13 +193,16 @@ Empty cells are gaps in a track.
     "validate", short_help="The paper's crash tests against what the paper states.", epilog=VALIDATE_EXAMPLES
 )
 @click.option("-o", "--output", "out", type=OUTPUT, metavar="DIR", help="Folder for pictures and Parquet files.")
-@click.option("--measured", type=click.Path(), metavar="FILE.csv", help="Your own test data, drawn over the result.")
+@click.option(
+    "--measured", type=click.Path(), metavar="FILE.csv", help="Your own test data, drawn over the simulation."
+)
 @click.option("--case", metavar="CASE", help="The test they belong to: abg, rwg, or a settings file with one design.")
 @json_option
 def validate(out: str | None, measured: str | None, case: str | None, as_json: bool) -> int:
     """Simulate both crash tests of the paper, with its formulas as printed and corrected, beside what it says of them.
 
-    Your own test (--measured) is scored as well: docs/measuring.md says what to measure, and what the scores are.
+    Your own test (--measured) is laid over the simulation, with a table of peaks: docs/measuring.md says what to
+    measure.
 
     With -o the figures of the paper are redrawn for the simulated side and all time histories written. The exit code
     is 1 if a statement of the paper is contradicted.
@@ -213,29 +212,19 @@ def validate(out: str | None, measured: str | None, case: str | None, as_json: b
     from boulder_sweep.crash_tests.validation import NOT_COMPARED
     from boulder_sweep.crash_tests.validation import validate as run_validation
 
-    overlaid = None if measured is None or case is None else _overlay(measured, case)
+    tested = None
+    if measured is not None and case is not None:
+        from boulder_sweep.crash_tests.overlay import overlay
+
+        tested = overlay(measured, case)
     validation = run_validation(out)
     content: dict[str, Any] = validation.to_dict()
     text = [validation.text(), "", f"note: {NOT_COMPARED}"]
-    if overlaid is not None:
-        overlay, scored, notes, draw = overlaid
-        written = [] if out is None else [draw(Path(out))]
-        content["measured"] = {preset: [d.to_dict() for d in rows] for preset, rows in overlay.items()}
-        content["scores"] = [score.to_dict() for score in scored]
-        content["notes"] = notes
-        content["files"] += written
-        from boulder_sweep.crash_tests.score import deviation_table, score_table
-        from boulder_sweep.crash_tests.tables import WIDTH
-
-        tables = [deviation_table(overlay).text()]
-        if max(map(len, tables[0].split("\n"))) > WIDTH:  # too many signals for one: a table for each
-            signals = dict.fromkeys(d.signal for rows in overlay.values() for d in rows)
-            by_signal = ({p: [d for d in rows if d.signal == name] for p, rows in overlay.items()} for name in signals)
-            tables = [deviation_table(part).text() for part in by_signal]
-        text = [validation.text(), "", f"{measured} against {case}:"]
-        text += [*(f"note: {note}" for note in notes), "\n\n".join(tables)]
-        text += ["", "scores, up to the limit of the rotation:", score_table(scored).text()]
-        text += ["safe: the model moves more, or reaches the limit earlier, than the test did"]
+    if tested is not None:
+        content["files"] += [] if out is None else [str(tested.plot(Path(out)))]
+        content |= tested.to_dict()
+        text = [validation.text(), "", f"{measured} against {case}, up to the limit of the rotation:"]
+        text += [*(f"note: {note}" for note in tested.notes), tested.table().text()]
     if out is not None:
         text += ["", *(f"written  {file}" for file in content["files"])]
     if as_json:
@@ -244,37 +233,3 @@ def validate(out: str | None, measured: str | None, case: str | None, as_json: b
         words = (line for part in text for line in part.split("\n"))
         show(*(part for line in words for part in (textwrap.wrap(line, 80) if line.startswith("note:") else [line])))
     return 0 if validation.holds else 1
-
-
-def _overlay(measured: str, case: str) -> tuple[dict[str, Any], list[Score], list[str], Callable[[Path], str]]:
-    """Compare a user's data with both presets, and score them.
-
-    Returns deviations by preset, scores, notes on the signs of what was measured, and a function that draws it all into
-    a folder.
-    """
-    from boulder_sweep.crash_tests.cases import NAMES, crash_test
-    from boulder_sweep.crash_tests.measured import TEST_SIGNALS, read_history
-    from boulder_sweep.crash_tests.score import by_the_paper, compare, forms_of, opposed, scores
-    from boulder_sweep.judge.quantiles import MEAN, at_values
-    from boulder_sweep.settings import load
-    from boulder_sweep.settings.model import PRESETS
-
-    history = read_history(measured, TEST_SIGNALS)
-    sweep = crash_test(case) if case in NAMES else load(case)
-    if sweep.n_designs != 1:
-        raise click.UsageError(f"--case {case} holds {sweep.n_designs:,} designs; a test is one")
-    sweep = at_values(sweep, MEAN) if sweep.distributions else sweep  # what the test was, not the worst that it may be
-    end = float(history.time_s[-1])
-    horizon = max(end, 0.0) or None
-    trajectories: dict[str, Trajectory] = {p: by_the_paper(sweep, p, horizon) for p in PRESETS}
-    deviations = {preset: compare(trajectory, history) for preset, trajectory in trajectories.items()}
-    scored = scores(forms_of(sweep, trajectories, horizon), history, sweep.criterion.max_rotation_deg)
-
-    def draw(folder: Path) -> str:
-        from boulder_sweep.views.crash_curves import draw_crash_test
-
-        target = folder / f"measured_{Path(measured).stem}.png"
-        draw_crash_test(sweep.name, trajectories, target, history)
-        return str(target)
-
-    return deviations, scored, opposed(trajectories.values(), history), draw

@@ -51,7 +51,7 @@ Examples:
     help="Draw where the energy goes, and add its columns to the time history.",
 )
 @click.option("--all", "every", is_flag=True, help="Print every column of the outcome as well.")
-@click.option("--animate", type=OUTPUT, metavar="F.gif|.mp4|.html", help="Animate the side view.")
+@click.option("--animate", type=OUTPUT, metavar="F.gif", help="Animate the side view.")
 @units_option
 @at_option
 @set_option

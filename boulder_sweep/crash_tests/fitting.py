@@ -2,8 +2,8 @@
 
 The measured displacement, velocity or acceleration, or several of them at once, is compared by least squares with the
 exact response of a Maxwell element (`boulder_sweep.crash_tests.rigid_wall`). The time of first touch is fitted too,
-since the trigger sets the zero of the times of a record, and the speed unless it is given. The zero offset of an
-acceleration is its mean before first touch.
+since the trigger sets the zero of the times of a record, and so are the speed, unless it is given, and the zero offset
+of an acceleration that was recorded before first touch.
 
 How sure the result is follows from a jackknife: it is fitted again without each of some 20 stretches of the record in
 turn. Neighbouring samples share their noise, so whole stretches are left out (Kuensch 1989, Ann. Stat. 17, 1217-1241).
@@ -15,7 +15,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,58 +26,34 @@ from boulder_sweep.errors import FitError
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.values import is_unusual, range_words
 
-if TYPE_CHECKING:
-    from scipy.optimize import OptimizeResult
-
-SYSTEMATIC_SHARE, GO_TOGETHER = 0.02, 0.5
-"""A misfit left after the noise has been averaged out, as a share of the signal's range, from which on the vehicle
-cannot be called a Maxwell element, provided that neighbouring residuals go together."""
-SMOOTHING_SHARE = 0.05
-"""Part of the pulse over which noise is averaged out."""
-NOT_NEAR = 0.25
-"""The same misfit from which on the fit is refused."""
+MISFIT, NOT_NEAR = 0.05, 0.15
+"""Root mean square of a misfit as a share of the signal's range, from which on the user is warned, and from which on
+the fit is refused."""
 UNSURE = 0.5
 """Error of a constant as a share of it from which on the user is warned; from 1 on it is refused."""
 MOST_CRUSH_M = 10.0
 """Crush of a front that is longer than any vehicle's."""
-GAUGE_SHARE = 0.01
-"""What the gain of an accelerometer may be wrong by."""
-SURE = 1.5
-"""A speed is contradicted by the record beyond this many errors of 95 %."""
+SURE, GAUGE_SHARE = 1.5, 0.02
+"""A speed is contradicted by the record beyond this many errors of 95 %, and this share of it."""
 RATIO_BOUNDS = (2e-3, 2e2)
 """Range of c/sqrt(k m) that is searched; at its ends one of the two elements is as good as rigid."""
-PASSES = 4
-"""How often the weights of the signals, the offset and the rows it stands on are renewed from the last fit."""
 LEAST_SHIFT_S = 5e-4
 """A first touch this close to the zero of the times is not worth a word."""
-MOST_SHIFT = 0.1
-"""Share of the crush by which a front that is no spring and damper may move first touch: it may be soft at first."""
 BLOCKS, BLOCKS_BESIDE = 16, 4
 """Stretches that are left out in turn: from first touch to separation, and before and after it."""
 FEWEST_BEFORE = 5
-"""Rows before first touch from which on they give a zero offset."""
-SMEAR = 0.1
-"""Part of the rise to the peak force, ahead of first touch, into which a filter may smear the impact."""
+"""Rows before first touch from which on a zero offset is fitted."""
+ROWS_AT_START = 300
+"""Rows that starts are chosen by."""
 
 
-@dataclass(frozen=True)
-class SignalMisfit:
-    """How far the fitted response is from one signal.
-
-    Attributes
-    ----------
-    rms, share : float
-        Root mean square of the residuals, in the unit of the signal and as a share of its range.
-    systematic_share : float
-        Largest residual after the noise has been averaged out, as a share of the range.
-    correlation : float
-        Correlation of neighbouring residuals.
-    """
+class SignalMisfit(NamedTuple):
+    """How far the fitted response is from one signal."""
 
     rms: float
+    """Root mean square of the residuals, in the unit of the signal."""
     share: float
-    systematic_share: float
-    correlation: float
+    """The same as a share of its range."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +69,7 @@ class VehicleFit:
     touch_s : float
         First touch, in times of the pulse [s].
     offset_m_s2 : float or None
-        Zero offset that was taken from the acceleration [m/s^2]; None where no rows before first touch show it.
+        Zero offset of the acceleration [m/s^2]; None where no rows before first touch show it.
     spring_error_N_m, damper_error_N_s_m, touch_error_s : float
         Errors by the scatter of the record. They say nothing about whether a Maxwell element is right at all.
     speed_error_m_s : float or None
@@ -136,11 +112,7 @@ class VehicleFit:
             "peak_force_kN": wall.peak_force / 1e3,
             "rebound_speed_m_s": -wall.rebound_speed_m_s,
             "misfit": {
-                f"{name} [{PULSE_UNITS[name]}]": {
-                    "rms": m.rms,
-                    "share_of_range": m.share,
-                    "systematic": m.systematic_share,
-                }
+                f"{name} [{PULSE_UNITS[name]}]": {"rms": m.rms, "share_of_range": m.share}
                 for name, m in self.misfits.items()
             },
             "warnings": list(self.warnings),
@@ -163,167 +135,116 @@ class VehicleFit:
 
 
 class _Problem:
-    """The least-squares problem: unknowns log sqrt(k/m), log(c/sqrt(k m)), first touch and, where not given, v_0."""
+    """The least-squares problem in log sqrt(k/m), log(c/sqrt(k m)) and first touch.
+
+    The response is linear in speed and zero offset, so both follow from these three, where they are not given.
+    """
 
     def __init__(self, pulse: Pulse, mass_kg: float, speed_m_s: float | None) -> None:
-        self.time, self.signals = pulse.time_s, pulse.signals
-        self.mass_kg, self.speed_m_s = mass_kg, speed_m_s
+        self.pulse, self.mass_kg, self.speed_m_s = pulse, mass_kg, speed_m_s
+        self.has_offset = False
+        self.kept = np.full(len(pulse.time_s), True)
         self.ranges = {
             name: float(np.nanmax(np.abs(v)) + np.nanmax(v) - np.nanmin(v)) for name, v in pulse.signals.items()
         }
-        self.scales = dict(self.ranges)
-        self.offset: float | None = None
-        self.rows: dict[str, np.ndarray] = {}
         self.known = {name: np.isfinite(values) for name, values in pulse.signals.items()}
-        self.differences = dict.fromkeys(pulse.signals, 0)
-        latest = min(self.time[known][-FEWEST_SAMPLES] for known in self.known.values())
-        span = self.time[-1] - self.time[0]
-        low = [math.log(0.01 / span), math.log(RATIO_BOUNDS[0]), self.time[0] - span, 1e-9]
-        high = [math.log(2000.0 / span), math.log(RATIO_BOUNDS[1]), latest, 1e4]
-        count = 4 if speed_m_s is None else 3
-        self.bounds = np.array(low[:count]), np.array(high[:count])
+        time = pulse.time_s
+        latest = min(time[known][-FEWEST_SAMPLES] for known in self.known.values())
+        span = time[-1] - time[0]
+        low = math.log(0.01 / span), math.log(RATIO_BOUNDS[0]), time[0] - span
+        self.bounds = np.array(low), np.array([math.log(2000.0 / span), math.log(RATIO_BOUNDS[1]), latest])
 
-    def wall(self, unknowns: np.ndarray) -> RigidWall:
+    def wall(self, unknowns: np.ndarray, speed_m_s: float) -> RigidWall:
         """Vehicle that the unknowns stand for."""
         rate, ratio = math.exp(unknowns[0]), math.exp(unknowns[1])
-        speed = float(unknowns[3]) if self.speed_m_s is None else self.speed_m_s
-        return RigidWall(self.mass_kg, speed, self.mass_kg * rate**2, ratio * rate * self.mass_kg)
+        return RigidWall(self.mass_kg, speed_m_s, self.mass_kg * rate**2, ratio * rate * self.mass_kg)
 
-    def by_signal(self, unknowns: np.ndarray) -> dict[str, np.ndarray]:
-        """Measured minus computed in the rows in use, in the units of the signals."""
-        response = dict(zip(PULSE_UNITS, self.wall(unknowns).response(self.time - unknowns[2]), strict=True))
-        left = {name: (values - response[name])[self.rows[name]] for name, values in self.signals.items()}
-        if self.offset is not None:
-            left["acceleration"] = left["acceleration"] - self.offset
-        return left
-
-    def compared(self, unknowns: np.ndarray) -> dict[str, np.ndarray]:
-        """What is made small: the residuals, or their differences from row to row where they wander."""
-        found = self.by_signal(unknowns)
-        for name, order in self.differences.items():
-            if order:
-                spread = np.full(len(self.time), np.nan)
-                spread[self.rows[name]] = found[name]
-                apart = np.diff(spread[self.known[name]], order)
-                found[name] = apart[np.isfinite(apart)]
-        return found
-
-    def residuals(self, unknowns: np.ndarray) -> np.ndarray:
-        """What is made small, of all signals, as multiples of their scales."""
-        return np.concatenate([values / self.scales[name] for name, values in self.compared(unknowns).items()])
-
-    def choose(self, unknowns: np.ndarray, kept: np.ndarray) -> None:
-        """Take the rows that are kept, and the zero offset from them; it stays where they show none.
+    def solved(self, unknowns: np.ndarray) -> tuple[np.ndarray, float, float | None]:
+        """Return measured minus fitted of all rows kept, as shares of the ranges, and speed and zero offset.
 
         A displacement counts from first touch: some records hold it at 0 before, others let it come up from below.
         """
-        after = self.time >= unknowns[2]
-        self.rows = {
-            name: known & kept & (after if name == "displacement" else True) for name, known in self.known.items()
-        }
-        if "acceleration" in self.signals:
-            clear = unknowns[2] - SMEAR * self.wall(unknowns).peak_force_time_s
-            before = self.rows["acceleration"] & (self.time < clear)
-            if before.sum() >= FEWEST_BEFORE:
-                self.offset = float(self.signals["acceleration"][before].mean())
-
-    def solve(self, start: np.ndarray, tolerance: float) -> OptimizeResult:
-        """Solve from a start."""
-        from scipy.optimize import least_squares  # heavy, and only fits need it
-
-        tight = {"xtol": tolerance, "ftol": tolerance, "gtol": tolerance}
-        return least_squares(self.residuals, np.clip(start, *self.bounds), bounds=self.bounds, x_scale="jac", **tight)
+        time = self.pulse.time_s - unknowns[2]
+        response = dict(zip(PULSE_UNITS, self.wall(unknowns, 1.0).response(time), strict=True))
+        data, shape, ones = [], [], []
+        for name, values in self.pulse.signals.items():
+            rows, is_length = self.known[name] & self.kept, name == "displacement"
+            before = time[rows] < 0.0
+            measured = np.where(before & is_length, np.maximum(values[rows], 0.0), values[rows])
+            data.append(measured / self.ranges[name])
+            shape.append(np.where(before & is_length, 0.0, response[name][rows]) / self.ranges[name])
+            ones.append(np.full(len(measured), (name == "acceleration") / self.ranges[name]))
+        left, columns = np.concatenate(data), [np.concatenate(ones)] if self.has_offset else []
+        if self.speed_m_s is None:
+            columns.insert(0, np.concatenate(shape))
+        else:
+            left = left - self.speed_m_s * np.concatenate(shape)
+        linear = np.zeros(0)
+        if columns:
+            matrix = np.stack(columns, axis=1)
+            linear = np.linalg.lstsq(matrix, left, rcond=None)[0]
+            left = left - matrix @ linear
+        speed = float(max(linear[0], 1e-6)) if self.speed_m_s is None else self.speed_m_s
+        return left, speed, float(linear[-1]) if self.has_offset else None
 
     def starts(self, count: int = 4) -> list[np.ndarray]:
-        """Return the best vehicles of a grid of rates, ratios and first touches; the speed follows from each.
+        """Return the best vehicles of a grid of rates, ratios and first touches.
 
         First touch is sought at the zero of the times, and at and ahead of the first row that shows the impact.
         """
-        every = max(1, len(self.time) // 300)
-        signals = {name: values[::every] for name, values in self.signals.items()}
-        thin = _Problem(Pulse("", self.time[::every], signals), self.mass_kg, None)
-        found, span, onset = [], float(self.time[-1] - self.time[0]), _onset(self)
-        for rate in np.geomspace(0.5, 200.0, 14) / span:
+        time, signals = self.pulse.time_s, self.pulse.signals
+        every = max(1, len(time) // ROWS_AT_START)
+        few = Pulse("", time[::every], {name: values[::every] for name, values in signals.items()})
+        if any(np.isfinite(values).sum() < FEWEST_SAMPLES for values in few.signals.values()):
+            few = self.pulse
+        thin = _Problem(few, self.mass_kg, self.speed_m_s)
+        found, onset = [], _onset(self.pulse)
+        for rate in np.geomspace(0.5, 200.0, 14) / (time[-1] - time[0]):
             for ratio in np.geomspace(0.02, 20.0, 7):
                 for touch in (0.0, onset, onset - 0.3 / rate, onset - 0.8 / rate):
-                    guess = np.array([math.log(rate), math.log(ratio), touch, 0.0])
-                    if not thin.bounds[0][2] <= touch <= onset:
-                        continue
-                    thin.offset = None
-                    thin.choose(guess, np.full(len(thin.time), True))
-                    data = thin.residuals(guess)
-                    shape = data - thin.residuals(guess + np.array([0.0, 0.0, 0.0, 1.0]))
-                    fitting = float(data @ shape) / max(float(shape @ shape), 1e-300)
-                    speed = max(fitting, 1e-6) if self.speed_m_s is None else self.speed_m_s
-                    guess[3] = speed
-                    found.append((float(np.mean((data - speed * shape) ** 2)), guess[: len(self.bounds[0])]))
+                    guess = np.array([math.log(rate), math.log(ratio), touch])
+                    if self.bounds[0][2] <= touch <= onset:
+                        found.append((float(np.mean(thin.solved(guess)[0] ** 2)), guess))
         return [guess for _, guess in sorted(found, key=lambda pair: pair[0])[:count]]
 
+    def solve(self, starts: list[np.ndarray]) -> np.ndarray:
+        """Return the best solution from some starts."""
+        from scipy.optimize import least_squares  # heavy, and only fits need it
+
+        tight: dict[str, Any] = {"bounds": self.bounds, "x_scale": "jac", "xtol": 1e-14, "ftol": 1e-14, "gtol": 1e-14}
+        tried = [least_squares(lambda x: self.solved(x)[0], np.clip(one, *self.bounds), **tight) for one in starts]
+        return np.asarray(min(tried, key=lambda one: float(one.cost)).x)
+
     def best(self) -> np.ndarray:
-        """Solve, with every signal weighted by its own scatter in the end."""
-        everything, tried = np.full(len(self.time), True), []
-        for start in self.starts():
-            self.offset = None
-            self.choose(start, everything)
-            solved = self.solve(start, 1e-8)
-            tried.append((solved.cost / len(solved.fun), solved.x))
-        unknowns = min(tried, key=lambda pair: pair[0])[1]
-        for _ in range(PASSES):
-            self.offset = None
-            self.choose(unknowns, everything)
-            unknowns = self.solve(unknowns, 1e-14).x
-            for name, values in self.compared(unknowns).items():
-                misfit = _misfit_of(values, self.ranges[name])
-                self.scales[name] = max(misfit.rms, 1e-9 * self.ranges[name])
-                wanders = name != "acceleration" and misfit.rms > 1e-9 * self.ranges[name]
-                if wanders and misfit.correlation > GO_TOGETHER and misfit.systematic_share < SYSTEMATIC_SHARE:
-                    self.differences[name] = min(self.differences[name] + 1, 2)
-                    self.scales[name] = max(_rms(np.diff(values)), 1e-12 * self.ranges[name])
+        """Solve, with a zero offset of the acceleration where rows before first touch show it."""
+        unknowns = self.solve(self.starts())
+        before = self.pulse.time_s < unknowns[2]
+        if "acceleration" in self.known and np.sum(self.known["acceleration"] & before) >= FEWEST_BEFORE:
+            self.has_offset = True
+            unknowns = self.solve([unknowns])
         return unknowns
 
     def errors(self, unknowns: np.ndarray) -> np.ndarray:
-        """Half widths of the 95 % intervals of log k_v, log c_v, first touch and, where not given, v_0, shape (p,).
-
-        A jackknife over stretches of the record gives them. None is narrower than white noise and the curvature of the
-        misfit would make it: the curvature shows a flat valley that the jackknife may not follow.
-        """
+        """Half widths of the 95 % intervals of log k_v, log c_v, first touch and v_0 by a jackknife, shape (4,)."""
         from scipy.stats import t as student
 
-        to_logs = np.eye(len(unknowns))
-        to_logs[0, 0], to_logs[1, 0] = 2.0, 1.0  # k = m exp(2 u_0), c = m exp(u_0 + u_1)
-        offset, rows = self.offset, self.rows
-        solved = self.solve(unknowns, 1e-14)
-        _, sizes, vectors = np.linalg.svd(solved.jac, full_matrices=False)
-        free = max(len(solved.fun) - len(unknowns), 1)
-        roots = to_logs @ vectors.T / np.maximum(sizes, 1e-300) * math.sqrt(2.0 * solved.cost / free)
-        white = np.sqrt((roots**2).sum(axis=1))
+        def constants(x: np.ndarray) -> np.ndarray:
+            return np.array([2.0 * x[0], x[0] + x[1], x[2], self.solved(x)[1]])
+
         moved = []
         for block in self.stretches(unknowns):
-            kept = np.full(len(self.time), True)
-            kept[block] = False
-            self.choose(unknowns, kept)
-            moved.append(self.solve(unknowns, 1e-9).x - unknowns)
-            self.offset, self.rows = offset, rows
+            self.kept = np.full(len(self.pulse.time_s), True)
+            self.kept[block] = False
+            moved.append(constants(self.solve([unknowns])))
+        self.kept = np.full(len(self.pulse.time_s), True)
         count = len(moved)
-        scatter = np.sqrt((count - 1) / count * ((np.array(moved) @ to_logs.T) ** 2).sum(axis=0))
-        return float(student.ppf(0.975, min(BLOCKS, count) - 1)) * np.maximum(scatter, white)
-
-    def speed_of_record(self, unknowns: np.ndarray, error_m_s: float) -> tuple[float, float]:
-        """Speed before first touch by the record's own change of speed, and how far it may be off [m/s].
-
-        The change is the integral of the acceleration where there is one; what the fit makes of the speed at the end of
-        the record is added. By how much fit and integral differ is part of the error.
-        """
-        drift = 0.0
-        if "acceleration" in self.signals:
-            drift = -float(np.trapezoid(self.by_signal(unknowns)["acceleration"], self.time[self.rows["acceleration"]]))
-        record = float(unknowns[3]) + drift
-        return record, SURE * error_m_s + abs(drift) + GAUGE_SHARE * record
+        scatter = np.sqrt((count - 1) / count * ((np.array(moved) - constants(unknowns)) ** 2).sum(axis=0))
+        return np.asarray(student.ppf(0.975, min(BLOCKS, count) - 1) * scatter)
 
     def stretches(self, unknowns: np.ndarray) -> list[np.ndarray]:
         """Rows of each stretch: before first touch, up to separation, after it."""
-        ends = unknowns[2], unknowns[2] + self.wall(unknowns).separation_time_s
-        parts = np.split(np.arange(len(self.time)), np.searchsorted(self.time, ends))
+        ends = unknowns[2], unknowns[2] + self.wall(unknowns, 1.0).separation_time_s
+        parts = np.split(np.arange(len(self.pulse.time_s)), np.searchsorted(self.pulse.time_s, ends))
         counts = (BLOCKS_BESIDE, BLOCKS, BLOCKS_BESIDE)
         return [b for part, n in zip(parts, counts, strict=True) for b in np.array_split(part, n) if len(b)]
 
@@ -355,35 +276,43 @@ def fit_pulse(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) -
             raise FitError(f"the {name} of the vehicle must be positive, not {value:g}")
         if value is not None and (words := _far_out(column, value)):
             raise FitError(f"--{name}: {words}; check its unit")
-    problem = _Problem(pulse, float(mass_kg), None)
-    unknowns = problem.best()
-    errors = problem.errors(unknowns)
+    fit = _fit(pulse, float(mass_kg), None)
     if speed_m_s is not None:
-        record, error = problem.speed_of_record(unknowns, float(errors[3]))
-        if abs(record - speed_m_s) > error:
+        record, error = fit.wall.speed_m_s, fit.speed_error_m_s or 0.0
+        apart = abs(record - speed_m_s) > SURE * error + GAUGE_SHARE * record
+        if apart and not _far_out("impact_speed_m_s", record):  # else the record ends too early to say
             raise FitError(
-                f"{pulse.name}: by its change of speed the record says {record:.1f} ± {max(error, 0.05):.1f} m/s, "
+                f"{pulse.name}: the record says {record:.1f} ± {max(error, 0.05):.1f} m/s, "
                 f"--speed {speed_m_s:.1f} m/s; check the speed, and the units and the zero offset of the record"
             )
-        problem = _Problem(pulse, float(mass_kg), float(speed_m_s))
-        unknowns = problem.best()
-        errors = problem.errors(unknowns)
-    wall, residuals = problem.wall(unknowns), problem.by_signal(unknowns)
-    misfits = {name: _misfit_of(values, problem.ranges[name]) for name, values in residuals.items()}
-    fit = VehicleFit(
+        fit = _fit(pulse, float(mass_kg), float(speed_m_s))
+    _refuse(fit)
+    return replace(fit, warnings=tuple(_warnings(fit)))
+
+
+def _fit(pulse: Pulse, mass_kg: float, speed_m_s: float | None) -> VehicleFit:
+    """Fit a pulse, whatever comes out."""
+    problem = _Problem(pulse, mass_kg, speed_m_s)
+    unknowns = problem.best()
+    errors = problem.errors(unknowns)
+    left, speed, offset = problem.solved(unknowns)
+    wall = problem.wall(unknowns, speed)
+    ends = np.cumsum([known.sum() for known in problem.known.values()])[:-1]
+    shares = {
+        name: math.sqrt(float(np.mean(part**2))) for name, part in zip(pulse.signals, np.split(left, ends), strict=True)
+    }
+    return VehicleFit(
         pulse=pulse,
         wall=wall,
         touch_s=float(unknowns[2]),
-        offset_m_s2=problem.offset,
+        offset_m_s2=offset,
         spring_error_N_m=float(errors[0]) * wall.spring_N_m,
         damper_error_N_s_m=float(errors[1]) * wall.damper_N_s_m,
         touch_error_s=float(errors[2]),
         speed_error_m_s=None if speed_m_s is not None else float(errors[3]),
-        misfits=misfits,
+        misfits={name: SignalMisfit(share * problem.ranges[name], share) for name, share in shares.items()},
         warnings=(),
     )
-    _refuse(fit)
-    return replace(fit, warnings=tuple(_warnings(fit)))
 
 
 def _far_out(name: str, value: float) -> str:
@@ -399,22 +328,13 @@ def _far_out(name: str, value: float) -> str:
     return f"{range_words(value, value, field.unit, unit)} is far outside what vehicles have, {ends}"
 
 
-def _systematic(misfits: dict[str, SignalMisfit]) -> dict[str, float]:
-    """Misfits that noise does not explain, as shares of the ranges."""
-    return {
-        name: misfit.systematic_share
-        for name, misfit in misfits.items()
-        if misfit.systematic_share > SYSTEMATIC_SHARE and misfit.correlation > GO_TOGETHER
-    }
-
-
 def _refuse(fit: VehicleFit) -> None:
     """Refuse a fit that says nothing about a vehicle, with its reasons and what to do."""
     wall, ratio = fit.wall, fit.wall.damper_N_s_m / math.sqrt(fit.wall.spring_N_m * fit.wall.mass_kg)
     reasons = [
-        f"no spring and damper in series come near it: the {name} is off by {share:.0%} of its range"
-        for name, share in _systematic(fit.misfits).items()
-        if share > NOT_NEAR
+        f"no spring and damper in series come near it: the {name} is off by {misfit.share:.0%} of its range"
+        for name, misfit in fit.misfits.items()
+        if misfit.share > NOT_NEAR
     ]
     at_once = wall.peak_force_time_s < 2.0 * float(np.median(np.diff(fit.pulse.time_s)))
     open_ends = (
@@ -427,13 +347,6 @@ def _refuse(fit: VehicleFit) -> None:
             if alone and other == "spring" and fit.pulse.time_s[-1] - fit.touch_s > wall.separation_time_s:
                 why += ", since the vehicle leaves the wall as fast as it came, which no front of sheet metal does"
             reasons.append(f"the record does not determine the {name}: {why}")
-    shift, least = fit.touch_s, max(fit.touch_error_s, LEAST_SHIFT_S)
-    unseen = shift > least or fit.pulse.time_s[0] - shift > least
-    far = abs(shift) * wall.speed_m_s > MOST_SHIFT * wall.max_displacement_m
-    if unseen and far and abs(shift) > least and _systematic(fit.misfits):
-        words = f"a spring and a damper in series fit it only from {1e3 * shift:.1f} ms on, and not well"
-        later = f"; if first touch is then, take {1e3 * shift:.1f} ms from its times" if shift > 0.0 else ""
-        reasons.append(words + later)
     if not reasons:
         names = "impact_speed_m_s", "vehicle_spring_N_m", "vehicle_damper_N_s_m"
         found = ((BY_NAME[name].key, _far_out(name, fit.to_dict()[name])) for name in names)
@@ -460,12 +373,12 @@ def _what_to_do(fit: VehicleFit) -> str:
 def _warnings(fit: VehicleFit) -> Iterator[str]:
     """Yield what the user of a fit should know before trusting it."""
     wall = fit.wall
-    for name, share in _systematic(fit.misfits).items():
-        yield (
-            f"the {name} is off by {share:.0%} of its range even with the noise averaged out: this front is not a "
-            f"spring and a damper in series (it may stiffen as it is crushed); use the constants only for impacts that "
-            f"crush it about as far"
-        )
+    for name, misfit in fit.misfits.items():
+        if misfit.share > MISFIT:
+            yield (
+                f"the {name} is off by {misfit.share:.0%} of its range: the record is noisy, or this front is not a "
+                f"spring and a damper in series"
+            )
     shares = ("spring", fit.spring_error_N_m / wall.spring_N_m), ("damper", fit.damper_error_N_s_m / wall.damper_N_s_m)
     for name, share in shares:
         if share > UNSURE:
@@ -475,7 +388,8 @@ def _warnings(fit: VehicleFit) -> Iterator[str]:
     if abs(fit.touch_s) > least:
         yield (
             f"the record shows first touch at {1e3 * fit.touch_s:.1f} ± {1e3 * fit.touch_error_s:.1f} ms, not at its "
-            f"time 0; the fit counts from there"
+            f"time 0; the fit counts from there. If time 0 is right, this front is not a spring and a damper in series "
+            f"but stiffens as it is crushed: use the constants only for impacts that crush it about as far"
         )
     if first > least:
         yield f"the record begins {1e3 * first:.1f} ms after first touch: what came before is what the fit makes of it"
@@ -493,32 +407,11 @@ def _warnings(fit: VehicleFit) -> Iterator[str]:
         )
 
 
-def _onset(problem: _Problem) -> float:
-    """Return the first time at which a signal shows the impact, noise averaged out [s]."""
+def _onset(pulse: Pulse) -> float:
+    """Return the first time at which a signal has changed by a third of its change [s]."""
     times = []
-    for name, values in problem.signals.items():
-        time, smooth = problem.time[problem.known[name]], _smooth(values[problem.known[name]], 0.02)
-        change = {"acceleration": -smooth, "velocity": smooth[0] - smooth, "displacement": smooth}[name]
-        times.append(float(time[np.argmax(change > 0.3 * change.max())]))
+    for name, values in pulse.signals.items():
+        known = np.isfinite(values)
+        change = values[known] if name == "displacement" else values[known][0] - values[known]
+        times.append(float(pulse.time_s[known][np.argmax(change > change.max() / 3.0)]))
     return min(times)
-
-
-def _smooth(values: np.ndarray, share: float) -> np.ndarray:
-    """Means over windows of a share of the values."""
-    window = max(1, round(share * len(values)))
-    sums = np.concatenate([[0.0], np.cumsum(values)])
-    return np.asarray((sums[window:] - sums[:-window]) / window)
-
-
-def _rms(values: np.ndarray) -> float:
-    """Root mean square."""
-    return float(np.sqrt(np.mean(values**2)))
-
-
-def _misfit_of(residuals: np.ndarray, span: float) -> SignalMisfit:
-    """Describe the residuals of one signal."""
-    smooth = _smooth(residuals, SMOOTHING_SHARE)
-    scatter = float(residuals @ residuals)
-    correlation = float(residuals[1:] @ residuals[:-1]) / scatter if scatter > 0.0 else 0.0
-    size = _rms(residuals)
-    return SignalMisfit(size, size / span, float(np.abs(smooth).max()) / span, correlation)

@@ -326,7 +326,7 @@ class Trajectory:
         draw("side_view", "draw_still", self, path, time_s=time_s)
 
     def animate(self, path: str | Path, progress: Callable[[int, int], None] | None = None) -> None:
-        """Draw a moving side view: .gif, .mp4 (needs ffmpeg) or .html; see `plot`.
+        """Draw a moving side view (.gif); see `plot`.
 
         Parameters
         ----------

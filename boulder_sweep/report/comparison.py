@@ -34,7 +34,7 @@ class Comparison:
     ----------
     matched : DataFrame
         Designs of both results: inputs, and outcomes with ``_before`` and ``_after`` behind their names; so have the
-        inputs in `differ`.
+        inputs in `differ`, those that follow from other inputs, and the mass.
     differ : tuple of str
         Columns of inputs of which the two results have no value in common. Designs are matched by all others, and
         their values of these in order.
@@ -167,9 +167,6 @@ def compare(before: str | Path | RemotePath, after: str | Path | RemotePath) -> 
     matched = tables[0].merge(tables[1].drop(columns=same), on=[*shared, "nth"], suffixes=("_before", "_after"))
     if matched.empty or not as_many:
         raise ReportError(f"{before} and {after} have no design in common{_apart(tables, differ)}")
-    for name in (*follow, "mass_kg"):
-        if matched[f"{_key(name)}_before"].equals(matched[f"{_key(name)}_after"]):
-            matched = matched.rename(columns={f"{name}_before": name}).drop(columns=f"{name}_after")
     passing = [table[table.verdict == "pass"] for table in tables]
     return Comparison(
         matched=matched.drop(columns=[name for name in matched if name.startswith("key_")] + ["rank", "nth"]),

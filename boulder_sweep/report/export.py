@@ -5,13 +5,12 @@ from __future__ import annotations
 import csv
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
 from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from boulder_sweep.answers.outputs import AnswerFile, result_of
-from boulder_sweep.columns import BOULDER_MASS, BY_NAME, DESIGN_ID
+from boulder_sweep.columns import BOULDER_MASS, BY_NAME
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.quantities import NEEDED, QUANTITIES, quantities_by
 from boulder_sweep.locations import RemotePath, location_of
@@ -33,35 +32,8 @@ JUDGED_BY = Shown(
 )
 PIECE = 10_000
 """Rows that become cells at once."""
-NUMBER_FORMATS = {
-    "m": "0.000",
-    "ft": "0.000",
-    "m^3": "0.0",
-    "yd^3": "0.0",
-    "kg": "#,##0",
-    "lb": "#,##0",
-    "kg/m^3": "#,##0",
-    "pcf": "0.0",
-    "MN/m^3": "0.0",
-    "pci": "0.0",
-    "m/s": "0.00",
-    "mph": "0.0",
-    "N/m": "#,##0",
-    "lb/in": "#,##0",
-    "N*s/m": "#,##0",
-    "lb*s/in": "#,##0.0",
-    "kN": "#,##0.0",
-    "kip": "#,##0.0",
-    "deg": "0.00",
-    "s": "0.0000",
-    "1": "0.000",
-}
-"""How a spreadsheet shows numbers, by unit; the cells keep all digits."""
-ERROR_FORMAT = "0.0E+00"
-"""Of estimated errors, which are small."""
-MOST_CHARACTERS = 60
-"""Widest column of words."""
-ABOUT_WIDTHS = (44, 12, 90)
+LEAST_WIDTH, ABOUT_WIDTHS = 14, {"A": 44, "B": 12, "C": 90}
+"""Widths of columns, in characters."""
 FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
 """First characters of text that a spreadsheet takes for a formula."""
 
@@ -250,98 +222,30 @@ def _parquet(target: BinaryIO, finished: Exportable, units: str) -> int:
 
 def _sheet(target: BinaryIO, finished: Exportable, units: str) -> int:
     """Write a spreadsheet: the designs, and what a reader must know about them."""
-    rows, columns = 0, list[Shown]()
-    with _workbook(target) as book:
-        designs = book.create_sheet("designs")
-        designs.freeze_panes = "B2"
-        designs.print_title_rows, designs.print_title_cols = "1:1", "A:A"
-        designs.page_setup.orientation = "landscape"
-        for columns, table in _tables(finished, units):
-            if rows == 0:
-                words = [_longest(column) for column in table.columns]
-                _set_widths(
-                    designs, [max(len(one.name) + 4, 10, wide + 3) for one, wide in zip(columns, words, strict=True)]
-                )
-                names = _cells(column.name for column in columns)
-                designs.append([_head(designs, text, bool(wide)) for text, wide in zip(names, words, strict=True)])
-                styled = [_styled(designs, column, bool(wide)) for column, wide in zip(columns, words, strict=True)]
-            for values in _rows(table):
-                designs.append([_filled(cell, value) for cell, value in zip(styled, values, strict=True)])
-            rows += len(table)
-        if rows:
-            designs.auto_filter.ref = f"A1:{_letter(len(columns))}{rows + 1}"
-        sheet = book.create_sheet("about")
-        sheet.page_setup.orientation, sheet.page_setup.fitToHeight = "landscape", 0
-        sheet.sheet_properties.pageSetUpPr.fitToPage = True
-        _set_widths(sheet, ABOUT_WIDTHS)
-        for line in about(finished, columns, units):
-            sheet.append(_cells(line))
-    return rows
-
-
-def _set_widths(sheet: Any, widths: Iterable[float]) -> None:
-    """Set the widths of the columns of a sheet, in characters; before its first row."""
-    for column, width in enumerate(widths, 1):
-        sheet.column_dimensions[_letter(column)].width = width
-
-
-def _letter(column: int) -> str:
-    from openpyxl.utils import get_column_letter
-
-    return str(get_column_letter(column))
-
-
-def _longest(column: pa.ChunkedArray) -> int:
-    """Return the most characters of the words of a column, within reason; 0 for numbers."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
-    if not (pa.types.is_dictionary(column.type) or pa.types.is_string(column.type)):
-        return 0
-    words = [chunk.dictionary if pa.types.is_dictionary(column.type) else chunk for chunk in column.chunks]
-    longest = max((pc.max(pc.utf8_length(those)).as_py() or 1 for those in words), default=1)
-    return min(int(longest), MOST_CHARACTERS)
-
-
-def _head(sheet: Any, text: str, of_words: bool) -> Any:
-    """Return the cell of a header, which stands as the cells below it."""
-    from openpyxl.cell import WriteOnlyCell
-    from openpyxl.styles import Alignment, Font
-
-    cell = WriteOnlyCell(sheet, text)
-    cell.font = Font(name="Calibri", size=11, bold=True)
-    cell.alignment = Alignment(horizontal="left", indent=1) if of_words else Alignment(horizontal="right")
-    return cell
-
-
-def _styled(sheet: Any, column: Shown, of_words: bool) -> Any:
-    """Return the cell of a column that is filled for every row: rows are written one by one."""
-    from openpyxl.cell import WriteOnlyCell
-    from openpyxl.styles import Alignment
-
-    cell = WriteOnlyCell(sheet)
-    if of_words:
-        cell.alignment = Alignment(horizontal="left", indent=1)  # apart from a number at the right end of its cell
-    if column.unit in NUMBER_FORMATS and column.stored != DESIGN_ID.name:
-        cell.number_format = ERROR_FORMAT if "_error_" in column.name else NUMBER_FORMATS[column.unit]
-    return cell
-
-
-def _filled(cell: Any, value: Any) -> Any:
-    """Return a styled cell with a value; nothing needs no style."""
-    if value is None:
-        return value
-    cell.value = value
-    return cell
-
-
-@contextmanager
-def _workbook(target: BinaryIO) -> Iterator[Any]:
-    """Return a workbook that is written as it grows."""
     try:
         from openpyxl import Workbook
+        from openpyxl.utils import get_column_letter
     except ImportError as lacking:
         raise ReportError("spreadsheets need openpyxl: pip install 'boulder-sweep[report]'") from lacking
-    book = Workbook(write_only=True)
-    yield book
+
+    rows, columns, book = 0, list[Shown](), Workbook(write_only=True)
+    designs = book.create_sheet("designs")
+    designs.freeze_panes = "B2"
+    for columns, table in _tables(finished, units):
+        if rows == 0:  # widths come before the first row
+            for number, column in enumerate(columns, 1):
+                width = max(len(column.name) + 4, LEAST_WIDTH)
+                designs.column_dimensions[get_column_letter(number)].width = width
+            designs.append(_cells(column.name for column in columns))
+        for values in _rows(table):
+            designs.append(values)
+        rows += len(table)
+    if rows:
+        designs.auto_filter.ref = f"A1:{get_column_letter(len(columns))}{rows + 1}"
+    sheet = book.create_sheet("about")
+    for letter, width in ABOUT_WIDTHS.items():
+        sheet.column_dimensions[letter].width = width
+    for line in about(finished, columns, units):
+        sheet.append(_cells(line))
     book.save(target)
+    return rows

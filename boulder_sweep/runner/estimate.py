@@ -1,15 +1,11 @@
-"""What a run needs: rows by exact arithmetic; time, disk and memory from a timed sample."""
+"""What a run needs: rows by exact arithmetic; time and disk from a timed sample."""
 
 from __future__ import annotations
 
-import resource
 import shutil
-import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -31,23 +27,11 @@ BLOCK_S = 0.2
 at once."""
 TASK_S = 2.0
 """Work of one task of a cluster [s]: long compared with scheduling it, short enough to lose little with a worker."""
-_SAMPLE_S = (0.1, 0.5)
-"""Time of the largest sample [s]: up to the first, or `_SHARE` of the whole table's time up to the second."""
-_SHARE = 0.05
-"""Share of a table that is sampled, within the next limits: the run computes these rows again."""
-_SAMPLE_ROWS = (1536, 8192)
-"""Rows of the largest sample: fewer take more time and more bytes per row than the whole table."""
+_SAMPLES = (1, 16, 128, 1024, 8192)
+"""Rows of the samples, each computed if the one before lets expect no more than `_SAMPLE_S`; the last one counts."""
+_SAMPLE_S = 0.2
 _STRETCHES = 24
 """Positions all over the table from which a sample takes consecutive rows, equally many from each."""
-_GROWTH = 8
-"""Each sample has up to so many times the rows of the one before, as far as their time allows."""
-_BYTES_IN_PROGRESS = 400
-"""Memory per row between being handed out and being written: inputs, outcomes and encoding."""
-_LEAST_BYTES, _LEAST_BYTES_OF_CONTACT = 1, 24
-"""What a row takes at least, and what it takes besides where the truck meets the boulder: then it holds outcomes, which
-hardly compress. Tables of such rows take 37 bytes a row and more."""
-_MOST_LOOKED_AT = 1000
-"""Rows all over the table whose contact is looked at before anything is compiled."""
 _GOLDEN = 0.618033988749895
 
 
@@ -63,7 +47,6 @@ class RowCost(NamedTuple):
 
 _GUESS = RowCost(seconds_per_row=1e-5, bytes_per_row=50.0, bytes_per_part=30_000.0)
 """For a sweep none of whose sampled rows can be computed."""
-_ROOM = "Free some space, or choose another folder (-o)"
 
 
 @dataclass(frozen=True)
@@ -72,16 +55,12 @@ class Estimate:
 
     Parameters
     ----------
-    rows
-        Rows of the whole table.
-    rows_to_compute
-        Rows still missing.
+    rows, rows_to_compute
+        Rows of the whole table, and those still missing.
     seconds
         Time to compute them.
     disk_bytes, disk_free_bytes
-        Size of what will be written, and free space on that disk; None where no output was named.
-    memory_bytes, memory_free_bytes
-        Peak memory, and memory available; None where the system does not report it.
+        Size of what will be written, and free space on that disk; None where no folder on a disk was named.
     rows_per_second
         Of all workers together.
     rows_per_block
@@ -95,8 +74,6 @@ class Estimate:
     seconds: float
     disk_bytes: int
     disk_free_bytes: int | None
-    memory_bytes: int
-    memory_free_bytes: int | None
     rows_per_second: float
     rows_per_block: int
     jobs: int
@@ -104,18 +81,9 @@ class Estimate:
     @property
     def objections(self) -> list[str]:
         """List what does not fit, with numbers; empty if everything fits."""
-        objections = []
-        if self.disk_free_bytes is not None and self.disk_bytes > self.disk_free_bytes:
-            objections.append(
-                f"the table of {self.rows:,} rows needs about {size_text(self.disk_bytes)} of disk, "
-                f"and {size_text(self.disk_free_bytes)} are free. {_ROOM}"
-            )
-        if self.memory_free_bytes is not None and self.memory_bytes > self.memory_free_bytes:
-            objections.append(
-                f"{self.jobs} workers need about {size_text(self.memory_bytes)} of memory, "
-                f"and {size_text(self.memory_free_bytes)} are available. Free some memory, or use fewer --jobs"
-            )
-        return objections
+        if self.disk_free_bytes is None or self.disk_bytes <= self.disk_free_bytes:
+            return []
+        return [_too_large(self.rows, "about", self.disk_bytes, self.disk_free_bytes)]
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data."""
@@ -130,9 +98,9 @@ def take_sample(
 ) -> RowCost:
     """Compute a few rows spread over the table and measure the time; the kernels must be warm.
 
-    Samples grow from one row to the largest that is affordable, and that one counts: it is computed like a block of
-    the run, so that what a block costs besides its rows, and lanes that are not full, weigh as little as they will.
-    The time is that of the processor: while other programs keep it busy, blocks must not become shorter.
+    The largest sample counts: it is computed like a block of the run, so that what a block costs besides its rows, and
+    lanes that are not full, weigh as little as they will. The time is the processor's: while other programs keep it
+    busy, blocks must not become shorter.
 
     Parameters
     ----------
@@ -149,33 +117,21 @@ def take_sample(
 
     from boulder_sweep.store.schema import encode, part_table, table_schema
 
-    with suppress(Exception):  # what is computed first also loads what it needs, which takes time of its own
-        evaluation(sweep.plan.selection(_spread_rows(sweep.n_designs, 1)))
-    seconds_per_row, table, size = 0.0, None, 1
-    while size:
+    seconds_per_row, table = 0.0, None
+    for size in (1, *_SAMPLES):  # the first loads what it needs, which takes time of its own
+        if size > 1 and (table is None or size * seconds_per_row > _SAMPLE_S or len(table) == sweep.n_designs):
+            break
         begun = work_clock()
         try:
             block = sweep.plan.selection(_spread_rows(sweep.n_designs, size))
-            judged = evaluation(block)
+            table = part_table(block, evaluation(block), metadata)
         except Exception:  # the run itself will retry and name the rows; the sample before counts
             break
         seconds_per_row = (work_clock() - begun) / len(block)
-        table = part_table(block, judged, metadata)
-        size = _larger_sample(size, seconds_per_row, sweep.n_designs)
     if table is None:
         return _GUESS
     beside_rows = len(encode(pa.Table.from_batches([], table_schema(metadata))))
-    written = max(len(encode(table)) - beside_rows, 0)
-    return RowCost(seconds_per_row, written / len(table), beside_rows)
-
-
-def _larger_sample(size: int, seconds_per_row: float, rows: int) -> int:
-    """Return the rows of the sample after one of some size; 0 where not even twice as many are affordable."""
-    (fewest, most), (least, longest) = _SAMPLE_ROWS, _SAMPLE_S
-    largest = min(rows, max(fewest, min(int(_SHARE * rows), most)))
-    affordable = max(least, min(_SHARE * rows * seconds_per_row, longest)) / max(seconds_per_row, 1e-9)
-    larger = int(min(_GROWTH * size, affordable, largest))
-    return larger if larger >= min(2 * size, largest) and larger > size else 0
+    return RowCost(seconds_per_row, max(len(encode(table)) - beside_rows, 0) / len(table), beside_rows)
 
 
 def _spread_rows(rows: int, count: int) -> np.ndarray:
@@ -219,15 +175,12 @@ def estimated(
     rows_per_second = min(jobs, cores or jobs) / sample.seconds_per_row
     seconds = rows_to_compute / rows_per_second
     parts = max(-(-rows_to_compute // rows_per_part), int(seconds / COMMIT_EVERY_S))
-    memory = _BYTES_IN_PROGRESS * rows_in_progress(per_block, jobs, rows_per_part) + peak_memory()
     return Estimate(
         rows=rows,
         rows_to_compute=rows_to_compute,
         seconds=seconds,
         disk_bytes=int(rows_to_compute * sample.bytes_per_row + parts * sample.bytes_per_part),
         disk_free_bytes=None if out is None else _disk_free(out),
-        memory_bytes=memory,
-        memory_free_bytes=_memory_free(),
         rows_per_second=rows_per_second,
         rows_per_block=per_block,
         jobs=jobs,
@@ -250,38 +203,23 @@ def rows_per_task(estimate: Estimate, rows_per_part: int) -> int:
 
 
 def refuse_hopeless(sweep: Sweep, rows_to_compute: int, out: Location) -> None:
-    """Refuse, without compiling or computing anything, a table that cannot fit on the disk.
+    """Refuse, without compiling or computing anything, a table that cannot fit on the disk: a row takes a byte or more.
 
     Raises
     ------
     DoesNotFitError
         Says how much is needed at least, and how much is free.
     """
-    rows, free = sweep.n_designs, _disk_free(out)
-    if free is None:
-        return
-    least = rows_to_compute * _LEAST_BYTES
-    if least <= free < rows_to_compute * (_LEAST_BYTES + _LEAST_BYTES_OF_CONTACT):
-        least += int(rows_to_compute * _share_in_contact(sweep) * _LEAST_BYTES_OF_CONTACT)
-    if least > free:
-        raise DoesNotFitError(
-            f"the table of {rows:,} rows needs at least {size_text(least)} of disk, and {size_text(free)} are free. "
-            f"{_ROOM}"
-        )
+    free = _disk_free(out)
+    if free is not None and rows_to_compute > free:
+        raise DoesNotFitError(_too_large(sweep.n_designs, "at least", rows_to_compute, free))
 
 
-def _share_in_contact(sweep: Sweep) -> float:
-    """Share of some rows all over a table in which the truck meets the boulder."""
-    count = min(sweep.n_designs, _MOST_LOOKED_AT)
-    met = 0
-    for k in range(count):
-        row = k * sweep.n_designs // count
-        columns = sweep.block(row, row + 1).columns
-        height, depth, bumper = (
-            columns[name].to_numpy()[0] for name in ("boulder_height_m", "embedment_depth_m", "bumper_height_m")
-        )
-        met += bool(height - depth > bumper)
-    return met / count
+def _too_large(rows: int, about: str, needed: int, free: int) -> str:
+    return (
+        f"the table of {rows:,} rows needs {about} {size_text(needed)} of disk, and {size_text(free)} are free. "
+        f"Free some space, or choose another folder (-o)"
+    )
 
 
 def rows_in_progress(block: int, jobs: int, rows_per_part: int) -> int:
@@ -317,40 +255,3 @@ def _disk_free(out: Location) -> int | None:
     while not folder.exists() and folder != folder.parent:
         folder = folder.parent
     return shutil.disk_usage(folder).free
-
-
-def peak_memory() -> int:
-    """Return the peak memory of this process so far [bytes].
-
-    Linux reports it in ``/proc``; the value of `getrusage` includes the process that started this one, such as a
-    notebook with large tables.
-    """
-    peak = _process_memory("VmHWM")
-    if peak is None:
-        most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        return most if sys.platform == "darwin" else most * 1024
-    return peak
-
-
-def _process_memory(which: str) -> int | None:
-    """Return an entry of Linux on the memory of this process [bytes]; None on other systems."""
-    try:
-        return int(Path("/proc/self/status").read_text().split(f"{which}:")[1].split()[0]) * 1024
-    except (OSError, IndexError):
-        return None
-
-
-def _memory_free() -> int | None:
-    """Memory available to this process, its own included: the system's, or less if its control group is limited."""
-    try:
-        lines = Path("/proc/meminfo").read_text().splitlines()
-        free = next(int(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable:"))
-    except (OSError, StopIteration, ValueError):
-        return None
-    free += _process_memory("VmRSS") or 0
-    for name in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
-        try:
-            free = min(free, int(Path(name).read_text()))
-        except (OSError, ValueError):  # no such group, or "max"
-            continue
-    return free

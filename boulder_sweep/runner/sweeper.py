@@ -189,7 +189,7 @@ def estimate(
     Returns
     -------
     Estimate
-        Rows, time, disk and memory; `Estimate.objections` lists what does not fit.
+        Rows, time and disk; `Estimate.objections` lists what does not fit.
 
     Raises
     ------

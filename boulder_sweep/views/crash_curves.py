@@ -10,7 +10,7 @@ import numpy as np
 
 from boulder_sweep.crash_tests.cases import CLOSE_UNTIL_S, NAMES, PAPERS_N
 from boulder_sweep.crash_tests.measured import PULSE_UNITS
-from boulder_sweep.crash_tests.score import simulated_signal
+from boulder_sweep.crash_tests.overlay import simulated_signal
 from boulder_sweep.store.files import replacing
 from boulder_sweep.views import pictures
 from boulder_sweep.views.pictures import BLACK, BLUE, GREY, ORANGE
@@ -109,7 +109,7 @@ def _signal(axes: Axes, name: str, trajectories: Mapping[str, Trajectory], measu
     """Draw one signal under all presets."""
     title, label = next((title, label) for signal, title, label in MEASURED if signal == name)
     for preset, trajectory in trajectories.items():
-        style = STYLES.get(preset, {"color": BLACK})
+        style = STYLES[preset]
         words = f"simulated, {preset.replace('_', ' ')}"
         axes.plot(trajectory.time_s, simulated_signal(trajectory, name), label=words, **style)
         when = trajectory.motion.outcome.t_limit

@@ -1,11 +1,8 @@
-"""The side view: one instant drawn by matplotlib; animations as GIF (Pillow), MP4 (ffmpeg) and HTML with a slider."""
+"""The side view: one instant drawn by matplotlib; a GIF of the whole impact by Pillow."""
 
 from __future__ import annotations
 
-import shutil
-import subprocess
 from collections.abc import Iterable, Iterator
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -13,11 +10,11 @@ import numpy as np
 
 from boulder_sweep.errors import PictureError
 from boulder_sweep.store.files import replacing
-from boulder_sweep.text import ProgressCallback, script_data, why
+from boulder_sweep.text import ProgressCallback, why
 from boulder_sweep.views import pictures
 from boulder_sweep.views.scene import STYLES, SceneItem, SideView, samples_shown
 from boulder_sweep.views.time_curves import require_samples
-from boulder_sweep.views.wording import NOT_A_TEST, design_line, verdict_line
+from boulder_sweep.views.wording import NOT_A_TEST, verdict_line
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -112,7 +109,7 @@ def draw(axes: Axes, shapes: Iterable[SceneItem], *, behind: bool = False) -> li
     return artists
 
 
-KINDS = (".gif", ".mp4", ".html")
+KINDS = (".gif",)
 EVERY_S = 0.005
 """Time between two frames [s]."""
 MOST_FRAMES = 120
@@ -135,45 +132,22 @@ def animate(trajectory: Trajectory, path: str | Path, progress: ProgressCallback
     trajectory
         The impact.
     path
-        File to write: .gif, .mp4 (needs the program ffmpeg), or .html, one file with a player and a slider.
+        File to write (.gif).
     progress
         Called with how many frames of how many are drawn.
 
     Raises
     ------
     PictureError
-        There is nothing to draw, the kind is unknown, ffmpeg or matplotlib is missing, or the file cannot be written.
-    """
-    target = checked_animation(path)
-    require_samples(trajectory)
-    kind = target.suffix.lower()
-    try:
-        with replacing(target) as file:
-            if kind == ".html":
-                file.write(page(trajectory).encode())
-            elif kind == ".gif":
-                _write_gif(trajectory, file, progress)
-            else:
-                _write_mp4(trajectory, target, Path(file.name), progress)
-    except OSError as problem:
-        raise PictureError(f"{path} cannot be written: {why(problem)}") from problem
-
-
-def checked_animation(path: str | Path) -> Path:
-    """Return the path of an animation if it can be written there.
-
-    Raises
-    ------
-    PictureError
-        The kind is unknown, its folder does not exist or holds the result of a run, or ffmpeg is missing.
+        There is nothing to draw, the kind is unknown, matplotlib is missing, or the file cannot be written.
     """
     target = pictures.checked_kind(path, KINDS)
-    if target.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
-        raise PictureError(
-            f"{path}: an MP4 animation needs the program ffmpeg, which is not installed; "
-            f"{target.with_suffix('.gif').name} or {target.with_suffix('.html').name} need nothing more"
-        )
-    return target
+    require_samples(trajectory)
+    try:
+        with replacing(target) as file:
+            _write_gif(trajectory, file, progress)
+    except OSError as problem:
+        raise PictureError(f"{path} cannot be written: {why(problem)}") from problem
 
 
 def frames(trajectory: Trajectory, progress: ProgressCallback | None = None) -> Iterator[np.ndarray]:
@@ -182,7 +156,7 @@ def frames(trajectory: Trajectory, progress: ProgressCallback | None = None) -> 
     Yields
     ------
     ndarray of uint8, shape (height, width, 3)
-        One picture; height and width are even, as video formats require.
+        One picture.
     """
     pictures.require_matplotlib()
     import matplotlib
@@ -202,9 +176,7 @@ def frames(trajectory: Trajectory, progress: ProgressCallback | None = None) -> 
             title.set_text(view.caption(sample))
             moving = draw(axes, view.moving(sample))
             canvas.draw()
-            picture = np.asarray(canvas.buffer_rgba())[..., :3]
-            height, width = picture.shape[0] // 2 * 2, picture.shape[1] // 2 * 2
-            yield picture[:height, :width].copy()
+            yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
             for artist in moving:
                 artist.remove()
             if progress is not None:
@@ -229,61 +201,3 @@ def _write_gif(trajectory: Trajectory, target: BinaryIO, progress: ProgressCallb
     times = [1000 // FRAMES_PER_S] * (len(reduced) - 1) + [round(1000 * LAST_FRAME_S)]
     first, *others = reduced
     first.save(target, "GIF", save_all=True, append_images=others, duration=times, loop=0, optimize=True)
-
-
-def _write_mp4(trajectory: Trajectory, target: Path, passing: Path, progress: ProgressCallback | None) -> None:
-    """Pipe raw frames to ffmpeg, which writes a file that is there already."""
-    film = frames(trajectory, progress)
-    first = next(film)
-    height, width = first.shape[:2]
-    command = [
-        *("ffmpeg", "-y", "-loglevel", "error"),
-        *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(FRAMES_PER_S), "-i", "-"),
-        *("-an", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart"),
-        *("-f", "mp4", str(passing.absolute())),
-    ]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as encoder:
-        assert encoder.stdin is not None
-        try:
-            for picture in (first, *film):
-                encoder.stdin.write(picture.tobytes())
-        except BrokenPipeError:
-            pass  # it has said why and gone; its words are below
-        _, said = encoder.communicate()
-    if encoder.returncode != 0:
-        words = said.decode(errors="replace").strip()
-        raise PictureError(
-            f"{target}: ffmpeg could not make the animation: {words or f'exit code {encoder.returncode}'}"
-        )
-
-
-def page(trajectory: Trajectory) -> str:
-    """Return an HTML page that plays the side view: one file, no other resources.
-
-    The shapes of every frame travel as numbers and are drawn by the browser, so the page is small and sharp.
-    """
-    view = SideView(trajectory)
-    chosen = samples_shown(trajectory, MOST_FRAMES, EVERY_S)
-    window = view.window
-    content = {
-        "title": verdict_line(trajectory),
-        "design": design_line(trajectory),
-        "window": [window.left, window.right, window.bottom, window.top],
-        "styles": {name: style._asdict() for name, style in STYLES.items()},
-        "ground": [_plain(shape) for shape in view.ground()],
-        "captions": [view.caption(sample) for sample in chosen],
-        "frames": [[_plain(shape) for shape in view.moving(sample)] for sample in chosen],
-        "frames_per_s": FRAMES_PER_S,
-    }
-    template = (files("boulder_sweep.views") / "player.html").read_text(encoding="utf-8")
-    return template.replace("/*DATA*/null", script_data(content))
-
-
-def _plain(shape: SceneItem) -> dict[str, Any]:
-    """Return a shape as plain data, rounded to millimetres."""
-    plain: dict[str, Any] = {"k": shape.kind, "s": shape.style, "p": [[round(v, 3) for v in at] for at in shape.points]}
-    if shape.text:
-        plain["t"] = shape.text
-    if shape.radius:
-        plain["r"] = shape.radius
-    return plain

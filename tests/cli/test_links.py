@@ -21,7 +21,7 @@ WRITING = [
     ("simulate", CASE, "--plot", "impact.svg"),
     ("simulate", CASE, "--energy", "energy.png"),
     ("simulate", CASE, "--trajectory", "history.parquet"),
-    ("simulate", CASE, "--animate", "film.html"),
+    ("simulate", CASE, "--animate", "film.gif"),
 ]
 
 

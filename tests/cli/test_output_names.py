@@ -52,7 +52,7 @@ def nothing_computed(tmp_path, monkeypatch):
         (("--plot", "x.png", "--energy", "../{folder}/x.png"), "is named twice"),
         (("--trajectory", "t.csv"), "its name must end in .parquet"),
         (("--energy", "e.bmp"), "must end in .png, .svg, .pdf"),
-        (("--animate", "film.png"), "must end in .gif, .mp4, .html"),
+        (("--animate", "film.png"), "must end in .gif"),
         (("--plot", "x.png", "--animate", "no/film.gif"), "does not exist"),
     ],
 )

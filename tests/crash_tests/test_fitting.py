@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -57,7 +56,6 @@ def made(
     late: float = 0.0,
     offset_g: float = 0.0,
     filter_Hz: float | None = None,
-    integrated: bool = False,
     held: bool = False,
 ) -> Pulse:
     """A generated pulse; its times count from `late` seconds after first touch, and noise is a share of the peaks."""
@@ -66,9 +64,6 @@ def made(
     values = dict(zip(SIGNALS, known(wall, t), strict=True))
     sizes = {"displacement": 0.8, "velocity": 15.0, "acceleration": 150.0}
     scatter = {name: rng.normal(0.0, noise * sizes[name], len(t)) for name in SIGNALS}
-    if integrated:
-        scatter["velocity"] = np.cumsum(scatter["acceleration"]) * step
-        scatter["displacement"] = np.cumsum(scatter["velocity"]) * step
     if held:  # a crush is not measured before first touch
         values["displacement"] = np.maximum(values["displacement"], 0.0 * t)
     values = {name: values[name] + scatter[name] for name in signals}
@@ -113,16 +108,6 @@ NOISY: dict[str, dict[str, Any]] = {
     "early, filtered": {"late": -0.012, "filter_Hz": 100.0, "step": 5e-4, "noise": 0.06},
     "cut": {"end": 0.09},
     "displacement": {"signals": ("displacement",)},
-    "one accelerometer, integrated": {"signals": SIGNALS, "integrated": True},
-}
-AT_NIGHT: dict[str, dict[str, Any]] = {
-    "no rows before": {"start": 0.0},
-    "late, cut at its zero": {"late": 0.012, "start": 0.012},
-    "filtered with an offset": {"offset_g": -1.0, "filter_Hz": 100.0, "step": 5e-4, "noise": 0.06},
-    "velocity": {"signals": ("velocity",)},
-    "velocity, integrated": {"signals": ("velocity",), "integrated": True},
-    "displacement, integrated": {"signals": ("displacement",), "integrated": True},
-    "film and accelerometer": {"signals": ("displacement", "acceleration")},
     "all": {"signals": SIGNALS},
 }
 
@@ -135,10 +120,10 @@ def misses(fit: VehicleFit, wall: RigidWall) -> tuple[float, float]:
     )
 
 
-@pytest.mark.parametrize("kind", [*NOISY, *(pytest.param(kind, marks=pytest.mark.nightly) for kind in AT_NIGHT)])
+@pytest.mark.parametrize("kind", NOISY)
 def test_errors_are_as_stated(kind: str) -> None:
     """At least 9 of 10 records within the 95 % intervals, which are not far too wide either."""
-    fits = [fit_pulse(made(seed=seed, **(NOISY | AT_NIGHT)[kind]), PAPER.mass_kg) for seed in range(SEEDS)]
+    fits = [fit_pulse(made(seed=seed, **NOISY[kind]), PAPER.mass_kg) for seed in range(SEEDS)]
     found = np.array([misses(fit, PAPER) for fit in fits])
     assert np.all((np.abs(found) < 1.0).sum(axis=0) >= 9), found
     assert np.all(np.sqrt((found**2).mean(axis=0)) > 0.15), found
@@ -219,10 +204,6 @@ def stiffening(t: np.ndarray, k: float = 3e5, k_3: float = 8e6, damper: float = 
             Pulse("", TIMES, dict(zip(SIGNALS, (0.1 * known(PAPER, TIMES)[0], *known(PAPER, TIMES)[1:]), strict=True))),
             "no spring and damper in series come near it: the .* is off by",
         ),
-        (
-            Pulse("", TIMES, {"acceleration": stiffening(TIMES, k=1e4, k_3=3e7)}),
-            r"if first touch is then, take \d\d\.\d ms from its times",
-        ),
     ],
     ids=lambda value: "" if isinstance(value, Pulse) else value[:30],
 )
@@ -247,19 +228,15 @@ def test_impossible_vehicles_are_refused(mass: float, speed: float | None, messa
 
 
 def test_a_front_that_stiffens_is_named() -> None:
-    fit = fit_pulse(Pulse("", TIMES, {"acceleration": stiffening(TIMES, k=1e6, k_3=4e6)}), 6800.0)
-    assert any("not a spring and a damper" in warning for warning in fit.warnings)
+    fit = fit_pulse(Pulse("", TIMES, {"acceleration": stiffening(TIMES, k=1e4, k_3=3e7)}), 6800.0)
+    assert fit.touch_s == pytest.approx(0.0147, abs=1e-3)
+    assert any("stiffens as it is crushed" in warning for warning in fit.warnings)
 
 
-def test_first_touch_is_not_moved_to_where_a_front_stiffens_unless_the_user_says_so() -> None:
-    soft = {"acceleration": stiffening(TIMES, k=1e4, k_3=3e7)}
-    with pytest.raises(FitError) as refused:
-        fit_pulse(Pulse("", TIMES, soft), 6800.0)
-    told = re.search(r"if first touch is then, take (\d+\.\d) ms from its times", str(refused.value))
-    assert told is not None
-    fit = fit_pulse(Pulse("", TIMES - 1e-3 * float(told[1]), soft), 6800.0)
-    assert abs(fit.touch_s) < 1e-3
-    assert any("not a spring and a damper" in warning for warning in fit.warnings)
+def test_a_record_that_is_noisy_or_of_another_front_is_named() -> None:
+    fit = fit_pulse(made(noise=0.25), PAPER.mass_kg)
+    assert fit.misfits["acceleration"].share > 0.05
+    assert any(warning.startswith("the acceleration is off by ") for warning in fit.warnings)
 
 
 def test_an_accelerometer_without_rows_before_first_touch_is_named() -> None:
@@ -352,7 +329,7 @@ def test_command_prints_the_result_and_a_line_for_a_settings_file(sweep: Command
     assert (code, err) == (0, "")
     first, second = out.splitlines()[-2:]
     assert first == "vehicle: {mass: 6803.89 kg, speed: ...,"
-    assert second.startswith("          spring: 31")
+    assert second.startswith("          spring: 30")
     assert second.endswith(" kN*s/m}")
     assert (tmp_path / "fit.png").stat().st_size > 10_000
     code, out, _ = sweep("fit-vehicle", file, "--mass", "6800 kg", "--speed", "48.24 km/h", "--json")
@@ -369,7 +346,7 @@ def test_command_prints_the_result_and_a_line_for_a_settings_file(sweep: Command
         (["--mass", "heavy"], "not a number"),
         (["--mass", "15 lb"], "--mass: 6.80389 kg is far outside what vehicles have"),
         (["--mass", "6800 kg", "--speed", "30 deg"], "a speed is needed"),
-        (["--mass", "6800 kg", "--speed", "3.7 m/s"], "the record says 13.5 ± 0.3 m/s, --speed 3.7 m/s"),
+        (["--mass", "6800 kg", "--speed", "3.7 m/s"], "the record says 13.4 ± 0.1 m/s, --speed 3.7 m/s"),
         ([], "Missing option '--mass'"),
         (["--mass", "6800 kg", "--plot", "fit.jpeg"], "must end in .png"),
     ],

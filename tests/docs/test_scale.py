@@ -14,7 +14,7 @@ from docs.studies.scale import MOST_LOAD, VALUE, Plan, most_workers
 @pytest.mark.parametrize("workers", [1, 2, 64])
 def test_tasks_are_those_of_a_run(rows, workers):
     rate = workers / VALUE["row_cpu_s"]
-    estimate = Estimate(rows, rows, rows / rate, 0, None, 0, None, rate, 1000, workers)
+    estimate = Estimate(rows, rows, rows / rate, 0, None, rate, 1000, workers)
     assert Plan(rows, workers).rows_per_task == pytest.approx(rows_per_task(estimate, ROWS_PER_PART), rel=1e-3)
 
 

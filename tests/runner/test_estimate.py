@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import tracemalloc
 from dataclasses import replace
 
@@ -21,7 +19,6 @@ from boulder_sweep.runner.estimate import (
     RowCost,
     blocks,
     estimated,
-    peak_memory,
     rows_in_progress,
     rows_per_block,
     take_sample,
@@ -191,7 +188,6 @@ def test_an_estimate_is_in_proportion():
     ten = estimated(sample, rows=10**7, rows_to_compute=10**7, **common)
     assert ten.seconds == pytest.approx(10 * one.seconds)
     assert ten.disk_bytes == pytest.approx(10 * one.disk_bytes, rel=0.05)
-    assert ten.memory_bytes == pytest.approx(one.memory_bytes, rel=0.05)
     assert estimated(sample, rows=10**7, rows_to_compute=10**6, **common).seconds == one.seconds
 
 
@@ -206,15 +202,13 @@ def test_more_workers_than_cores_are_not_faster(monkeypatch):
 
 def test_objections_name_the_numbers():
     fits = Estimate(
-        rows=10, rows_to_compute=10, seconds=1.0, disk_bytes=100, disk_free_bytes=200, memory_bytes=100,
-        memory_free_bytes=200, rows_per_second=10.0, rows_per_block=1, jobs=1,
+        rows=10, rows_to_compute=10, seconds=1.0, disk_bytes=100, disk_free_bytes=200,
+        rows_per_second=10.0, rows_per_block=1, jobs=1,
     )  # fmt: skip
     assert fits.objections == []
     (disk,) = replace(fits, disk_bytes=3_000_000_000, disk_free_bytes=1_000_000).objections
     assert "3 GB" in disk
     assert "1 MB" in disk
-    (memory,) = replace(fits, memory_bytes=3_000_000_000, memory_free_bytes=1_000_000).objections
-    assert "3 GB" in memory
 
 
 def test_an_estimate_writes_nothing(tmp_path):
@@ -239,30 +233,6 @@ def test_a_grid_of_ten_to_the_twelve_is_refused_before_memory_grows(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_estimate_of_ten_to_the_twelve_is_exact_in_rows(monkeypatch):
-    """The memory is that of the run: whatever this process needed before counts for nothing here."""
-    monkeypatch.setattr("boulder_sweep.runner.estimate.peak_memory", lambda: 250_000_000)
+def test_an_estimate_of_ten_to_the_twelve_is_exact_in_rows():
     found = estimate(grid(**HUGE), simulate=plausible)
     assert found.rows == found.rows_to_compute == 10**12
-    assert found.memory_bytes < 2e9
-
-
-_LARGE_PARENT = """
-import subprocess, sys
-large = bytearray(b"1") * 600_000_000
-code = "from boulder_sweep.runner.estimate import peak_memory; print(peak_memory())"
-subprocess.run([sys.executable, "-c", code], check=True)
-"""
-
-
-def test_memory_of_the_process_that_started_this_one_does_not_count():
-    """A notebook with large tables starts a sweep: an estimate shall not take the notebook's memory for the sweep's."""
-    output = subprocess.run([sys.executable, "-u", "-c", _LARGE_PARENT], check=True, capture_output=True, text=True)
-    assert 10_000_000 < int(output.stdout.split()[-1]) < 500_000_000
-
-
-def test_memory_grows_with_what_is_held():
-    before = peak_memory()
-    held = bytearray(b"1") * 200_000_000
-    assert peak_memory() >= before
-    assert peak_memory() > len(held)

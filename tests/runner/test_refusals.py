@@ -7,9 +7,8 @@ import errno
 import pytest
 
 from boulder_sweep.errors import BackendError
-from boulder_sweep.runner import estimate, sweeper
+from boulder_sweep.runner import sweeper
 from boulder_sweep.runner.sweeper import run
-from boulder_sweep.settings import Sweep
 from boulder_sweep.store import files
 from boulder_sweep.store.failures import DoesNotFitError, OutputExistsError, StoreError, WriteError
 from tests.runner.grids import grid, grid_of
@@ -40,24 +39,6 @@ def test_a_grid_that_fits_on_no_disk(tmp_path):
     with pytest.raises(DoesNotFitError, match=r"1,000,000,000,000,000 rows needs at least 1 PB.*free.*another folder"):
         run(sweep, tmp_path / "out")
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(("height", "refused"), [("{from: 1.6 m, to: 3.4 m, count: 100}", True), ("0.6 m", False)])
-def test_a_grid_whose_outcomes_do_not_fit(tmp_path, monkeypatch, height, refused):
-    """Ten bytes a row are too little where the truck meets the boulder, and may do where it does not."""
-    sweep = grid(**(HUGE | {"height": height}))
-    monkeypatch.setattr(estimate, "_disk_free", lambda out: 10 * sweep.n_designs)
-    looked_at = []
-    block = Sweep.block
-    monkeypatch.setattr(Sweep, "block", lambda self, *rows: looked_at.append(rows) or block(self, *rows))
-    if refused:
-        with pytest.raises(DoesNotFitError, match=r"needs at least 25 TB of disk, and 10 TB are free"):
-            run(sweep, tmp_path / "out")
-        assert list(tmp_path.iterdir()) == []
-    else:
-        with pytest.raises(AssertionError, match="too late"):
-            run(sweep, tmp_path / "out")
-    assert 0 < sum(stop - start for start, stop in looked_at) <= estimate._MOST_LOOKED_AT
 
 
 def test_a_full_disk(tmp_path, monkeypatch):
