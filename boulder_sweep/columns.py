@@ -110,10 +110,6 @@ INPUTS: tuple[ColumnSpec, ...] = (
 )
 
 OPTIONAL_INPUTS: tuple[ColumnSpec, ...] = (
-    ColumnSpec("vehicle_second_spring_N_m", "float64", "N/m", "second spring of the vehicle's front, which stiffens"),
-    ColumnSpec(
-        "vehicle_second_spring_from_m", "float64", "m", "crush of the vehicle's front from which its second spring acts"
-    ),
     ColumnSpec("boulder_mass_kg", "float64", "kg", "mass of the boulder as weighed"),
 )
 """Inputs that a file may leave out without a default: their columns are in its tables only where it gives them."""
@@ -351,8 +347,6 @@ In tables of answers and of `sweep export`; those of runs have what they follow 
 COLUMNS: tuple[ColumnSpec, ...] = (DESIGN_ID, *INPUTS, *OUTCOMES)
 INPUT_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in INPUTS)
 OPTIONAL_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in OPTIONAL_INPUTS)
-SECOND_SPRING_COLUMNS: tuple[str, str] = ("vehicle_second_spring_N_m", "vehicle_second_spring_from_m")
-"""Those of a vehicle whose front stiffens."""
 BOULDER_MASS = "boulder_mass_kg"
 """That of a boulder that has been weighed."""
 OUTCOME_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in OUTCOMES)

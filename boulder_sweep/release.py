@@ -24,12 +24,10 @@ from boulder_kernels._cache import CACHE_VARIABLE, LEVELS, SHIPPED, SOURCES
 from boulder_sweep.store.files import put_file
 
 CONFIGS = Path(__file__).parents[1] / "configs"
-SPRINGS = "vehicle.spring=[{stiffness: 3103 kN/m}, {beyond: 0.5 m, stiffness: 9000 kN/m}]"
 WET, COHESIVE = "soil.water_table=0.5 m", "soil.cohesion=5 kPa"
 ELEMENTS = "model.soil={elements: 50}"
 VARIANTS: tuple[tuple[str, ...], ...] = (
     (),
-    (SPRINGS,),
     (WET,),
     (COHESIVE,),
     (ELEMENTS,),

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from boulder_kernels import Constants, Control, Design, Outcome, Readings, Record, SecondSpring
+from boulder_kernels import Constants, Control, Design, Outcome, Readings, Record
 from boulder_kernels.design import Body
 from boulder_kernels.dynamics import (
     FREE,
@@ -49,7 +49,6 @@ class Motion:
     record: Record
     outcome: Outcome
     """Of the whole motion that was recorded, beyond the limit."""
-    second: SecondSpring | None = None
 
     @property
     def body(self) -> Body:
@@ -77,8 +76,6 @@ class EnergyLedger:
         Kinetic energy of the vehicle.
     crush_spring_J, crush_damper_J : ndarray
         Stored in the spring of its front, and dissipated in the damper.
-    crush_spent_J : ndarray
-        Spent where a second spring took over (Eq 112); 0 without one.
     boulder_linear_J, boulder_angular_J : ndarray
         Kinetic energy of boulder and lumped soil.
     soil_elastic_J, soil_drag_J : ndarray
@@ -98,7 +95,6 @@ class EnergyLedger:
     vehicle_kinetic_J: np.ndarray
     crush_spring_J: np.ndarray
     crush_damper_J: np.ndarray
-    crush_spent_J: np.ndarray
     boulder_linear_J: np.ndarray
     boulder_angular_J: np.ndarray
     soil_elastic_J: np.ndarray
@@ -163,14 +159,13 @@ def ledger_of(motion: Motion) -> EnergyLedger:
     EnergyLedger
         Arrays of shape (n,).
     """
-    _, stored, (spent, before, since) = _evaluated(motion)
+    _, stored, (before, since) = _evaluated(motion)
     truck, linear, angular, elastic, spring, potential = stored
     drag, damper, restoring, pull = motion.record.exchanged.T
     parts = {
         "vehicle_kinetic_J": truck,
         "crush_spring_J": spring,
         "crush_damper_J": damper.copy(),
-        "crush_spent_J": spent,
         "boulder_linear_J": linear,
         "boulder_angular_J": angular,
         "soil_elastic_J": elastic - since,
@@ -189,12 +184,10 @@ def _evaluated(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     record, c, m_v = motion.record, motion.constants, motion.design.m_v
     n = len(record.times)
     rates, stored, spent = (
-        np.empty((count, n)) for count in (len(Acceleration._fields), len(StoredEnergies._fields), 3)
+        np.empty((count, n)) for count in (len(Acceleration._fields), len(StoredEnergies._fields), 2)
     )
-    if not len(record.offset):
-        record = record._replace(offset=np.zeros(n))
     if n:
-        evaluate_samples(record, at_sample(c, 0), motion.second, m_v, motion.readings, rates, stored, spent)
+        evaluate_samples(record, at_sample(c, 0), m_v, motion.readings, rates, stored, spent)
     return rates, stored, spent
 
 

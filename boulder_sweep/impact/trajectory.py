@@ -81,12 +81,7 @@ ENERGY: tuple[ColumnSpec, ...] = (
     _number("energy_residual_J", "J", "sum of all parts minus the vehicle's energy at first touch"),
 )
 
-SPENT = _number(
-    "energy_crush_spent_J", "J", "spent where the second spring of the vehicle's front took over: permanent crush"
-)
-"""Of vehicles with a second spring only."""
-
-_BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in (*HISTORY, *ENERGY, SPENT)}
+_BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in (*HISTORY, *ENERGY)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,8 +243,7 @@ class Trajectory:
         columns = {spec.name: getattr(self, spec.name) for spec in HISTORY}
         if energy:
             ledger = self.energy()
-            spent = () if self.motion.second is None else (SPENT,)
-            for spec in (*ENERGY, *spent):
+            for spec in ENERGY:
                 columns[spec.name] = getattr(ledger, spec.name.removeprefix("energy_"))
         return columns
 

@@ -217,9 +217,9 @@ def pilot_size(elements: int) -> int:
 
 def simulated(designs: Designs, readings: Readings, control: Control) -> OutcomeTable:
     """Simulate designs in pieces, so that an interruption takes effect soon."""
-    size = AT_ONCE if control.elements or designs.laws else AT_ONCE_CLOSED
+    size = AT_ONCE if control.elements else AT_ONCE_CLOSED
     rows = [designs.rows(slice(at, at + size)) for at in range(0, designs.size, size)] or [designs]
-    pieces = [simulate_table(some.table, readings, control, *some.laws) for some in rows]
+    pieces = [simulate_table(some.table, readings, control) for some in rows]
     return type(pieces[0])(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))
 
 

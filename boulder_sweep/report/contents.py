@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from boulder_kernels import ELASTIC, Control, Readings, SecondSpring, Status, rules
+from boulder_kernels import ELASTIC, Control, Readings, Status, rules
 from boulder_kernels.layered import PRESSURE_SLOPE
 from boulder_kernels.rules import OF_CRITERION, RULES
 from boulder_kernels.table import is_paired
-from boulder_sweep.columns import INPUTS, OPTIONAL_INPUTS, OUTCOMES, SECOND_SPRING_COLUMNS, TO_BUILD
+from boulder_sweep.columns import INPUTS, OPTIONAL_INPUTS, OUTCOMES, TO_BUILD
 from boulder_sweep.designs import LEAST_SOLIDITY, MOST_SOLIDITY, REASONS
 from boulder_sweep.investigation import family_bounds
 from boulder_sweep.judge.inputs import SOURCES
@@ -59,10 +59,7 @@ OUTCOME_WORDS = {
 """Outcomes of a design that the page shows."""
 
 
-REFUSED_AT = (
-    *("", "embedment_depth_m", "hood_height_m", "impact_height_m"),
-    *("vehicle_second_spring_N_m", "boulder_mass_kg", ""),
-)
+REFUSED_AT = ("", "embedment_depth_m", "hood_height_m", "impact_height_m", "boulder_mass_kg", "")
 """The inputs beside which the page says why a design cannot be computed, in the order of `REASONS`; of an unusual value
 it says so in its note."""
 FIXED_SIDES = ["boulder_length_m", "boulder_width_m", "boulder_height_m"]
@@ -274,7 +271,7 @@ def _layout() -> dict[str, Any]:
         "piece_room": page_records.PIECE_ROOM,
         "element_room": page_records.ELEMENT_ROOM,
         "memory_room": page_records.MEMORY_ROOM,
-        "columns": {**SOURCES, **dict(zip(SecondSpring._fields, SECOND_SPRING_COLUMNS, strict=True))},
+        "columns": SOURCES,
     }
 
 

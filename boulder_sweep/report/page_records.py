@@ -10,7 +10,7 @@ from typing import Any, get_type_hints
 
 import numpy as np
 
-from boulder_kernels import Control, Design, DesignTable, OutcomeTable, Readings, SecondSpring
+from boulder_kernels import Control, Design, DesignTable, OutcomeTable, Readings
 from boulder_kernels._jit import function_of, inlined
 from boulder_kernels.control import EVENT_TOLERANCE
 from boulder_kernels.ground import Ground
@@ -20,9 +20,9 @@ from boulder_kernels.plastic import LAST, Memory, is_plastic
 from boulder_kernels.rules import RULINGS, SIZES, FlagInputs, Tested, VerdictLimits
 from boulder_kernels.soil_laws import ELEMENT_LAWS
 
-DESIGN = (*Design._fields, *SecondSpring._fields)
-"""Inputs of a design, in this order; SI, phi in rad, beta in MN/m^3. A vehicle without a second spring has one like its
-first, from a crush on that it never reaches: its results have the same bits."""
+DESIGN = Design._fields
+"""Inputs of a design, in this order; SI, phi in rad, beta in MN/m^3."""
+DESIGN_COUNT = len(DESIGN)
 V_0, D, H = (DESIGN.index(name) for name in ("v_0", "d", "H"))
 SETTINGS = (*Readings._fields, *Control._fields)
 """Settings of the simulation, in this order; booleans are 0 or 1."""

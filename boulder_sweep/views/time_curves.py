@@ -20,7 +20,6 @@ from boulder_sweep.views.pictures import (
     GREY,
     LIGHT_GREY,
     ORANGE,
-    PALE_ORANGE,
     PURPLE,
     SKY,
     YELLOW,
@@ -236,8 +235,6 @@ def draw_energy(trajectory: Trajectory, path: str | Path, *, units: str = "si") 
         layers = [(getattr(ledger, name) / size, label, colour) for name, label, colour in LAYERS]
         if ledger.soil_plastic_J.max() > 0.0:
             layers.insert(3, (ledger.soil_plastic_J / size, "soil: pressed for good", BROWN))
-        if ledger.crush_spent_J.any():
-            layers.insert(1, (ledger.crush_spent_J / size, "crush of the vehicle (spent as it stiffened)", PALE_ORANGE))
         if np.abs(ledger.pull_J).max() > 0.0:
             layers.append((ledger.pull_J / size, "out of nothing (printed separation)", BLACK))
         handles = []

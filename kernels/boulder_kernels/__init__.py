@@ -12,7 +12,6 @@ from .design import Constants, Design, DesignTable, Readings, as_printed, consta
 from .impact import Problem, simulate, simulate_design
 from .outcomes import SIMULATED, Maxima, Outcome, OutcomesAtRest, OutcomeTable, Status
 from .plastic import ELASTIC, PLASTIC, PLASTIC_WITH_GAP
-from .second_spring import SecondSpring, SecondSprings
 from .table import simulate_table
 from .time_history import Record, no_record
 
@@ -32,8 +31,6 @@ __all__ = [
     "Problem",
     "Readings",
     "Record",
-    "SecondSpring",
-    "SecondSprings",
     "Status",
     "as_printed",
     "constants_of",

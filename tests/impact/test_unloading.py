@@ -83,7 +83,6 @@ def test_the_energy_ledger_closes_with_the_plastic_work(way):
         # these compile kernels that no other test needs
         pytest.param("soil.cohesion=5 kPa", marks=pytest.mark.nightly),
         pytest.param(
-            "vehicle.spring=[{stiffness: 3103.3 kN/m}, {beyond: 0.3 m, stiffness: 9000 kN/m}]",
             marks=pytest.mark.nightly,
         ),
     ],

@@ -165,5 +165,5 @@ def layered_constants(
 def simulate_plastic(design: bk.Design, readings: bk.Readings, how: bk.Control, record: bk.Record) -> Impact:
     """Simulate one impact in plastic soil."""
     profile = profile_of(design, None, how.elements, unloading=how.unloading, samples=len(record.times))
-    problem = bk.Problem(design, profile, None)
+    problem = bk.Problem(design, profile)
     return simulate_impact(problem, readings, how, record)

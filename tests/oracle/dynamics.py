@@ -46,15 +46,11 @@ class Modes:
         (printed reading: the boulder feels no force while the vehicle still obeys Eq 45).
     sign : float
         sign(sin(gamma_N + theta)) of Eqs 37 and 39, used by the printed 'forward' mode alone.
-    stage : int
-        1 until the crush x_v - x_contact has first reached s_2, 2 from then on. The force is continuous; what changes
-        is the spring of Eq 41, and with it the jerk of Eq 45.
     """
 
     rotation: Rotation
     contact: Contact
     sign: float = 1.0
-    stage: int = 1
 
 
 @dataclass(frozen=True)
@@ -153,7 +149,7 @@ def rate_under(impact: Problem, y: Array, modes: Modes, load: Loads) -> Array:
         a_v = x_v_3 = 0.0
     else:
         a_v = y[6]
-        x_v_3 = jerk(inputs.m_v, inputs.spring(modes.stage), inputs.c_v, y[6], y[5], load.v_contact)
+        x_v_3 = jerk(inputs.m_v, inputs.k_v, inputs.c_v, y[6], y[5], load.v_contact)
     v_b_1 = (load.soil.F + load.F_v) / impact.constants.m_eff
     # held: exactly no rotation, not just up to rounding
     omega_1 = 0.0 if modes.rotation == "held" else (load.net + load.M_R) / impact.constants.J_eff

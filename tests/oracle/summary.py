@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
 
 import numpy as np
 
@@ -23,8 +22,6 @@ class Summary:
         Largest absolute rotation [rad], x_b [m], x_v [m], crush [m] and F_v [N], with their times [s].
     t_end : float
         Simulated time [s].
-    second_spring_from : float
-        Time [s] from which the second spring of the vehicle acts; infinite where it never does.
     swing_back : float
         Largest absolute rotation less the least rotation after it [rad].
     left : tuple of float
@@ -37,14 +34,8 @@ class Summary:
     max_crush: Peak
     peak_force: Peak
     t_end: float
-    second_spring_from: float
     swing_back: float
     left: tuple[float, ...]
-
-    @property
-    def stiffened(self) -> bool:
-        """Whether the second spring of the vehicle was reached."""
-        return isfinite(self.second_spring_from)
 
 
 def summary_of(impact: Impact) -> Summary:
@@ -58,7 +49,6 @@ def summary_of(impact: Impact) -> Summary:
         max_crush=impact.max_crush,
         peak_force=impact.peak_force,
         t_end=impact.t_end,
-        second_spring_from=impact.time_of("second spring"),
         swing_back=turned.value - float(impact.states(after)[2].min()),
         left=tuple(float(x) for x in np.asarray(impact.solution(impact.t_end))[REMEMBERED:]),
     )

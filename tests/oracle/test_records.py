@@ -26,8 +26,8 @@ PARTS = 20
 def kind(case: dict[str, Any]) -> tuple[str, ...]:
     """What tells impacts apart beside their numbers."""
     given, readings, options = (case[name] for name in ("inputs", "readings", "options"))
-    soil, springs = given["ground"] is not None, given["k_2"] < np.inf
-    return (readings["restoring"], readings["contact"], str(soil), str(springs), *map(str, options.values()))
+    soil = given["ground"] is not None
+    return (readings["restoring"], readings["contact"], str(soil), *map(str, options.values()))
 
 
 def chosen(count: int) -> list[dict[str, Any]]:

@@ -153,7 +153,7 @@ class Kernel {
     const { design, history } = this.layout;
     const n = times.length;
     const { at, views } = this.room([
-      2, design.length, ...this.soilLengths(settings, 1, n), settings.length, n, 6 * n, 2 * n, 4 * n, n,
+      2, design.length, ...this.soilLengths(settings, 1, n), settings.length, n, 6 * n, 2 * n, 4 * n,
       history.length * n, 2,
     ]);
     design.forEach((name, field) => (views[1][field] = one[name]));
