@@ -32,7 +32,6 @@ VARIANTS: tuple[tuple[str, ...], ...] = (
     (COHESIVE,),
     (ELEMENTS,),
     (WET, ELEMENTS),
-    (ELEMENTS, "model.unloading=plastic_with_gap"),
     ("boulder.taper=0.8",),
 )
 """Settings for which kernels of their own are compiled."""

@@ -205,8 +205,8 @@ def need(
         raise QuestionError(f"--probability {probability}: must be more than 0 and less than 100 %")
     if robust and not can_be_asked(sweep):
         raise QuestionError(
-            "--robust: second opinions know boxes of rock of given density, elastic, dry, level, uniform soil without "
-            "cohesion and corrected readings only"
+            "--robust: second opinions know boxes of rock of given density, dry, level, uniform soil without cohesion "
+            "and corrected readings only"
         )
     if robust and chance is not None:
         raise QuestionError(

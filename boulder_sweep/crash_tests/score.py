@@ -23,7 +23,7 @@ from boulder_sweep.errors import ComparisonError
 from boulder_sweep.impact.simulation import SAMPLE_S, simulate
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.robustness import can_be_asked
-from boulder_sweep.settings.model import PRESETS, RESISTANCES, UNLOADINGS
+from boulder_sweep.settings.model import PRESETS, RESISTANCES
 from boulder_sweep.soils import with_law
 
 if TYPE_CHECKING:
@@ -270,22 +270,18 @@ def forms_of(sweep: Sweep, trajectories: Mapping[str, Trajectory], horizon_s: fl
     """
     forms = [_of_trajectory(f"paper's law, {preset.replace('_', ' ')}", t) for preset, t in trajectories.items()]
     model = sweep.model
-    other = [words for words, plain in zip((model.resistance, model.unloading), _PLAIN, strict=True) if words != plain]
+    other = [model.resistance] if model.resistance != RESISTANCES[0] else []
     if other or model.preset not in PRESETS:
-        words = ", ".join([model.preset.replace("_", " "), *(name.replace("_", " ") for name in other)])
+        words = ", ".join(name.replace("_", " ") for name in (model.preset, *other))
         forms.append(_of_trajectory(f"the file's model: {words}", simulate(sweep, horizon_s=horizon_s)))
     if can_be_asked(sweep):
         forms += [_of_opinion(sweep, law, horizon_s or sweep.solver.horizon_s) for law in model.second_opinion]
     return forms
 
 
-_PLAIN = (RESISTANCES[0], UNLOADINGS[0])
-"""Law of the resistance and unloading of the paper."""
-
-
 def by_the_paper(sweep: Sweep, preset: str, horizon_s: float | None) -> Trajectory:
     """Return the impact by the paper's law of the soil and a preset of readings."""
-    model = dataclasses.replace(sweep.model, resistance=_PLAIN[0], unloading=_PLAIN[1])
+    model = dataclasses.replace(sweep.model, resistance=RESISTANCES[0])
     return simulate(dataclasses.replace(sweep, model=model), readings=preset, horizon_s=horizon_s)
 
 

@@ -24,7 +24,7 @@ from boulder_sweep.judge.robustness import can_be_asked
 from boulder_sweep.judge.verdict import limits_of
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.settings import Sweep
-from boulder_sweep.settings.model import UNLOADINGS, Criterion, Ground, Model, ReadingChoice, SolverSettings, completed
+from boulder_sweep.settings.model import Criterion, Ground, Model, ReadingChoice, SolverSettings, completed
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import shown_values
 from boulder_sweep.settings.sweep import DesignList, allowed_in
@@ -215,7 +215,6 @@ def model_of(settings: dict[str, Any], control: Control) -> Model:
         control.elements,
         model["calibrated_crush_m"],
         model["resistance"],
-        unloading=UNLOADINGS[control.unloading],
         second_opinion=tuple(model.get("second_opinion", ())),
         foot=model["foot"],
         profile=Shape.of_model(model).points,

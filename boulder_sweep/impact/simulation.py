@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 
 from boulder_kernels import SIMULATED, Control, Outcome, Readings, Record, Status, no_record
+from boulder_kernels import simulate as simulate_impact
 from boulder_kernels.impact import simulate_last_resort
-from boulder_kernels.table import halved, is_layered, is_paired, problem_at, simulate_impact, step_of_solution
+from boulder_kernels.soil_laws import constants_in
+from boulder_kernels.table import halved, is_layered, is_paired, problem_at, step_of_solution
 from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.impact.history import Motion
 from boulder_sweep.impact.trajectory import Trajectory
@@ -134,8 +136,9 @@ def history_of(
     drawn = deciding._replace(stop_at_limit=False, horizon=_drawn_s(row, deciding.horizon))
     times = _sample_times(drawn.horizon, sample_s)
     record = _empty_record(times)
-    problem = problem_at(designs.table, 0, drawn, len(record.times))
-    outcome, c, *_ = simulate_impact(problem, how, drawn, record)
+    problem = problem_at(designs.table, 0, drawn)
+    outcome = simulate_impact(problem, how, drawn, record)
+    c = constants_in(problem.design, how, drawn.elements, problem.profile)
     motion = Motion(problem.design, how, c, drawn, _kept(record, times, outcome), outcome)
     decided = _decided(designs, how, deciding)
     return Trajectory.of(sweep.name, design_id, inputs, sweep.resolved(), motion, judged, decided)
@@ -205,7 +208,7 @@ def _deciding(control: Control, how: Readings, step_s: float | None, *, layered:
 def _decided(designs: Designs, how: Readings, control: Control) -> Outcome:
     """Return the impact up to where its row ends."""
     problem = problem_at(designs.table, 0, control)
-    outcome = simulate_impact(problem, how, control, no_record()).outcome
+    outcome = simulate_impact(problem, how, control, no_record())
     if control.last_resort and problem.profile is None and outcome.status not in (*SIMULATED, Status.NO_CONTACT):
         outcome = simulate_last_resort(problem, how, control, no_record())
     return outcome

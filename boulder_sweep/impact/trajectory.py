@@ -65,7 +65,6 @@ ENERGY: tuple[ColumnSpec, ...] = (
     _number("energy_boulder_linear_J", "J", "kinetic energy of boulder and soil wedge in translation"),
     _number("energy_boulder_angular_J", "J", "kinetic energy of boulder and soil wedge in rotation"),
     _number("energy_soil_elastic_J", "J", "stored in the springs of the soil"),
-    _number("energy_soil_plastic_J", "J", "plastic work of the soil; 0 in elastic soil"),
     _number("energy_soil_drag_J", "J", "dissipated by the drag of the soil"),
     _number(
         "energy_gravity_J",

@@ -15,11 +15,9 @@ import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, simulate_table
 from boulder_kernels._jit import plain
-from boulder_kernels.plastic import is_plastic
 from boulder_kernels.rules import SLOWER_SPEEDS, after_slower, is_asked_slower
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_kernels.table import some_rows
-from boulder_sweep.columns import AT_REST, OUTCOMES, OutcomeColumn
 from boulder_sweep.judge.accuracy import LONGEST_HORIZON, Accuracy, control_of, readings_of
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed, with_rows, worst_of
@@ -106,7 +104,7 @@ class Evaluation:
             return self.judged(self.designs(block))
         codes = np.asarray(block.reasons.codes)
         computable = codes == 0
-        refused = not_computed(tuple(block.reasons.texts[1:]), codes[~computable] - 1, self.columns)
+        refused = not_computed(tuple(block.reasons.texts[1:]), codes[~computable] - 1)
         if not computable.any():
             return joined([refused])
         both = joined([self.judged(self.designs(block, computable)), refused])
@@ -241,11 +239,6 @@ class Evaluation:
         unknown = np.full(len(rows), np.inf)
         doubted = some_rows(outcomes, rows)._replace(theta_error=unknown, x_error=unknown)
         return judge_once(doubted, designs.rows(rows), self.limits, self.only)
-
-    @property
-    def columns(self) -> tuple[OutcomeColumn, ...]:
-        """Outcome columns of the rows, where `only` does not leave some out."""
-        return (*OUTCOMES, *AT_REST) if is_plastic(self.control.unloading) else OUTCOMES
 
     def settings(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """Return readings and control as plain data, for the record."""

@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -24,9 +23,8 @@ from boulder_kernels.error_estimates import (
     step_errors,
 )
 from boulder_kernels.ground import Ground, put_soil
-from boulder_kernels.impact import failed, simulate_last_resort
-from boulder_kernels.outcomes import COARSER, FINER, NONE_NEEDED, SECOND, STEP, THETA_MAX, Status, write_outcome
-from boulder_kernels.plastic import memory_of
+from boulder_kernels.impact import simulate_last_resort
+from boulder_kernels.outcomes import COARSER, FINER, NONE_NEEDED, SECOND, STEP, THETA_MAX, write_outcome
 from boulder_kernels.rules import (
     SLOWER_SPEEDS,
     Confirmation,
@@ -43,18 +41,17 @@ from boulder_kernels.rules import (
     put_ruling,
     ruling_of,
 )
-from boulder_kernels.soil_laws import ELEMENT_LAWS, SoilProfile, constants_in
+from boulder_kernels.soil_laws import SoilProfile, constants_in
 from boulder_kernels.time_history import sample_of, state_of
-from boulder_kernels.unloading import plastic_work, recall
 from boulder_sweep.report.page_records import (
     BELOW,
     CHECKED,
     DESIGN_COUNT,
     ELEMENT_ROOM,
     GROUND_COUNT,
+    HISTORY_COUNT,
     LAYER_ROOM,
     LIMITS_COUNT,
-    MEMORY_ROOM,
     ONCE,
     PAIRED_AT,
     PIECE_ROOM,
@@ -65,21 +62,19 @@ from boulder_sweep.report.page_records import (
     D,
     H,
     copy_row,
+    elements_from,
     first_control,
     flag_inputs_at,
     given_control,
     halved_control,
     layers_from,
-    memory_from,
     outcome_at,
     outcomes_from,
     outlined_elements_from,
     pieces_from,
     readings_from,
     table_from,
-    taking_elements,
     tested_from,
-    written_out,
 )
 
 EXPORTS = {"rows": "pippipipipppippppp", "history": "pppipipipppipppppp"}
@@ -132,12 +127,10 @@ def write_history(
 ) -> None:
     """Evaluate motion, force and energies of a record."""
     centre[0], centre[1] = c.c_x, c.c_y
-    memory = memory_of(c)
     for i in range(record.times.size):
         y = state_of(record, i)
         if np.isnan(y.x_b):
             break
-        recall(i, memory)
         sample = sample_of(record, i, c, design.m_v, readings)
         stored, touching = sample.stored, record.touching[i] > 0.0
         drag, damper, restoring, pull = (
@@ -149,14 +142,12 @@ def write_history(
         out[0, i], out[1, i], out[2, i], out[3, i], out[4, i], out[5, i] = y
         out[6, i] = record.touching[i]
         out[7, i] = -design.m_v * sample.rate.a_v if touching else 0.0
-        before, since = plastic_work(y, c, memory)
         out[8, i], out[9, i], out[10, i], out[11, i] = (
             stored.truck_kinetic,
             stored.boulder_kinetic,
             stored.boulder_rotational,
-            stored.soil_elastic - since,
+            stored.soil_elastic,
         )
-        out[17, i] = before + since
         out[12, i] = stored.crush_elastic
         out[13, i] = stored.gravity if readings.restoring_gravity else restoring
         out[14, i], out[15, i], out[16, i] = drag, damper, -pull
@@ -180,24 +171,6 @@ def simulate_recorded(
     return outcome
 
 
-def by_element_laws() -> Callable[..., Outcome]:
-    """Return a kernel that simulates one design in soil elements of the law that its control asks for."""
-    last = "design, readings, control, record, out, centre"
-    lines, names = [f"def simulate(layers, room, memories, {last}):"], {}
-    for code, law in enumerate(ELEMENT_LAWS):
-        names[f"elements_{code}"] = taking_elements(law.record)
-        memory = None if law.gap is None else f"memory_from(room, control.elements, {law.gap}, memories)"
-        lines.append(f"if control.unloading == {code}:")
-        lines.append(f" soil_{code} = SoilProfile(layers, elements_{code}(room, control.elements), {memory})")
-        lines.append(f" return simulate_recorded(soil_{code}, {last})")
-    lines.append("return failed(INVALID)")
-    known = {"SoilProfile": SoilProfile, "memory_from": memory_from, "simulate_recorded": simulate_recorded}
-    return written_out("\n ".join(lines), failed=failed, INVALID=Status.INVALID.value, **known, **names)
-
-
-simulate_by_elements = by_element_laws()
-
-
 @array_kernel
 def simulate_in_soil(
     layers: np.ndarray,
@@ -211,9 +184,8 @@ def simulate_in_soil(
     centre: np.ndarray,
 ) -> Outcome:
     """Simulate one design in its soil; layers, outline and room for the soil are as of `history`."""
-    m, points, n, samples = len(layers), len(outline), control.elements, record.times.size
-    kept = samples * (2 * n + 1)
-    room = carray(soil_at, (kept + ELEMENT_ROOM * n + MEMORY_ROOM,))[kept:]
+    m, points, n = len(layers), len(outline), control.elements
+    room = carray(soil_at, (ELEMENT_ROOM * n + 1,))
     if m == 0 and control.last_resort and control.stop_at_limit:
         return simulate_last_resort(Problem(design, None), readings, control, record)
     if m == 0:
@@ -221,18 +193,17 @@ def simulate_in_soil(
     if points > 0 and n == 0:
         k = m + points - 2
         pieces = pieces_from(carray(soil_at, (7, k)), carray(soil_at, (PIECE_ROOM * k,))[7 * k :], outline)
-        in_pieces = SoilProfile(layers, pieces, None)
+        in_pieces = SoilProfile(layers, pieces)
         return simulate_recorded(in_pieces, design, readings, control, record, out, centre)
     if points > 0:
-        beside = SoilProfile(layers, outlined_elements_from(room, n, outline), None)
+        beside = SoilProfile(layers, outlined_elements_from(room, n, outline))
         return simulate_recorded(beside, design, readings, control, record, out, centre)
     if n == 0:
-        in_layers = SoilProfile(
-            layers, layers_from(carray(soil_at, (6, m)), carray(soil_at, (LAYER_ROOM * m,))[6 * m :]), None
-        )
+        numbers = layers_from(carray(soil_at, (6, m)), carray(soil_at, (LAYER_ROOM * m,))[6 * m :])
+        in_layers = SoilProfile(layers, numbers)
         return simulate_recorded(in_layers, design, readings, control, record, out, centre)
-    memories = carray(soil_at, (samples, 2 * n + 1))
-    return simulate_by_elements(layers, room, memories, design, readings, control, record, out, centre)
+    by_elements = SoilProfile(layers, elements_from(room, n))
+    return simulate_recorded(by_elements, design, readings, control, record, out, centre)
 
 
 @array_kernel
@@ -249,7 +220,7 @@ def solve(
 ) -> int:
     """Simulate one design, write its outcome with the error of its steps, and return which second one it needs."""
     design = design_in(designs, row)
-    nothing, nowhere = carray(soil_at, (18, 0)), carray(soil_at, (0,))
+    nothing, nowhere = carray(soil_at, (HISTORY_COUNT, 0)), carray(soil_at, (0,))
     soil = layers[row], outlines[row], soil_at
     outcome = simulate_in_soil(*soil, design, readings, control, record, nothing, nowhere)
     out[:, row] = np.nan
@@ -374,13 +345,13 @@ def rows(
     profile_at, points
         Profile of the boulders, shape (points, 4); no points for boxes.
     layers_at, m
-        Room for the layers of their soil, shape (n, m, 6), see `boulder_kernels.layered`; none for a uniform elastic
-        soil beside boxes.
+        Room for the layers of their soil, shape (n, m, 6), see `boulder_kernels.layered`; none for a uniform soil
+        beside boxes.
     outlines_at
         Room for the outlines of the boulders, shape (n, points, 4), see `boulder_kernels.outlined`.
     soil_at
         Room for the soil of one design: for its layers, LAYER_ROOM m numbers, for its pieces beside an outline,
-        PIECE_ROOM (m + points - 2), or for N soil elements ELEMENT_ROOM N + MEMORY_ROOM.
+        PIECE_ROOM (m + points - 2), or for N soil elements ELEMENT_ROOM N + 1.
     controls_at, count
         Settings, shape (count, len(SETTINGS)): the first, and finer ones in the order of
         `boulder_sweep.judge.refinement.finer_controls`. With one alone a late row counts as it is, and slower trucks
@@ -446,8 +417,7 @@ def history(
     design_from
         Inputs, shape (len(DESIGN),); K_epsilon is written over.
     ground_at, below_at, deeper, profile_at, points, layers_at, m, outline_at, soil_at
-        The soil as it lies and room for what follows from it, as of `rows` for one design; with soil elements the
-        last is room for n samples, too.
+        The soil as it lies and room for what follows from it, as of `rows` for one design.
     settings_at
         Settings, shape (len(SETTINGS),).
     n, times_at
@@ -466,7 +436,11 @@ def history(
     layers, outlines = carray(layers_at, (1, m, 6)), carray(outline_at, (1, points, 4))
     put_soils(designs, ground_at, below_at, deeper, carray(profile_at, (points, 4)), layers, outlines)
     design = design_in(designs, 0)
-    out, modes, exchanged = carray(history_at, (18, n)), carray(modes_at, (2, n)), carray(exchanged_at, (n, 4))
+    out, modes, exchanged = (
+        carray(history_at, (HISTORY_COUNT, n)),
+        carray(modes_at, (2, n)),
+        carray(exchanged_at, (n, 4)),
+    )
     record = Record(carray(times_at, (n,)), carray(states_at, (n, 6)), modes[0], modes[1], exchanged)
     out[:] = np.nan
     record.states[:] = np.nan

@@ -18,7 +18,7 @@ from boulder_sweep.settings import fields
 from boulder_sweep.settings.distributions import BOUNDED, Distribution, SetDistributions
 from boulder_sweep.settings.entries import Entries
 from boulder_sweep.settings.fields import BY_NAME, Field
-from boulder_sweep.settings.model import UNLOADINGS, WATER_KG_M3, Layer, Model, SolverSettings
+from boulder_sweep.settings.model import WATER_KG_M3, Layer, Model, SolverSettings
 from boulder_sweep.settings.problems import Position, Problem
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.sweep import Sweep
@@ -129,7 +129,6 @@ def check_pairs(entries: Entries) -> None:
         key = "hood_height" if "vehicle.hood_height" in entries.given else "bumper_height"
         entries.report(f"vehicle.{key}", f"the hood ({hood:g} m) is lower than the bumper ({bumper:g} m)")
     _check_impact_height(entries, bumper)
-    _check_shape(entries)
     _check_mass(entries)
     _check_solver(entries)
     _check_uncertain(entries)
@@ -152,14 +151,6 @@ def _check_impact_height(entries: Entries, bumper: float | None) -> None:
 def shape_in(entries: Entries) -> Shape:
     """Return the shape of the boulders, as far as it can be read."""
     return Model(**{name: entries.settings[name] for name in ("profile", "taper") if name in entries.settings}).shape
-
-
-def _check_shape(entries: Entries) -> None:
-    """Report soil that is not elastic beside a boulder that is no box."""
-    key = "profile" if "profile" in entries.settings else "taper"
-    if not shape_in(entries).is_box and entries.settings.get("unloading", UNLOADINGS[0]) != UNLOADINGS[0]:
-        message = f"soil that is not elastic is modelled beside boxes only; remove boulder.{key} or model.unloading"
-        entries.report(f"boulder.{key}", message)
 
 
 def _check_mass(entries: Entries) -> None:

@@ -54,11 +54,9 @@ from .error_estimates import error_time
 from .events import NONE, SHORTEN, locate_limit
 from .modes import change_mode, changes_counted, initial_modes, length_after
 from .outcomes import Outcome, Status, compression_at, no_maxima, undefined_maxima
-from .plastic import memory_of
 from .settling import NO_PROOF, boulder_energy
 from .soil_laws import constants_in
 from .time_history import Record, add_exchanged, nothing_exchanged, write_samples
-from .unloading import forget, rate_after, remember, until_rest
 
 FULL_TURN = math.pi
 """Rotation at which a simulation that does not stop at the limit ends [rad]: the boulder is upside down."""
@@ -76,12 +74,12 @@ class Problem(NamedTuple):
     design: Design
     """The design, SI."""
     profile: Any
-    """`SoilProfile` of its soil; None for the uniform elastic soil of the design."""
+    """`SoilProfile` of its soil; None for the uniform soil of the design."""
 
 
 @kernel
 def simulate_design(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
-    """Simulate one impact in a uniform elastic soil; see `simulate`."""
+    """Simulate one impact in a uniform soil; see `simulate`."""
     return simulate(Problem(design, None), readings, control, record)
 
 
@@ -115,18 +113,6 @@ def simulate(problem: Problem, readings: Readings, control: Control, record: Rec
     if misses(problem.design):
         return failed(Status.NO_CONTACT.value)
     c = constants_in(problem.design, readings, control.elements, problem.profile)
-    return simulate_motion(c, readings, control, record)
-
-
-@inlined
-def misses(design: Design) -> bool:
-    """Whether the truck passes over the boulder."""
-    return design.H - design.d <= design.e_bumper
-
-
-@kernel
-def simulate_motion(c: Constants, readings: Readings, control: Control, record: Record) -> Outcome:
-    """Simulate one impact of known constants; see `simulate`, which also asks whether the truck hits at all."""
     if not is_computable(c):
         return failed(Status.INVALID.value)
     theta_stop = control.theta_limit if control.stop_at_limit else FULL_TURN
@@ -140,6 +126,12 @@ def simulate_motion(c: Constants, readings: Readings, control: Control, record: 
     return outcome
 
 
+@inlined
+def misses(design: Design) -> bool:
+    """Whether the truck passes over the boulder."""
+    return design.H - design.d <= design.e_bumper
+
+
 @kernel
 def simulate_by_steps(
     h_touching: float,
@@ -151,8 +143,6 @@ def simulate_by_steps(
     record: Record,
 ) -> Outcome:
     """Simulate one impact with given time steps [s] while the truck touches and while not; see `simulate`."""
-    memory = memory_of(c)
-    forget(memory)
     ending = ending_of(control, readings, h_apart)
     budget = float(MOST_STEPS) if control.last_resort else attempt_budget(h_apart, ending.longest)
     h_full = h_touching
@@ -187,7 +177,6 @@ def simulate_by_steps(
                 h_next = kept.tau * h
                 continue
             decided = decide(t, h, y, kept, barrier, horizon, ending, c)
-            decided = until_rest(decided, kept.y, ending, c, memory)
             end = compression_at(kept.y, switches, c)
         h_next, m, barrier, horizon = h_full, kept.m, decided.barrier, decided.horizon
         error += step_error
@@ -200,7 +189,6 @@ def simulate_by_steps(
             if recording:
                 written = write_samples(record, written, t, h, kept.tau, dense, modes, switches, c, exchanged)
                 exchanged = add_exchanged(exchanged, dense, h, kept.tau, modes, switches, c)
-        remember(y, kept.y, kept.tau * h, c, memory)
         begun, t = t, decided.t
         if decided.status != RUNNING:
             if decided.status == Status.LIMIT.value:
@@ -209,7 +197,7 @@ def simulate_by_steps(
             yield_located = control.locate_yield and control.elements == 0
             moved = error_time(h_full, yield_located) * error
             return Outcome(decided.status, m, t_limit, t, attempts, moved, kept.y.omega_b, rotation_changes)
-        y, k1, start = kept.y, rate_after(k_end, kept.y, switches, c, memory), end
+        y, k1, start = kept.y, k_end, end
         if kept.event > NONE:
             rotation_changes += changes_counted(kept.event, begun, modes)
             y, modes = change_mode(int(kept.event), y, rate_of(y, switches, c).M, modes, c)
@@ -262,7 +250,7 @@ def simulate_last_resort(problem: Problem, readings: Readings, control: Control,
     Parameters
     ----------
     problem
-        The design; the soil is the uniform elastic soil of the design.
+        The design; the soil is the uniform soil of the design.
     readings, control, record
         As of `boulder_kernels.impact.simulate`; the record keeps nothing.
     """

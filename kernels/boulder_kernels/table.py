@@ -9,56 +9,44 @@ import numpy as np
 from ._jit import array_kernel, kernel, plain, unless_none
 from .control import EVENT_TOLERANCE, STEP_RATIO, Control
 from .design import DesignTable, Readings, design_at, design_in
-from .dynamics import State
 from .error_estimates import (
     SAFETY,
     SAFETY_CONFIRMED,
     SAFETY_PRINTED,
-    add_rest_error,
     confirm_errors,
     estimate_errors,
     step_errors,
 )
-from .impact import Problem, failed, misses, simulate, simulate_last_resort, simulate_motion
+from .impact import Problem, simulate, simulate_last_resort
 from .lanes import simulate_lanes
 from .layered import (
     LAYERED,
     PRESSURE,
-    PRESSURE_SLOPE,
-    LayeredTable,
     OutlinedTable,
     filled_layers,
     lanes_count,
-    uniform_layers,
 )
 from .outcomes import (
     COARSER,
     FINER,
-    NONE_NEEDED,
     PAIR,
     SECOND,
-    SIMULATED,
-    Outcome,
-    OutcomesAtRest,
     OutcomeTable,
-    Status,
     empty_outcomes,
     outcome_table,
     write_outcome,
 )
 from .outlined import given_beside, with_outline
-from .plastic import ELASTIC, LAST, SWING, is_plastic, memory_of
 from .settling import proof_is_possible
-from .soil_laws import SoilProfile, constants_in, empty_soil, profile_of
+from .soil_laws import SoilProfile, empty_soil, profile_of
 from .time_history import Record, no_record
-from .unloading import rest_of
 from .workspace import LayeredLanes, OutlinedLanes, TaperedLanes
 
 
 @array_kernel
 def take_profile(row: int, soil: Any, layers: np.ndarray) -> SoilProfile:
     """Return the soil of one design of a table in layers, shape (n, M, 6)."""
-    return SoilProfile(layers[row], soil, None)
+    return SoilProfile(layers[row], soil)
 
 
 @array_kernel
@@ -109,7 +97,7 @@ def simulate_rows(
     readings: Readings,
     control: Control,
 ) -> np.ndarray:
-    """Simulate designs one by one, in any elastic soil.
+    """Simulate designs one by one, in any soil.
 
     Parameters
     ----------
@@ -129,60 +117,12 @@ def simulate_rows(
     return out
 
 
-class Impact(NamedTuple):
-    """One impact of a table; of a boulder in plastic soil also where it comes to rest, else NaN."""
-
-    outcome: Outcome
-    constants: Any
-    """Constants of the design, with what plastic soil remembers in the end and remembered at every sample."""
-    theta_rest: float
-    """Rotation in which the boulder comes to rest [rad]; NaN where nothing is known of it."""
-    doubt: float
-    """By how much it may be another, by the energy that is left [rad]."""
-    swing_back: float
-    """How far the boulder has swung back from its largest rotation [rad]."""
-
-
-def problem_at(table: DesignTable, row: int, control: Control, samples: int = 0) -> Problem:
-    """Return one row of a table as a problem, with room for as many samples as a record has."""
+def problem_at(table: DesignTable, row: int, control: Control) -> Problem:
+    """Return one row of a table as a problem."""
     design = design_at(table, row)
     layers = table.layers[row] if isinstance(table, LAYERED) else None
     outline = table.outlines[row] if isinstance(table, OutlinedTable) else None
-    return Problem(design, profile_of(design, layers, control.elements, outline, control.unloading, samples))
-
-
-def simulate_impact(problem: Problem, readings: Readings, control: Control, record: Record) -> Impact:
-    """Simulate one impact, and find where a boulder in plastic soil comes to rest; arguments: see `simulate`.
-
-    In plastic soil no step is cut where the soil yields, because what yields depends on what it remembers.
-    """
-    c = constants_in(problem.design, readings, control.elements, problem.profile)
-    if memory_of(c) is None:
-        return Impact(simulate(problem, readings, control, record), c, np.nan, np.nan, np.nan)
-    if misses(problem.design):
-        return Impact(failed(Status.NO_CONTACT.value), c, np.nan, np.nan, np.nan)
-    outcome = simulate_motion(c, readings, control._replace(locate_yield=False), record)
-    y = State(*c.memory.so_far[LAST:])
-    if outcome.status not in SIMULATED or outcome.status == Status.LIMIT:
-        return Impact(outcome, c, np.nan, np.nan, np.nan)
-    swing_back = float(c.memory.so_far[SWING])
-    if y.v_v > 0.0 or not plain(proof_is_possible)(readings):
-        return Impact(outcome, c, np.nan, np.nan, swing_back)
-    rest = rest_of(y, control.theta_limit, c)
-    return Impact(outcome, c, rest.theta, rest.doubt, swing_back)
-
-
-def simulate_plastic_rows(table: DesignTable, readings: Readings, control: Control) -> Any:
-    """Simulate every design of a table once in plastic soil; ``rest_error`` is without a numerical error."""
-    n = len(table.L)
-    out, rest = empty_outcomes(n), np.full((3, n), np.nan)
-    for row in range(n):
-        problem = problem_at(table, row, control)
-        impact = simulate_impact(problem, readings, control, no_record())
-        errors = step_errors(impact.outcome, problem.design, control.theta_limit, control.horizon)
-        write_outcome(out, row, impact.outcome, errors)
-        rest[:, row] = impact.theta_rest, impact.swing_back, impact.doubt
-    return OutcomesAtRest(*outcome_table(out, step_of_solution(control)), *rest)
+    return Problem(design, profile_of(design, layers, control.elements, outline))
 
 
 def finer_step(step: float) -> float:
@@ -244,12 +184,6 @@ def simulate_once(table: DesignTable, readings: Readings, control: Control) -> t
         Which second solution each of them needs, see `boulder_kernels.outcomes.StepErrors`.
     """
     n = len(table.L)
-    if control.unloading != ELASTIC and not isinstance(table, LAYERED):
-        uniform = np.array([uniform_layers(design_at(table, row)) for row in range(n)])
-        table = LayeredTable(*table, uniform.reshape(n, 1, PRESSURE_SLOPE + 1))
-    if is_plastic(control.unloading):
-        outcomes: OutcomeTable = simulate_plastic_rows(table, readings, control)
-        return outcomes, np.full(n, NONE_NEEDED)
     designs = np.stack(table[: len(DesignTable._fields)])
     layers: np.ndarray | None = getattr(table, "layers", None)
     outlines: np.ndarray | None = getattr(table, "outlines", None)
@@ -267,7 +201,7 @@ def simulate_once(table: DesignTable, readings: Readings, control: Control) -> t
         soil = None
         if layers is not None:
             outline = None if outlines is None else outlines[0]
-            soil = empty_soil(layers.shape[1], control.elements, outline, control.unloading)
+            soil = empty_soil(layers.shape[1], control.elements, outline)
         out = simulate_rows(designs, layers, outlines, soil, readings, control)
     return outcome_table(out, step_of_solution(control)), out[SECOND]
 
@@ -283,9 +217,9 @@ def is_paired(readings: Readings, control: Control, *, layered: bool) -> bool:
     """Return whether every design is solved twice for its error, where errors are estimated.
 
     What is read as printed may jump within a step, unseen by the error of the steps, and a soil in layers yields at
-    many instants. The error time of element sums and of plastic soil has not been measured.
+    many instants. The error time of element sums has not been measured.
     """
-    measured = control.elements == 0 and control.unloading == ELASTIC and not (layered or control.last_resort)
+    measured = control.elements == 0 and not (layered or control.last_resort)
     return control.paired or not measured or not plain(proof_is_possible)(readings)
 
 
@@ -351,7 +285,7 @@ def simulate_table(table: DesignTable, readings: Readings, control: Control) -> 
     Returns
     -------
     OutcomeTable
-        Arrays of shape (n,), in the order of the designs; `OutcomesAtRest` for plastic soil.
+        Arrays of shape (n,), in the order of the designs.
     """
     if not control.error_estimate:
         return simulate_once(table, readings, control)[0]
@@ -362,6 +296,4 @@ def simulate_table(table: DesignTable, readings: Readings, control: Control) -> 
     fine, _ = simulate_once(table, readings, refined)
     safety = SAFETY if readings.restoring_gravity else SAFETY_PRINTED
     estimate_errors(out, fine, DesignTable(*table[: len(DesignTable._fields)]), safety)
-    if is_plastic(control.unloading):
-        add_rest_error(out, fine, safety)
     return fine

@@ -29,10 +29,8 @@ from .dynamics import (
     switches_of,
 )
 from .numerics import sine_versine
-from .plastic import memory_of
 from .soil import soil_kinematics
 from .soil_laws import drag_power, soil_energy
-from .unloading import note, plastic_work, recall
 
 GAUSS_NODES = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262)
 GAUSS_WEIGHTS = (0.17392742256872692, 0.32607257743127305, 0.32607257743127305, 0.17392742256872692)
@@ -191,7 +189,6 @@ def write_samples(
         states = record.states[written]
         states[0], states[1], states[2] = y.x_b, y.v_b, y.theta_b
         states[3], states[4], states[5] = y.omega_b, y.x_v, y.v_v
-        note(written, memory_of(c))
         record.turning[written] = modes.turning
         record.touching[written] = modes.touching
         so_far = add_exchanged(exchanged, dense, h, tau, modes, switches, c)
@@ -212,7 +209,7 @@ class Sample(NamedTuple):
     rate: Acceleration
     """Accelerations, and the moment of soil and truck without the restoring moment."""
     stored: StoredEnergies
-    """Stored energies [J]; of plastic soil, what its elements would give back."""
+    """Stored energies [J]."""
 
 
 @inlined
@@ -250,16 +247,15 @@ def evaluate_samples(
     readings: Readings,
     rates: np.ndarray,
     stored: np.ndarray,
-    spent: np.ndarray,
 ) -> None:
-    """Evaluate the samples of a record in elastic or plastic soil.
+    """Evaluate the samples of a record.
 
     Parameters
     ----------
     record
         The record, with n samples.
     c
-        Constants of the motion. What plastic soil remembers in them is overwritten.
+        Constants of the motion.
     m_v
         Mass of the vehicle [kg].
     readings
@@ -268,17 +264,10 @@ def evaluate_samples(
         Where the fields of `Acceleration` go, shape (4, n).
     stored
         Where those of `StoredEnergies` go, shape (6, n) [J].
-    spent
-        Where the energies go that were spent by plastic soil up to the step of the sample, and by it since then, shape
-        (2, n) [J]. The last is a part of the elastic energy of the soil.
     """
-    memory = memory_of(c)
     for i in range(record.times.size):
-        recall(i, memory)
         s = sample_of(record, i, c, m_v, readings)
         rates[0, i], rates[1, i], rates[2, i], rates[3, i] = s.rate.a_b, s.rate.alpha_b, s.rate.a_v, s.rate.M
         e = s.stored
         stored[0, i], stored[1, i], stored[2, i] = e.truck_kinetic, e.boulder_kinetic, e.boulder_rotational
         stored[3, i], stored[4, i], stored[5, i] = e.soil_elastic, e.crush_elastic, e.gravity
-        before, since = plastic_work(state_of(record, i), c, memory)
-        spent[0, i], spent[1, i] = before, since

@@ -114,8 +114,6 @@ def test_what_else_the_file_asks_for(tmp_path: Path) -> None:
     assert peaks[3:] == pytest.approx([13.0, 19.1], abs=0.06)
     assert math.isnan(forms[3].t_limit_s)
     assert forms[2].t_limit_s < 0.4
-    plastic = load(RWG, ["model.unloading=plastic", "model.second_opinion=broms"])
-    assert [form.name for form in forms_for(plastic, 0.1)][2:] == ["the file's model: corrected, plastic"]
 
 
 def test_a_second_opinion_that_overturns_has_its_time() -> None:

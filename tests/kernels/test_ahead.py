@@ -23,7 +23,7 @@ from boulder_kernels.layered import uniform_layers
 from boulder_kernels.numerics import sine_versine
 from boulder_kernels.outcomes import empty_outcomes
 from boulder_kernels.soil_laws import profile_of
-from boulder_kernels.table import problem_at, run_rows
+from boulder_kernels.table import run_rows
 
 from .samples import control, random_designs, table_of
 
@@ -38,12 +38,10 @@ def problems() -> dict[str, bk.Problem]:
     """One impact in each kind of soil."""
     twice = np.repeat(uniform_layers(DESIGN), 2, axis=0)
     twice[0, 0] = 0.5 * DESIGN.d
-    plastic = HOW._replace(unloading=bk.PLASTIC_WITH_GAP, elements=20)
     return {
         "uniform": bk.Problem(DESIGN, None),
         "layers": bk.Problem(DESIGN, profile_of(DESIGN, twice, 0)),
         "elements": bk.Problem(DESIGN, profile_of(DESIGN, twice, 20)),
-        "plastic": problem_at(table_of([DESIGN]), 0, plastic),
     }
 
 
@@ -52,7 +50,7 @@ def problems() -> dict[str, bk.Problem]:
     [
         "uniform",
         "layers",
-        *(pytest.param(one, marks=pytest.mark.nightly) for one in ("elements", "plastic")),
+        pytest.param("elements", marks=pytest.mark.nightly),
     ],
 )
 def test_the_bits_are_those_of_numba(kind: str) -> None:

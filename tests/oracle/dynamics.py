@@ -23,9 +23,6 @@ from .vehicle import crush_force, jerk
 
 Array = NDArray[np.float64]
 
-REMEMBERED = 11
-"""Where in the state, behind the seven of Eq 52 and four path integrals, that begins what the soil remembers."""
-
 Rotation = Literal["held", "forward", "backward", "clockwise", "anticlockwise"]
 Contact = Literal["touching", "clipped", "coasting"]
 
@@ -93,9 +90,8 @@ def problem(inputs: Inputs, readings: Readings, elements: int | None = None) -> 
 
 
 def motion_of(y: Array) -> Motion:
-    """Motion of the boulder out of the states of Eq 52: x_1, x_3, x_2, x_4; behind them what the soil remembers."""
-    bearing = np.asarray(y[REMEMBERED:]) if len(y) > REMEMBERED else None
-    return Motion(x_b=float(y[0]), theta=float(y[2]), v_b=float(y[1]), omega=float(y[3]), bearing=bearing)
+    """Motion of the boulder out of the states of Eq 52: x_1, x_3, x_2, x_4."""
+    return Motion(x_b=float(y[0]), theta=float(y[2]), v_b=float(y[1]), omega=float(y[3]))
 
 
 def loads(impact: Problem, y: Array, modes: Modes) -> Loads:
