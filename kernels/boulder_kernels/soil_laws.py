@@ -25,7 +25,6 @@ from .layered import (
     SoilSums,
     fill_elements,
     fill_layers,
-    uniform_layers,
 )
 from .layered_soil import (
     potential_of_elements,
@@ -237,18 +236,6 @@ def empty_soil(layers: int, elements: int, outline: np.ndarray | None = None) ->
     return SoilLayers(to, K, inverse_K, P_0, P_1, R, np.empty(len(SoilSums._fields)))
 
 
-def profile_of(
-    design: Design,
-    layers: np.ndarray | None,
-    elements: int,
-    outline: np.ndarray | None = None,
-) -> SoilProfile | None:
-    """Return the soil of a design in layers, by N elements or, where N is 0, exactly; beside an outline if it has one.
-
-    Without layers it is the uniform soil of the design: None, or beside an outline its only layer.
-    """
-    if layers is None:
-        if outline is None:
-            return None
-        layers = uniform_layers(design)
+def profile_of(layers: np.ndarray, elements: int, outline: np.ndarray | None = None) -> SoilProfile:
+    """Return a soil in layers, by N elements or, where N is 0, exactly; beside an outline if the boulder has one."""
     return SoilProfile(layers, empty_soil(len(layers), elements, outline))

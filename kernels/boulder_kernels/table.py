@@ -120,9 +120,10 @@ def simulate_rows(
 def problem_at(table: DesignTable, row: int, control: Control) -> Problem:
     """Return one row of a table as a problem."""
     design = design_at(table, row)
-    layers = table.layers[row] if isinstance(table, LAYERED) else None
+    if not isinstance(table, LAYERED):
+        return Problem(design, None)
     outline = table.outlines[row] if isinstance(table, OutlinedTable) else None
-    return Problem(design, profile_of(design, layers, control.elements, outline))
+    return Problem(design, profile_of(table.layers[row], control.elements, outline))
 
 
 def finer_step(step: float) -> float:

@@ -156,4 +156,4 @@ def same_bits(a: np.ndarray, b: np.ndarray) -> bool:
 
 def layered_constants(design: bk.Design, layers: np.ndarray, readings: bk.Readings, elements: int) -> Any:
     """Constants of one design in layers of soil, by elements or, where there are none, exactly."""
-    return constants_in(design, readings, elements, profile_of(design, layers, elements))
+    return constants_in(design, readings, elements, profile_of(layers, elements))

@@ -40,8 +40,8 @@ def problems() -> dict[str, bk.Problem]:
     twice[0, 0] = 0.5 * DESIGN.d
     return {
         "uniform": bk.Problem(DESIGN, None),
-        "layers": bk.Problem(DESIGN, profile_of(DESIGN, twice, 0)),
-        "elements": bk.Problem(DESIGN, profile_of(DESIGN, twice, 20)),
+        "layers": bk.Problem(DESIGN, profile_of(twice, 0)),
+        "elements": bk.Problem(DESIGN, profile_of(twice, 20)),
     }
 
 
