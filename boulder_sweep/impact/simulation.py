@@ -210,7 +210,7 @@ def _decided(designs: Designs, how: Readings, control: Control) -> Outcome:
     problem = problem_at(designs.table, 0, control)
     outcome = simulate_impact(problem, how, control, no_record())
     if control.last_resort and problem.profile is None and outcome.status not in (*SIMULATED, Status.NO_CONTACT):
-        outcome = simulate_last_resort(problem, how, control, no_record())
+        outcome = simulate_last_resort(problem.design, how, control, no_record())
     return outcome
 
 

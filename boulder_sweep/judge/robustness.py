@@ -94,8 +94,7 @@ AT_ONCE = 400
 def can_be_asked(sweep: Sweep) -> bool:
     """Return whether the designs of a sweep are such as second opinions know.
 
-    They know boxes, plain dry soil and corrected readings, and are not asked of assumed
-    rock.
+    They know boxes, plain dry soil and corrected readings, and are not asked of assumed rock.
     """
     model = sweep.model
     return model.ground.is_usual and model.shape.is_box and not model.rock_assumed and model.preset == "corrected"

@@ -187,7 +187,7 @@ def simulate_in_soil(
     m, points, n = len(layers), len(outline), control.elements
     room = carray(soil_at, (ELEMENT_ROOM * n + 1,))
     if m == 0 and control.last_resort and control.stop_at_limit:
-        return simulate_last_resort(Problem(design, None), readings, control, record)
+        return simulate_last_resort(design, readings, control, record)
     if m == 0:
         return simulate_recorded(None, design, readings, control, record, out, centre)
     if points > 0 and n == 0:

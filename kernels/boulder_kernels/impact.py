@@ -244,23 +244,22 @@ def longest_step(theta_limit: float, c: Constants) -> float:
 
 
 @kernel
-def simulate_last_resort(problem: Problem, readings: Readings, control: Control, record: Record) -> Outcome:
+def simulate_last_resort(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
     """Simulate one impact; what cannot be decided within the steps allowed keeps the status it is refused with.
 
     Parameters
     ----------
-    problem
-        The design; the soil is the uniform soil of the design.
+    design
+        The design, in uniform soil.
     readings, control, record
         As of `boulder_kernels.impact.simulate`; the record keeps nothing.
     """
-    design = problem.design
     c = constants_of(design, readings, control.elements)
     if misses(design) or not is_computable(c):
-        return simulate(problem, readings, control, record)
+        return simulate_design(design, readings, control, record)
     _, status = first_step(control, control.theta_limit, c)
     if status == ACCEPTED:
-        return simulate(problem, readings, control, record)
+        return simulate_design(design, readings, control, record)
     factor = spring_to_follow(rates_of(control.theta_limit, c), control)
     c = constants_of(with_spring(design, factor), readings, control.elements)
     apart = constants_of(with_spring(design, NO_SPRING), readings, control.elements)

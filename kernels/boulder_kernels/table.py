@@ -85,7 +85,7 @@ def run_last_resort(designs: np.ndarray, readings: Readings, control: Control, r
     """The same for designs that need more steps than are allowed, see `boulder_kernels.impact.simulate_last_resort`."""
     for row in range(designs.shape[1]):
         design = design_in(designs, row)
-        outcome = simulate_last_resort(Problem(design, None), readings, control, record)
+        outcome = simulate_last_resort(design, readings, control, record)
         write_outcome(out, row, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
 
 
