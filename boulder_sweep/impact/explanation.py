@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_kernels import Control, Readings
-from boulder_sweep.columns import BY_NAME, INPUT_COLUMNS, OPTIONAL_COLUMNS, OutcomeColumn
+from boulder_sweep.columns import BY_NAME, INPUT_COLUMNS, OPTIONAL_COLUMNS, OUTCOMES, OutcomeColumn
 from boulder_sweep.designs import embedment_of_ratio
 from boulder_sweep.impact.simulation import history_of
 from boulder_sweep.judge.accuracy import known_control
@@ -141,7 +141,7 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
     computable = not block.reasons[0]
     return Explanation(
         name=sweep.name,
-        recomputed={spec.name: again[spec.name] for spec in evaluation.columns if spec.name in manifest.columns},
+        recomputed={spec.name: again[spec.name] for spec in OUTCOMES if spec.name in manifest.columns},
         changed=tuple(differences(there, identity(*stated))),
         trajectory=history_of(sweep, 0, evaluation, cases) if computable else None,
         **common,
