@@ -145,7 +145,7 @@ def _of_code(names: Sequence[str]) -> Counts:
         "run_lanes": (lanes.run_lanes, (table, *how, *lane_arrays, table)),
         "run_rows": (
             rows.run_rows,
-            (table, *(nothing,) * 4, *how, numba.typeof(bk.no_record()), table),
+            (table, *(nothing,) * 3, *how, numba.typeof(bk.no_record()), table),
         ),
         "element_sums": (soil.element_sums, (lines, constants)),
     }
@@ -199,7 +199,7 @@ def _of_calls() -> Counts:
     control = bk.Control(STEP_S, HORIZON, ROTATION_LIMIT, 0, False)
     counts: Counts = {}
     with np.errstate(all="ignore"):
-        one_by_one = partial(simulate_rows, np.stack(designs), None, None, None, None)
+        one_by_one = partial(simulate_rows, np.stack(designs), None, None, None)
         ways = (("lanes", partial(bk.simulate_table, designs)), ("one by one", one_by_one))
         for name, simulate in ways:
             tally = _calls_of(simulate, bk.corrected(), control)

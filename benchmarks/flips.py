@@ -95,7 +95,6 @@ LOW = {
 }
 """Shallow boulders, which slide, rock, and are decided late."""
 SECOND_OPINIONS = "model: {second_opinion: [broms, width_capped]}"
-STIFFENING = "vehicle: {second_spring: 9000 kN/m, second_spring_from: 0.5 m}"
 CASES: dict[str, Case] = {
     "corrected, balanced": Case(35_000),
     "corrected, fast": Case(10_000, "solver: {accuracy: fast}"),
@@ -112,11 +111,6 @@ CASES: dict[str, Case] = {
     "broms": Case(6_000, "model: {resistance: broms}"),
     "width_capped": Case(6_000, "model: {resistance: width_capped}"),
     "elements": Case(1_000, "model: {soil: {elements: 50}}"),
-    "plastic": Case(300, "model: {unloading: plastic, soil: {elements: 50}}"),
-    "plastic, gap": Case(300, "model: {unloading: plastic_with_gap, soil: {elements: 50}}"),
-    "plastic, broms": Case(150, "model: {unloading: plastic, resistance: broms, soil: {elements: 50}}"),
-    "second spring": Case(3_000, STIFFENING),
-    "second spring, as printed": Case(750, f"{STIFFENING}\nmodel: {{readings: as_printed}}"),
     "layers": Case(2_000, f"soil: {{{LAYERS}}}"),
     "layers, broms": Case(750, f"soil: {{{LAYERS}}}\nmodel: {{resistance: broms}}"),
     "cohesion": Case(1_000, "soil: {cohesion: 5 kPa}"),

@@ -48,7 +48,7 @@ _ATTEMPT = (
 )
 _PROOF = "def barrier_energy(m: Maxima, c: Constants) -> float:\n"
 _ONCE = "        out = simulate_lanes(given.designs, readings, control, given.soil, given.parts)\n"
-_SIMULATED = "        outcomes = self.simulate(designs.table, self.readings, control, *designs.laws)\n"
+_SIMULATED = "        outcomes = self.simulate(designs.table, self.readings, control)\n"
 _TRIES = '        reason = ""\n        for _ in range(tries):\n'
 _COMMITTED = "committer.start()\n"
 _STAGED = "    storage.put(staged_name(staged.name, token, part.sha256), encoded.content)\n"

@@ -110,10 +110,6 @@ INPUTS: tuple[ColumnSpec, ...] = (
 )
 
 OPTIONAL_INPUTS: tuple[ColumnSpec, ...] = (
-    ColumnSpec("vehicle_second_spring_N_m", "float64", "N/m", "second spring of the vehicle's front, which stiffens"),
-    ColumnSpec(
-        "vehicle_second_spring_from_m", "float64", "m", "crush of the vehicle's front from which its second spring acts"
-    ),
     ColumnSpec("boulder_mass_kg", "float64", "kg", "mass of the boulder as weighed"),
 )
 """Inputs that a file may leave out without a default: their columns are in its tables only where it gives them."""
@@ -304,32 +300,6 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
     ),
 )
 
-AT_REST: tuple[OutcomeColumn, ...] = (
-    OutcomeColumn(
-        "permanent_tilt_deg",
-        "float64",
-        "deg",
-        "rotation in which the boulder comes to rest, positive with its top away from the vehicle",
-        lambda facts: np.degrees(facts.outcomes.theta_rest),
-    ),
-    OutcomeColumn(
-        "swing_back_deg",
-        "float64",
-        "deg",
-        "how far the boulder swings back from its largest rotation, up to end_time_s",
-        lambda facts: np.degrees(facts.outcomes.swing_back),
-    ),
-    OutcomeColumn(
-        "permanent_tilt_error_deg",
-        "float64",
-        "deg",
-        "by how much permanent_tilt_deg may be wrong: numerical error, and what the motion that is left may still turn",
-        lambda facts: np.degrees(_known(facts.outcomes.rest_error)),
-    ),
-)
-"""Outcomes in plastic soil only; behind the others in a table.
-Null where the boulder overturns, where the vehicle still drives on at the end, or where the readings allow no proof."""
-
 TO_BUILD: tuple[ColumnSpec, ColumnSpec, ColumnSpec] = (
     ColumnSpec("height_above_ground_m", "float64", "m", "height of the top of the boulder above the ground"),
     ColumnSpec(
@@ -351,12 +321,10 @@ In tables of answers and of `sweep export`; those of runs have what they follow 
 COLUMNS: tuple[ColumnSpec, ...] = (DESIGN_ID, *INPUTS, *OUTCOMES)
 INPUT_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in INPUTS)
 OPTIONAL_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in OPTIONAL_INPUTS)
-SECOND_SPRING_COLUMNS: tuple[str, str] = ("vehicle_second_spring_N_m", "vehicle_second_spring_from_m")
-"""Those of a vehicle whose front stiffens."""
 BOULDER_MASS = "boulder_mass_kg"
 """That of a boulder that has been weighed."""
 OUTCOME_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in OUTCOMES)
-BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in (*COLUMNS, *AT_REST, *OPTIONAL_INPUTS, *TO_BUILD)}
+BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in (*COLUMNS, *OPTIONAL_INPUTS, *TO_BUILD)}
 
 
 def column_spec(name: str) -> ColumnSpec:

@@ -14,9 +14,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS, SECOND_SPRING_COLUMNS
+from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS
 
-SECOND_SPRING = SECOND_SPRING_COLUMNS[0]
 SIDES = ("boulder_length_m", "boulder_width_m", "boulder_height_m")
 LEAST_SOLIDITY, MOST_SOLIDITY = 0.95, 1.05
 """Volume of a boulder by its mass over that of the box of its sides, between which it counts as that box: sides and
@@ -188,7 +187,6 @@ REASONS = (
     "embedment depth is not less than the boulder's height",
     "hood is lower than the bumper",
     "impact height is above the top of the boulder",
-    "second spring of the vehicle is softer than the first",
     "boulder is heavier than a solid box of its size and rock",
     "unusual",
 )
@@ -228,11 +226,6 @@ def refusal(
     return codes
 
 
-def refusal_of_springs(codes: np.ndarray, spring: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Return the same for vehicles with a second spring, which must not be softer than the first."""
-    return np.where(codes == 0, 4 * (second < spring), codes).astype(np.int8)
-
-
 def solidity_of(
     mass: np.ndarray, density: np.ndarray, length: np.ndarray, width: np.ndarray, height: np.ndarray
 ) -> np.ndarray:
@@ -243,7 +236,7 @@ def solidity_of(
 def refusal_of_mass(codes: np.ndarray, mass: np.ndarray, density: np.ndarray, *sides: np.ndarray) -> np.ndarray:
     """Return the same as `refusal` for boulders that were weighed."""
     heavy = solidity_of(mass, density, *sides) > MOST_SOLIDITY
-    return np.where(codes == 0, 5 * heavy, codes).astype(np.int8)
+    return np.where(codes == 0, 4 * heavy, codes).astype(np.int8)
 
 
 def refusal_of_unusual(codes: np.ndarray, unusual: np.ndarray) -> np.ndarray:
@@ -275,8 +268,6 @@ def _completed(
     if "impact_height_m" not in known:
         known["impact_height_m"] = combine(impact_height_of_face, height, embedment, bumper, hood)
     refusals = combine(refusal, height, embedment, bumper, hood, impact)
-    if SECOND_SPRING in known:
-        refusals = combine(refusal_of_springs, refusals, known["vehicle_spring_N_m"], known[SECOND_SPRING])
     if BOULDER_MASS in known:
         weighed = (known[name] for name in (BOULDER_MASS, "boulder_density_kg_m3", *SIDES))
         refusals = combine(refusal_of_mass, refusals, *weighed)

@@ -24,17 +24,14 @@ from boulder_kernels._cache import CACHE_VARIABLE, LEVELS, SHIPPED, SOURCES
 from boulder_sweep.store.files import put_file
 
 CONFIGS = Path(__file__).parents[1] / "configs"
-SPRINGS = "vehicle.spring=[{stiffness: 3103 kN/m}, {beyond: 0.5 m, stiffness: 9000 kN/m}]"
 WET, COHESIVE = "soil.water_table=0.5 m", "soil.cohesion=5 kPa"
 ELEMENTS = "model.soil={elements: 50}"
 VARIANTS: tuple[tuple[str, ...], ...] = (
     (),
-    (SPRINGS,),
     (WET,),
     (COHESIVE,),
     (ELEMENTS,),
     (WET, ELEMENTS),
-    (ELEMENTS, "model.unloading=plastic_with_gap"),
     ("boulder.taper=0.8",),
 )
 """Settings for which kernels of their own are compiled."""

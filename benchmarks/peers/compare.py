@@ -85,7 +85,7 @@ def measure_kernels(problem: Problem, *, in_lanes: bool = True) -> Measured:
     def simulate(control: bk.Control) -> bk.OutcomeTable:
         if in_lanes:
             return bk.simulate_table(problem.designs, READINGS, control)
-        out = simulate_rows(designs, None, None, None, None, READINGS, control)
+        out = simulate_rows(designs, None, None, None, READINGS, control)
         return bk.OutcomeTable(out[0].astype(np.int8), *out[1:])
 
     simulate(bk.Control(0.01, HORIZON, ROTATION_LIMIT, 0, False))

@@ -27,7 +27,7 @@ def _rates(t, y, rate, p):  # type of the arguments: numbalsoda.lsoda_sig
     """Rate of the six states; p holds the constants of the design in their order."""
     c = Constants(
         p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], 0, p[10], p[11], p[12], p[13], p[14], p[15], p[16],
-        p[17], p[18], p[19], p[20], p[21], p[22], p[23],
+        p[17], p[18], p[19], p[20], p[21], p[22],
     )  # fmt: skip
     k = literal_acceleration(State(y[0], y[1], y[2], y[3], y[4], y[5]), READINGS, c)
     rate[0], rate[1], rate[2] = y[1], k.a_b, y[3]

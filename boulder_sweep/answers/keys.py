@@ -238,15 +238,8 @@ def _whole_range(
         return LEAST_RATIO * one, 1.0 - bumper / height
     if key.name == "impact_height_m":
         return 0.0 * one, given["hood_height_m"]
-    lowest, highest = (end * one for end in usual_ends(key))
-    second = "vehicle_second_spring_N_m"
-    if key.name == second:
-        lowest = np.maximum(lowest, given["vehicle_spring_N_m"])  # a softer one is refused
-    elif key.name == "vehicle_spring_N_m" and second in given:
-        highest = np.minimum(highest, given[second])
-    elif key.name == "vehicle_second_spring_from_m":
-        highest = np.minimum(highest, given["bed_offset_m"])  # no more than what is in front of the cargo bed
-    return lowest, highest
+    low, high = usual_ends(key)
+    return low * one, high * one
 
 
 def usual_ends(key: Key) -> tuple[float, float]:

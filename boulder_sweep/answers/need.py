@@ -27,7 +27,7 @@ from boulder_sweep.answers.result import (
 )
 from boulder_sweep.answers.search import BLOCKED, WORDS
 from boulder_sweep.answers.trials import NO_FACE, Judges, judges_of, ranges
-from boulder_sweep.columns import INPUTS, SECOND_SPRING_COLUMNS
+from boulder_sweep.columns import INPUTS
 from boulder_sweep.designs import SIDES
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
@@ -199,19 +199,14 @@ def need(
             f"{key.field.path} cannot be searched beside boulder.mass, which is that of one boulder; "
             "remove it from the file and give boulder.density"
         )
-    if key.name in SECOND_SPRING_COLUMNS and key.name not in sweep.plan.given:
-        raise QuestionError(
-            f"the vehicle of {sweep.name} has no second spring; give it both vehicle.second_spring and "
-            f"vehicle.second_spring_from, of which {key.field.path} is then searched"
-        )
     least_margin = margin_asked(margin)
     chance = None if probability is None else share(probability, "--probability")
     if chance is not None and not 0.0 < chance < 1.0:
         raise QuestionError(f"--probability {probability}: must be more than 0 and less than 100 %")
     if robust and not can_be_asked(sweep):
         raise QuestionError(
-            "--robust: second opinions know boxes of rock of given density, elastic, dry, level, uniform soil without "
-            "cohesion, one spring of the vehicle and corrected readings only"
+            "--robust: second opinions know boxes of rock of given density, dry, level, uniform soil without cohesion "
+            "and corrected readings only"
         )
     if robust and chance is not None:
         raise QuestionError(

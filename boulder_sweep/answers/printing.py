@@ -54,8 +54,6 @@ HEADS = {
     "impact_speed_m_s": ("speed", "m/s"),
     "vehicle_spring_N_m": ("spring", "N/m"),
     "vehicle_damper_N_s_m": ("damper", "N s/m"),
-    "vehicle_second_spring_N_m": ("spring 2", "N/m"),
-    "vehicle_second_spring_from_m": ("beyond", "m"),
     "bumper_height_m": ("bumper", "m"),
     "hood_height_m": ("hood", "m"),
     "bed_offset_m": ("bed", "m"),

@@ -244,15 +244,6 @@ def impact_lines(row: Mapping[str, Any], history: Trajectory, units: str = "si")
             f"truck {metres(row['max_vehicle_displacement_m'], digits='.3g')}; "
             f"peak force {quantity_text('kN', units, row['peak_force_kN'], digits=',.0f')}",
         ]
-    if row.get("permanent_tilt_deg") is not None:
-        lines.append(
-            f"  afterwards: swings back by {row['swing_back_deg']:.3g} deg, rests at "
-            f"{row['permanent_tilt_deg']:.3g} deg, to within {row['permanent_tilt_error_deg']:.1g} deg"
-        )
-    if (second := history.motion.second) is not None:
-        reached = history.time_s[history.motion.record.offset > 0.0]
-        when = f"reached {1e3 * reached[0]:.0f} ms after contact" if len(reached) else "not reached"
-        lines.append(f"  front: its second spring acts from a crush of {metres(second.s_2)} on, {when}")
     lines.append(build_line(history, units))
     if row["time_to_limit_s"] is None:
         error = row["rotation_error_deg"]

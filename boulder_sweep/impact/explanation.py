@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_kernels import Control, Readings
-from boulder_sweep.columns import BY_NAME, INPUT_COLUMNS, OPTIONAL_COLUMNS, OutcomeColumn
+from boulder_sweep.columns import BY_NAME, INPUT_COLUMNS, OPTIONAL_COLUMNS, OUTCOMES, OutcomeColumn
 from boulder_sweep.designs import embedment_of_ratio
 from boulder_sweep.impact.simulation import history_of
 from boulder_sweep.judge.accuracy import known_control
@@ -24,7 +24,7 @@ from boulder_sweep.judge.robustness import can_be_asked
 from boulder_sweep.judge.verdict import limits_of
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.settings import Sweep
-from boulder_sweep.settings.model import UNLOADINGS, Criterion, Ground, Model, ReadingChoice, SolverSettings, completed
+from boulder_sweep.settings.model import Criterion, Ground, Model, ReadingChoice, SolverSettings, completed
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import shown_values
 from boulder_sweep.settings.sweep import DesignList, allowed_in
@@ -141,7 +141,7 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
     computable = not block.reasons[0]
     return Explanation(
         name=sweep.name,
-        recomputed={spec.name: again[spec.name] for spec in evaluation.columns if spec.name in manifest.columns},
+        recomputed={spec.name: again[spec.name] for spec in OUTCOMES if spec.name in manifest.columns},
         changed=tuple(differences(there, identity(*stated))),
         trajectory=history_of(sweep, 0, evaluation, cases) if computable else None,
         **common,
@@ -215,7 +215,6 @@ def model_of(settings: dict[str, Any], control: Control) -> Model:
         control.elements,
         model["calibrated_crush_m"],
         model["resistance"],
-        unloading=UNLOADINGS[control.unloading],
         second_opinion=tuple(model.get("second_opinion", ())),
         foot=model["foot"],
         profile=Shape.of_model(model).points,

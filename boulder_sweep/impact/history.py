@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from boulder_kernels import Constants, Control, Design, Outcome, Readings, Record, SecondSpring
+from boulder_kernels import Constants, Control, Design, Outcome, Readings, Record
 from boulder_kernels.design import Body
 from boulder_kernels.dynamics import (
     FREE,
@@ -21,7 +21,6 @@ from boulder_kernels.dynamics import (
 )
 from boulder_kernels.layered import SoilLayers
 from boulder_kernels.outlined import OutlinedElements, OutlinedPieces, body_beside, is_outlined
-from boulder_kernels.plastic import PlasticConstants, at_sample
 from boulder_kernels.soil import drag_force, soil_kinematics, spring_force
 from boulder_kernels.time_history import StoredEnergies, evaluate_samples
 
@@ -49,7 +48,6 @@ class Motion:
     record: Record
     outcome: Outcome
     """Of the whole motion that was recorded, beyond the limit."""
-    second: SecondSpring | None = None
 
     @property
     def body(self) -> Body:
@@ -77,14 +75,10 @@ class EnergyLedger:
         Kinetic energy of the vehicle.
     crush_spring_J, crush_damper_J : ndarray
         Stored in the spring of its front, and dissipated in the damper.
-    crush_spent_J : ndarray
-        Spent where a second spring took over (Eq 112); 0 without one.
     boulder_linear_J, boulder_angular_J : ndarray
         Kinetic energy of boulder and lumped soil.
     soil_elastic_J, soil_drag_J : ndarray
         Stored in the springs of the soil, and dissipated by its drag.
-    soil_plastic_J : ndarray
-        Plastic work of the soil; 0 in elastic soil (Eq 123).
     gravity_J : ndarray
         Done against the weight. Under the gravity reading a potential energy; as printed the work done against
         the restoring moment, which has no potential (and is negative where it drives the boulder on).
@@ -98,11 +92,9 @@ class EnergyLedger:
     vehicle_kinetic_J: np.ndarray
     crush_spring_J: np.ndarray
     crush_damper_J: np.ndarray
-    crush_spent_J: np.ndarray
     boulder_linear_J: np.ndarray
     boulder_angular_J: np.ndarray
     soil_elastic_J: np.ndarray
-    soil_plastic_J: np.ndarray
     soil_drag_J: np.ndarray
     gravity_J: np.ndarray
     pull_J: np.ndarray
@@ -135,7 +127,7 @@ def forces_along(motion: Motion) -> dict[str, np.ndarray]:
     dict of str to ndarray
         Arrays of shape (n,) by the names of the trajectory's columns.
     """
-    (a_b, alpha_b, a_v, M), _, _ = _evaluated(motion)
+    (a_b, alpha_b, a_v, M), _ = _evaluated(motion)
     c, theta = motion.constants, motion.record.states[:, 2]
     # As printed the truck is pulled back by a force that the boulder does not feel: only contact counts here.
     F_v = np.where(motion.record.touching, -motion.design.m_v * a_v, 0.0)
@@ -163,18 +155,16 @@ def ledger_of(motion: Motion) -> EnergyLedger:
     EnergyLedger
         Arrays of shape (n,).
     """
-    _, stored, (spent, before, since) = _evaluated(motion)
+    _, stored = _evaluated(motion)
     truck, linear, angular, elastic, spring, potential = stored
     drag, damper, restoring, pull = motion.record.exchanged.T
     parts = {
         "vehicle_kinetic_J": truck,
         "crush_spring_J": spring,
         "crush_damper_J": damper.copy(),
-        "crush_spent_J": spent,
         "boulder_linear_J": linear,
         "boulder_angular_J": angular,
-        "soil_elastic_J": elastic - since,
-        "soil_plastic_J": before + since,
+        "soil_elastic_J": elastic,
         "soil_drag_J": drag.copy(),
         "gravity_J": potential if motion.readings.restoring_gravity else restoring.copy(),
         "pull_J": -pull,
@@ -184,18 +174,14 @@ def ledger_of(motion: Motion) -> EnergyLedger:
     return EnergyLedger(time_s=motion.record.times, **parts, residual_J=residual)
 
 
-def _evaluated(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return rates, stored and spent energies at the samples of a record, see `evaluate_samples`."""
+def _evaluated(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """Return rates and stored energies at the samples of a record, see `evaluate_samples`."""
     record, c, m_v = motion.record, motion.constants, motion.design.m_v
     n = len(record.times)
-    rates, stored, spent = (
-        np.empty((count, n)) for count in (len(Acceleration._fields), len(StoredEnergies._fields), 3)
-    )
-    if not len(record.offset):
-        record = record._replace(offset=np.zeros(n))
+    rates, stored = np.empty((len(Acceleration._fields), n)), np.empty((len(StoredEnergies._fields), n))
     if n:
-        evaluate_samples(record, at_sample(c, 0), motion.second, m_v, motion.readings, rates, stored, spent)
-    return rates, stored, spent
+        evaluate_samples(record, c, m_v, motion.readings, rates, stored)
+    return rates, stored
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,7 +214,7 @@ def soil_profile(motion: Motion, sample: int, slices: int) -> SoilForces:
     displacement = k.A - k.slope_x * ratio
     velocity = k.B - k.slope_v * ratio
     if not isinstance(c, Constants):
-        pressed = _pressed_at(ratio, displacement, velocity, at_sample(c, sample)) / slices
+        pressed = _pressed_at(ratio, displacement, velocity, c) / slices
         return SoilForces(ratio * c.d, -pressed)
     height = c.d / slices
     force = [
@@ -240,7 +226,7 @@ def soil_profile(motion: Motion, sample: int, slices: int) -> SoilForces:
 
 def _pressed_at(ratio: np.ndarray, displacement: np.ndarray, velocity: np.ndarray, c: Any) -> np.ndarray:
     """What layers or elements press with at ratios of the depth, per ratio [N]; of elements, those they lie in."""
-    soil, front, back = c.soil, 0.0, 0.0
+    soil = c.soil
     if isinstance(soil, OutlinedElements):
         soil = soil.elements
     if isinstance(soil, OutlinedPieces):
@@ -255,8 +241,4 @@ def _pressed_at(ratio: np.ndarray, displacement: np.ndarray, velocity: np.ndarra
         elements = len(soil.ratio)
         at = np.minimum((ratio * elements).astype(int), elements - 1)
         spring, ultimate, drag = (elements * values[at] for values in (soil.stiffness, soil.ultimate, soil.drag))
-        if isinstance(c, PlasticConstants):
-            front, back = c.memory.front[at], c.memory.back[at]
-    ahead = np.clip(spring * (displacement - front), 0.0, ultimate)
-    behind = np.clip(spring * (back - displacement), 0.0, ultimate)
-    return ahead - behind + drag * velocity * np.abs(velocity)
+    return np.clip(spring * displacement, -ultimate, ultimate) + drag * velocity * np.abs(velocity)

@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 
 from boulder_kernels import SIMULATED, Control, Outcome, Readings, Record, Status, no_record
+from boulder_kernels import simulate as simulate_impact
 from boulder_kernels.impact import simulate_last_resort
-from boulder_kernels.table import halved, is_layered, is_paired, problem_at, simulate_impact, step_of_solution
-from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS, SECOND_SPRING_COLUMNS
+from boulder_kernels.soil_laws import constants_in
+from boulder_kernels.table import halved, is_layered, is_paired, problem_at, step_of_solution
+from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.impact.history import Motion
 from boulder_sweep.impact.trajectory import Trajectory
 from boulder_sweep.judge.accuracy import accuracy_of
@@ -134,9 +136,10 @@ def history_of(
     drawn = deciding._replace(stop_at_limit=False, horizon=_drawn_s(row, deciding.horizon))
     times = _sample_times(drawn.horizon, sample_s)
     record = _empty_record(times)
-    problem = problem_at(designs.table, 0, drawn, designs.springs, len(record.times))
-    outcome, c, *_ = simulate_impact(problem, how, drawn, record)
-    motion = Motion(problem.design, how, c, drawn, _kept(record, times, outcome), outcome, problem.second)
+    problem = problem_at(designs.table, 0, drawn)
+    outcome = simulate_impact(problem, how, drawn, record)
+    c = constants_in(problem.design, how, drawn.elements, problem.profile)
+    motion = Motion(problem.design, how, c, drawn, _kept(record, times, outcome), outcome)
     decided = _decided(designs, how, deciding)
     return Trajectory.of(sweep.name, design_id, inputs, sweep.resolved(), motion, judged, decided)
 
@@ -159,9 +162,6 @@ def _as_sweep(design: Sweep | str | Path | Mapping[str, Any]) -> Sweep:
     missing = [name for name in INPUT_COLUMNS if name not in constants and name not in optional]
     if missing:
         raise ValueError(f"the design lacks {', '.join(missing)}")
-    springs = SECOND_SPRING_COLUMNS
-    if 0 < len(half := [name for name in springs if name in constants]) < len(springs):
-        raise ValueError(f"a second spring needs {' and '.join(springs)}, not {half[0]} alone")
     return Sweep(name="design", path=None, axes=(), constants=constants, model=Model(rock_assumed=rock_assumed))
 
 
@@ -207,10 +207,10 @@ def _deciding(control: Control, how: Readings, step_s: float | None, *, layered:
 
 def _decided(designs: Designs, how: Readings, control: Control) -> Outcome:
     """Return the impact up to where its row ends."""
-    problem = problem_at(designs.table, 0, control, designs.springs)
-    outcome = simulate_impact(problem, how, control, no_record()).outcome
+    problem = problem_at(designs.table, 0, control)
+    outcome = simulate_impact(problem, how, control, no_record())
     if control.last_resort and problem.profile is None and outcome.status not in (*SIMULATED, Status.NO_CONTACT):
-        outcome = simulate_last_resort(problem, how, control, no_record())
+        outcome = simulate_last_resort(problem.design, how, control, no_record())
     return outcome
 
 
@@ -235,7 +235,7 @@ def _empty_record(times: np.ndarray) -> Record:
     n = len(times)
     asked = np.minimum(times, times[-1] * BEFORE_THE_END)
     states, exchanged = np.full((n, 6), np.nan), np.full((n, 4), np.nan)
-    return Record(asked, states, np.zeros(n, np.int8), np.zeros(n, np.bool_), exchanged, np.zeros(n))
+    return Record(asked, states, np.zeros(n, np.int8), np.zeros(n, np.bool_), exchanged)
 
 
 def _kept(record: Record, times: np.ndarray, outcome: Outcome) -> Record:

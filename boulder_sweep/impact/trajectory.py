@@ -65,7 +65,6 @@ ENERGY: tuple[ColumnSpec, ...] = (
     _number("energy_boulder_linear_J", "J", "kinetic energy of boulder and soil wedge in translation"),
     _number("energy_boulder_angular_J", "J", "kinetic energy of boulder and soil wedge in rotation"),
     _number("energy_soil_elastic_J", "J", "stored in the springs of the soil"),
-    _number("energy_soil_plastic_J", "J", "plastic work of the soil; 0 in elastic soil"),
     _number("energy_soil_drag_J", "J", "dissipated by the drag of the soil"),
     _number(
         "energy_gravity_J",
@@ -81,12 +80,7 @@ ENERGY: tuple[ColumnSpec, ...] = (
     _number("energy_residual_J", "J", "sum of all parts minus the vehicle's energy at first touch"),
 )
 
-SPENT = _number(
-    "energy_crush_spent_J", "J", "spent where the second spring of the vehicle's front took over: permanent crush"
-)
-"""Of vehicles with a second spring only."""
-
-_BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in (*HISTORY, *ENERGY, SPENT)}
+_BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in (*HISTORY, *ENERGY)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,8 +242,7 @@ class Trajectory:
         columns = {spec.name: getattr(self, spec.name) for spec in HISTORY}
         if energy:
             ledger = self.energy()
-            spent = () if self.motion.second is None else (SPENT,)
-            for spec in (*ENERGY, *spent):
+            for spec in ENERGY:
                 columns[spec.name] = getattr(ledger, spec.name.removeprefix("energy_"))
         return columns
 

@@ -15,7 +15,6 @@ from boulder_kernels._jit import plain
 from boulder_kernels.settling import proof_is_possible
 from boulder_kernels.table import finer_step, is_paired
 from boulder_sweep.judge.inputs import Designs, sampled_designs
-from boulder_sweep.settings.model import UNLOADINGS
 from boulder_sweep.soils import is_layered
 
 if TYPE_CHECKING:
@@ -138,11 +137,10 @@ def control_of(sweep: Sweep, accuracy: Accuracy) -> Control:
         h=accuracy.steps.step_s,
         horizon=horizon,
         theta_limit=math.radians(sweep.criterion.max_rotation_deg),
-        elements=int(sweep.model.elements),
+        elements=sweep.model.soil_elements,
         error_estimate=accuracy.error_estimate,
         locate_yield=accuracy.steps.locate_yield,
         longest_horizon=LONGEST_HORIZON * horizon if goes_on else 0.0,
-        unloading=UNLOADINGS.index(sweep.model.unloading),
         paired=accuracy.paired,
         side_by_side=shape.is_box or len(shape.points) == 2 or sweep.n_designs >= OUTLINES_IN_LANES,
     )
@@ -188,7 +186,7 @@ def pilot(sweep: Sweep, wanted_deg: float) -> Accuracy:
     Accuracy
         The first steps of `LADDER` that meet it, or those that come closest if none does.
     """
-    designs = sampled_designs(sweep, pilot_size(sweep.model.elements))
+    designs = sampled_designs(sweep, pilot_size(sweep.model.soil_elements))
     readings = readings_of(sweep)
     tried: list[tuple[float, int]] = []
     for rung, steps in enumerate(LADDER):
@@ -217,9 +215,9 @@ def pilot_size(elements: int) -> int:
 
 def simulated(designs: Designs, readings: Readings, control: Control) -> OutcomeTable:
     """Simulate designs in pieces, so that an interruption takes effect soon."""
-    size = AT_ONCE if control.elements or designs.laws else AT_ONCE_CLOSED
+    size = AT_ONCE if control.elements else AT_ONCE_CLOSED
     rows = [designs.rows(slice(at, at + size)) for at in range(0, designs.size, size)] or [designs]
-    pieces = [simulate_table(some.table, readings, control, *some.laws) for some in rows]
+    pieces = [simulate_table(some.table, readings, control) for some in rows]
     return type(pieces[0])(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))
 
 

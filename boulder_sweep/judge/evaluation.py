@@ -13,14 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, SecondSprings, simulate_table
+from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, simulate_table
 from boulder_kernels._jit import plain
-from boulder_kernels.plastic import is_plastic
 from boulder_kernels.rules import SLOWER_SPEEDS, after_slower, is_asked_slower
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_kernels.table import some_rows
-from boulder_sweep.columns import AT_REST, OUTCOMES, OutcomeColumn
-from boulder_sweep.designs import SECOND_SPRING
 from boulder_sweep.judge.accuracy import LONGEST_HORIZON, Accuracy, control_of, readings_of
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed, with_rows, worst_of
@@ -40,15 +37,13 @@ Simulate = Callable[..., OutcomeTable]
 """Function that simulates a table of designs, with the arguments of `by_kernels`, which it always is outside tests."""
 
 
-def by_kernels(
-    table: DesignTable, readings: Readings, control: Control, springs: SecondSprings | None = None
-) -> OutcomeTable:
+def by_kernels(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
     """Simulate with the compiled kernels.
 
     A plain function, so that worker processes import it by name and use the compiled code on disk; the kernel
     itself would be sent as source and compiled again.
     """
-    return simulate_table(table, readings, control, springs)
+    return simulate_table(table, readings, control)
 
 
 @dataclass(frozen=True)
@@ -69,8 +64,6 @@ class Evaluation:
         Outcome columns wanted, verdict and reason among them; all of the table where empty.
     model
         Resistance, layers, water, cohesion and slope of the soil, and shape of the boulders.
-    second_spring
-        Whether the vehicles have a second spring, for which other kernels are compiled.
     least_margin
         Margin that a question asks for, from 0 to less than 1; see `judged`.
     second_opinion
@@ -87,7 +80,6 @@ class Evaluation:
     simulate: Simulate = by_kernels
     only: tuple[str, ...] = ()
     model: Model = field(default_factory=Model)
-    second_spring: bool = False
     least_margin: float = 0.0
     second_opinion: tuple[str, ...] = ()
     askable: bool = False
@@ -112,7 +104,7 @@ class Evaluation:
             return self.judged(self.designs(block))
         codes = np.asarray(block.reasons.codes)
         computable = codes == 0
-        refused = not_computed(tuple(block.reasons.texts[1:]), codes[~computable] - 1, self.columns)
+        refused = not_computed(tuple(block.reasons.texts[1:]), codes[~computable] - 1)
         if not computable.any():
             return joined([refused])
         both = joined([self.judged(self.designs(block, computable)), refused])
@@ -239,7 +231,7 @@ class Evaluation:
 
     def _once(self, designs: Designs, control: Control) -> JudgedOnce:
         """Simulate and judge designs once."""
-        outcomes = self.simulate(designs.table, self.readings, control, *designs.laws)
+        outcomes = self.simulate(designs.table, self.readings, control)
         return judge_once(outcomes, designs, self.limits, self.only)
 
     def _doubted(self, rows: np.ndarray, designs: Designs, outcomes: OutcomeTable) -> JudgedOnce:
@@ -248,49 +240,37 @@ class Evaluation:
         doubted = some_rows(outcomes, rows)._replace(theta_error=unknown, x_error=unknown)
         return judge_once(doubted, designs.rows(rows), self.limits, self.only)
 
-    @property
-    def columns(self) -> tuple[OutcomeColumn, ...]:
-        """Outcome columns of the rows, where `only` does not leave some out."""
-        return (*OUTCOMES, *AT_REST) if is_plastic(self.control.unloading) else OUTCOMES
-
     def settings(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """Return readings and control as plain data, for the record."""
         return self.readings._asdict(), self.control._asdict()
 
     def warm_up(self) -> None:
         """Load or compile the kernels by simulating one step of a plain design."""
-        springs = PLAIN_SPRINGS if self.second_spring else None
         model = self.model
-        table = with_soil(PLAIN_DESIGN.table, model.resistance, model.ground, shape=model.shape)
-        plain = PLAIN_DESIGN._replace(table=table, springs=springs)
-        self.simulate(plain.table, self.readings, self.control._replace(horizon=self.control.h), *plain.laws)
+        table = with_soil(PLAIN_DESIGN, model.resistance, model.ground, shape=model.shape)
+        self.simulate(table, self.readings, self.control._replace(horizon=self.control.h))
         if self.second_opinion:
-            second_opinions(PLAIN_DESIGN.table, HeaveControl(self.limits.rotation, self.control.h))
+            second_opinions(PLAIN_DESIGN, HeaveControl(self.limits.rotation, self.control.h))
 
 
-PLAIN_DESIGN = Designs(
-    DesignTable(
-        L=np.array([1.5]),
-        W=np.array([1.5]),
-        H=np.array([3.0]),
-        rho_b=np.array([2600.0]),
-        d=np.array([1.5]),
-        e=np.array([0.95]),
-        rho_s=np.array([1900.0]),
-        phi=np.array([math.radians(40.0)]),
-        beta=np.array([60.0]),
-        K_epsilon=np.array([1.0]),
-        m_v=np.array([6800.0]),
-        v_0=np.array([13.4]),
-        k_v=np.array([3.1e6]),
-        c_v=np.array([1.4e5]),
-        e_bumper=np.array([0.5]),
-    ),
-    bed_offset=np.array([2.9]),
+PLAIN_DESIGN = DesignTable(
+    L=np.array([1.5]),
+    W=np.array([1.5]),
+    H=np.array([3.0]),
+    rho_b=np.array([2600.0]),
+    d=np.array([1.5]),
+    e=np.array([0.95]),
+    rho_s=np.array([1900.0]),
+    phi=np.array([math.radians(40.0)]),
+    beta=np.array([60.0]),
+    K_epsilon=np.array([1.0]),
+    m_v=np.array([6800.0]),
+    v_0=np.array([13.4]),
+    k_v=np.array([3.1e6]),
+    c_v=np.array([1.4e5]),
+    e_bumper=np.array([0.5]),
 )
 """One usual design."""
-PLAIN_SPRINGS = SecondSprings(k_2=np.array([9e6]), s_2=np.array([1.0]))
-"""A second spring for its vehicle."""
 
 
 def evaluation_of(sweep: Sweep, accuracy: Accuracy, simulate: Simulate = by_kernels) -> Evaluation:
@@ -302,7 +282,6 @@ def evaluation_of(sweep: Sweep, accuracy: Accuracy, simulate: Simulate = by_kern
         limits=limits_of(sweep),
         simulate=simulate,
         model=sweep.model,
-        second_spring=SECOND_SPRING in sweep.plan.columns,
         second_opinion=sweep.model.second_opinion if askable else (),
         askable=askable,
     )

@@ -11,7 +11,7 @@ from boulder_sweep.judge.accuracy import Accuracy, steps_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.inputs import sampled_rows
 from boulder_sweep.judge.judged import ERROR
-from boulder_sweep.settings.model import CLOSED_FORM, PLASTIC_ELEMENTS
+from boulder_sweep.settings.model import CLOSED_FORM, ENOUGH_ELEMENTS
 from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
@@ -29,22 +29,18 @@ def words_of_few_elements(sweep: Sweep) -> str:
     ----------
     sweep
         A sweep whose `Model.has_few_elements`. At most `DESIGNS` of its designs are simulated with its soil elements,
-        and again in closed form, or with `PLASTIC_ELEMENTS` where the soil is not elastic, by the steps of ``fast``.
-        Uncertain inputs have their means.
+        and again in closed form, by the steps of ``fast``. Uncertain inputs have their means.
     """
-    enough = replace(sweep, model=replace(sweep.model, soil_elements=0))
-    way, remedy = f"{PLASTIC_ELEMENTS}", f"take {PLASTIC_ELEMENTS} or more"
-    if enough.model.elements == 0:
-        way, remedy = "the closed form", f"{remedy}, or {CLOSED_FORM}"
     rows = sampled_rows(sweep, DESIGNS)
-    few, many = _judged(sweep, rows), _judged(enough, rows)
+    few = _judged(sweep, rows)
+    many = _judged(replace(sweep, model=replace(sweep.model, soil_elements=0)), rows)
     computed = (few.verdict != ERROR) & (many.verdict != ERROR)
     changed = int((few.verdict != many.verdict)[computed].sum())
     off = np.nan_to_num(few["max_rotation_deg"] - many["max_rotation_deg"])[computed]
     return (
-        f"{counted(sweep.model.soil_elements, 'soil element')} against {way}: another verdict for {changed} of "
-        f"{counted(int(computed.sum()), 'design')} of this file, the rotation off by up to "
-        f"{np.abs(off).max(initial=0.0):.2g} deg; {remedy}"
+        f"{counted(sweep.model.soil_elements, 'soil element')} against the closed form: another verdict for {changed} "
+        f"of {counted(int(computed.sum()), 'design')} of this file, the rotation off by up to "
+        f"{np.abs(off).max(initial=0.0):.2g} deg; take {ENOUGH_ELEMENTS} or more, or {CLOSED_FORM}"
     )
 
 

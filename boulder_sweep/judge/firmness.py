@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_kernels import ELASTIC, DesignTable, Readings, as_printed, corrected
+from boulder_kernels import DesignTable, Readings, as_printed, corrected
 from boulder_sweep.judge.accuracy import QUANTILE, STEPS, STEPS_PRINTED, accuracy_of, simulated
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.inputs import plain_designs, sampled_designs, sampled_rows
@@ -84,7 +84,7 @@ class Firmness:
 
 
 def firmness_of(sweep: Sweep) -> Firmness:
-    """Find out how firm the verdicts of a sweep are, from a sample of its designs in the closed form of elastic soil.
+    """Find out how firm the verdicts of a sweep are, from a sample of its designs in the closed form of the soil.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def firmness_of(sweep: Sweep) -> Firmness:
     count = min(DESIGNS, max(FEWEST_DESIGNS, sweep.n_designs // SHARE))
     evaluation = evaluation_of(sweep, accuracy_of(sweep))
     designs, limits = sampled_designs(sweep, count), evaluation.limits
-    control, readings = evaluation.control._replace(elements=0, unloading=ELASTIC), evaluation.readings
+    control, readings = evaluation.control._replace(elements=0), evaluation.readings
     law = sweep.model.resistance
     other = as_printed() if readings == corrected() else corrected()
 

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from boulder_kernels import DesignTable, SecondSprings
+from boulder_kernels import DesignTable
 from boulder_kernels.layered import OutlinedTable
 from boulder_kernels.outlined import FAR, HEIGHT, NEAR
 from boulder_sweep.columns import BOULDER_MASS
-from boulder_sweep.designs import LEAST_SOLIDITY, SECOND_SPRING, solidity_of
+from boulder_sweep.designs import LEAST_SOLIDITY, solidity_of
 from boulder_sweep.settings.model import Model
 from boulder_sweep.soils import with_soil
 
@@ -51,8 +51,6 @@ class Designs(NamedTuple):
     soil is not the same at every depth, a `LayeredTable`, whose other fields hold the uppermost layer."""
     bed_offset: np.ndarray
     """Distance from the front bumper to the leading edge of the cargo bed [m], shape (n,)."""
-    springs: SecondSprings | None = None
-    """Second springs of the vehicles, SI, where the file gives them."""
     fills: np.ndarray | None = None
     """`solidity` where the file gives masses or a shape; None of boxes."""
     rocks: np.ndarray | None = None
@@ -68,13 +66,10 @@ class Designs(NamedTuple):
     def rows(self, chosen: np.ndarray | slice) -> Designs:
         """Return some of the designs, chosen by a mask, by their indices or by a slice."""
         table = type(self.table)(*(np.ascontiguousarray(column[chosen]) for column in self.table))
-        springs = self.springs
-        if springs is not None:
-            springs = SecondSprings(*(np.ascontiguousarray(column[chosen]) for column in springs))
         fills = None if self.fills is None else self.fills[chosen]
         rocks = None if self.rocks is None else self.rocks[chosen]
         factors = None if self.factors is None else self.factors[chosen]
-        return Designs(table, self.bed_offset[chosen], springs, fills, rocks, factors)
+        return Designs(table, self.bed_offset[chosen], fills, rocks, factors)
 
     @property
     def given_factors(self) -> np.ndarray:
@@ -101,11 +96,6 @@ class Designs(NamedTuple):
         """Whether what is simulated has the shape of each boulder, bool, shape (n,)."""
         return (self.solidity >= LEAST_SOLIDITY) | isinstance(self.table, OutlinedTable)
 
-    @property
-    def laws(self) -> tuple[SecondSprings, ...]:
-        """What `boulder_kernels.simulate_table` takes beside table, readings and control; nothing as a rule."""
-        return () if self.springs is None else (self.springs,)
-
 
 def designs_of(
     block: DesignBlock,
@@ -128,11 +118,6 @@ def designs_of(
     shape = model.shape
     columns = {field: _values(block, source, rows) for field, source in SOURCES.items()}
     columns["phi"] = np.radians(columns["phi"])
-    springs = None
-    if SECOND_SPRING in block.columns:
-        springs = SecondSprings(
-            _values(block, SECOND_SPRING, rows), _values(block, "vehicle_second_spring_from_m", rows)
-        )
     fills, rocks = None, None
     if not shape.is_box:
         fills = np.full(len(columns["L"]), shape.filled)
@@ -146,7 +131,7 @@ def designs_of(
     given = DesignTable(**columns)
     table = with_soil(given, model.resistance, model.ground, shape=shape)
     factors = None if table is given else given.K_epsilon
-    return Designs(table, _values(block, "bed_offset_m", rows), springs, fills, rocks, factors)
+    return Designs(table, _values(block, "bed_offset_m", rows), fills, rocks, factors)
 
 
 def _values(block: DesignBlock, name: str, rows: np.ndarray | None) -> np.ndarray:

@@ -6,13 +6,12 @@ Numbers only, so that stored tables can be read and put together without the ker
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from boulder_sweep.columns import AT_REST, GRADES, OUTCOMES, REASONS, VERDICTS, OutcomeColumn
+from boulder_sweep.columns import GRADES, OUTCOMES, REASONS, VERDICTS, OutcomeColumn
 
 PASS, FAIL, UNDECIDED, ERROR = range(len(VERDICTS))
 _ORDER = np.array([3, 0, 2, 1])
@@ -62,11 +61,6 @@ class Judged:
         """Return some rows, chosen by a mask, by their indices or by a slice."""
         return Judged({name: values[chosen] for name, values in self.columns.items()}, self.words)
 
-    def only(self, names: Sequence[str]) -> Judged:
-        """Return these columns alone."""
-        words = {name: self.words[name] for name in names if name in self.words}
-        return Judged({name: self.columns[name] for name in names}, words)
-
     def row(self, index: int) -> dict[str, Any]:
         """Return one row as plain data by the names of the columns: words, numbers, None for no value."""
         result: dict[str, Any] = {}
@@ -79,9 +73,7 @@ class Judged:
         return result
 
 
-def not_computed(
-    reasons: tuple[str, ...], codes: np.ndarray, specs: Sequence[OutcomeColumn] = (*OUTCOMES, *AT_REST)
-) -> Judged:
+def not_computed(reasons: tuple[str, ...], codes: np.ndarray) -> Judged:
     """Return rows of verdict ``error`` without any value.
 
     Parameters
@@ -90,8 +82,6 @@ def not_computed(
         Why, in words; none of them empty.
     codes
         Index into `reasons` of each row, shape (n,).
-    specs
-        Columns of the rows.
 
     Returns
     -------
@@ -100,10 +90,10 @@ def not_computed(
     """
     n = len(codes)
     nothing, no_word = np.full(n, np.nan), np.full(n, -1, dtype=np.int32)
-    columns = {spec.name: no_word if spec.type == "dictionary" else nothing for spec in specs}
+    columns = {spec.name: no_word if spec.type == "dictionary" else nothing for spec in OUTCOMES}
     columns["verdict"] = np.full(n, ERROR, dtype=np.int32)
     columns["reason"] = (np.asarray(codes) + len(REASONS)).astype(np.int32)
-    words = {spec.name: spec.words for spec in specs if spec.type == "dictionary"}
+    words = {spec.name: spec.words for spec in OUTCOMES if spec.type == "dictionary"}
     return Judged(columns, words | {"reason": (*REASONS, *reasons)})
 
 
@@ -122,7 +112,7 @@ def joined(pieces: list[Judged]) -> Judged:
     """
     columns: dict[str, np.ndarray] = {}
     words: dict[str, tuple[str, ...]] = {}
-    for spec in (*OUTCOMES, *AT_REST):
+    for spec in OUTCOMES:
         if any(spec.name not in piece.columns for piece in pieces):
             continue
         parts = [piece[spec.name] for piece in pieces]

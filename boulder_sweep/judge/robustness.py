@@ -25,11 +25,10 @@ from boulder_kernels.rules import UNSTUDIED
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_kernels.table import some_rows
 from boulder_sweep.columns import GRADES
-from boulder_sweep.designs import SECOND_SPRING
 from boulder_sweep.investigation import family_bounds
 from boulder_sweep.judge.judged import PASS, Judged
 from boulder_sweep.judge.validity import VEHICLE, are_studied
-from boulder_sweep.settings.model import RESISTANCES, SECOND_OPINIONS, UNLOADINGS
+from boulder_sweep.settings.model import RESISTANCES, SECOND_OPINIONS
 from boulder_sweep.soils import with_law
 
 if TYPE_CHECKING:
@@ -52,8 +51,7 @@ SENSITIVE_IN_WORDS = (
 MEANINGS = {
     "robust": IN_WORDS,
     "sensitive": SENSITIVE_IN_WORDS,
-    "open": "second opinions know boxes of rock of given density, elastic, dry, level, uniform soil, one spring and "
-    "corrected readings only",
+    "open": "second opinions know boxes of rock of given density, dry, level, uniform soil and corrected readings only",
 }
 """What a grade means of a pass of which second opinions were asked, if they could be."""
 UNSTUDIED_IN_WORDS = (
@@ -96,13 +94,10 @@ AT_ONCE = 400
 def can_be_asked(sweep: Sweep) -> bool:
     """Return whether the designs of a sweep are such as second opinions know.
 
-    They know boxes, one spring of the vehicle, plain dry soil and corrected readings, and are not asked of assumed
-    rock.
+    They know boxes, plain dry soil and corrected readings, and are not asked of assumed rock.
     """
     model = sweep.model
-    plain = model.ground.is_usual and model.unloading == UNLOADINGS[0] and not model.rock_assumed
-    plain = plain and model.shape.is_box
-    return plain and model.preset == "corrected" and SECOND_SPRING not in sweep.plan.columns
+    return model.ground.is_usual and model.shape.is_box and not model.rock_assumed and model.preset == "corrected"
 
 
 def meaning_of(row: Mapping[str, Any]) -> str | None:

@@ -94,7 +94,7 @@ FLAGS = (
         "more crush than the vehicle's front is calibrated for",
         "`vehicle_crush_m` above `vehicle.calibrated_crush` (1 m)",
         "After about 1 m of crush the chassis stiffens, as the paper says, and the model parts from the test on the "
-        "unsafe side. A second spring does not move the limit: the file says how far both are calibrated.",
+        "unsafe side.",
     ),
     Flag(
         "rotation",

@@ -36,9 +36,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 import boulder_kernels.rules as verdicts
-from boulder_kernels import SIMULATED, OutcomesAtRest, OutcomeTable, Status
+from boulder_kernels import SIMULATED, OutcomeTable, Status
 from boulder_kernels.rules import OF_CRITERION, RULES, RULINGS, VerdictLimits, write_rulings
-from boulder_sweep.columns import AT_REST, OUTCOMES, RATINGS, REASONS, VERDICTS, RowKind
+from boulder_sweep.columns import OUTCOMES, RATINGS, REASONS, VERDICTS, RowKind
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import ERROR, NUMERICAL_ERROR, PASS, UNDECIDED, Judged
 from boulder_sweep.judge.robustness import grades_without_asking, is_studied
@@ -184,7 +184,7 @@ def judge_once(
     """
     facts = facts_of(outcomes, designs, limits, rule)
     columns, words = {}, {}
-    for spec in (*OUTCOMES, *(AT_REST if isinstance(outcomes, OutcomesAtRest) else ())):
+    for spec in OUTCOMES:
         if only and spec.name not in only:
             continue
         if spec.name == "validity":
@@ -210,7 +210,7 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits, rule: np.
     known = designs.has_known_shape.astype(float)
     sizes = np.stack([designs.length, table.H, table.d, table.e_bumper, designs.bed_offset, flat, known])
     rulings = np.empty((len(RULINGS), len(status)))
-    given = OutcomeTable(status.astype(np.int8), *map(np.ascontiguousarray, outcomes[1 : len(OutcomeTable._fields)]))
+    given = OutcomeTable(status.astype(np.int8), *map(np.ascontiguousarray, outcomes[1:]))
     if not limits.guarded:
         unknown = np.full(len(status), np.nan)
         given = given._replace(theta_error=unknown, x_error=unknown)

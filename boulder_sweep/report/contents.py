@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from boulder_kernels import ELASTIC, Control, Readings, SecondSpring, Status, rules
+from boulder_kernels import Control, Readings, Status, rules
 from boulder_kernels.layered import PRESSURE_SLOPE
 from boulder_kernels.rules import OF_CRITERION, RULES
 from boulder_kernels.table import is_paired
-from boulder_sweep.columns import INPUTS, OPTIONAL_INPUTS, OUTCOMES, SECOND_SPRING_COLUMNS, TO_BUILD
+from boulder_sweep.columns import INPUTS, OPTIONAL_INPUTS, OUTCOMES, TO_BUILD
 from boulder_sweep.designs import LEAST_SOLIDITY, MOST_SOLIDITY, REASONS
 from boulder_sweep.investigation import family_bounds
 from boulder_sweep.judge.inputs import SOURCES
@@ -24,7 +24,7 @@ from boulder_sweep.judge.validity import FLAGS, has_odd_layers, largest_tested_r
 from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, STATUS_REASONS
 from boulder_sweep.report import page_records
 from boulder_sweep.report.build import kernel
-from boulder_sweep.report.figures import COLOURS, parts_of
+from boulder_sweep.report.figures import COLOURS, PARTS
 from boulder_sweep.report.rows import MOST_ELEMENTS, NOT_YET, ResultRows, label_of
 from boulder_sweep.settings.checks import (
     BEYOND_FRONT,
@@ -37,7 +37,7 @@ from boulder_sweep.settings.checks import (
 )
 from boulder_sweep.settings.choices import LAYER_FIELDS
 from boulder_sweep.settings.fields import BY_NAME, fields_of
-from boulder_sweep.settings.model import FEET, RESISTANCES, UNLOADINGS, WATER_KG_M3, Ground
+from boulder_sweep.settings.model import FEET, RESISTANCES, WATER_KG_M3, Ground
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import SYSTEMS, quantity_text, shown_unit
 from boulder_sweep.settings.values import EMPTY, NOT_A_NUMBER, OUTSIDE, needed, sample_of
@@ -59,10 +59,7 @@ OUTCOME_WORDS = {
 """Outcomes of a design that the page shows."""
 
 
-REFUSED_AT = (
-    *("", "embedment_depth_m", "hood_height_m", "impact_height_m"),
-    *("vehicle_second_spring_N_m", "boulder_mass_kg", ""),
-)
+REFUSED_AT = ("", "embedment_depth_m", "hood_height_m", "impact_height_m", "boulder_mass_kg", "")
 """The inputs beside which the page says why a design cannot be computed, in the order of `REASONS`; of an unusual value
 it says so in its note."""
 FIXED_SIDES = ["boulder_length_m", "boulder_width_m", "boulder_height_m"]
@@ -112,7 +109,7 @@ def page_data(
             if spec.name in OUTCOME_WORDS
         ],
         "start": dict(start),
-        "soil": _soil(law, ground, shape, simulated),
+        "soil": _soil(law, ground, shape),
         "face": isinstance(settings["inputs"]["impact_height_m"], str),
         "refusals": [*zip(REASONS, REFUSED_AT, strict=True)],
         "refused": {"outside": OUTSIDE, "empty": EMPTY, "not_a_number": NOT_A_NUMBER},
@@ -133,7 +130,7 @@ def page_data(
             "most_solidity": MOST_SOLIDITY,
         },
         "words": REASON_WORDS,
-        "parts": parts_of(control),
+        "parts": list(PARTS),
         "colours": COLOURS,
         "yaml": {system: _yaml(settings, ground, system) for system in SYSTEMS},
         "chosen": [dict(one) for one in chosen],
@@ -239,8 +236,8 @@ def _packed(content: bytes) -> str:
     return base64.b64encode(gzip.compress(content, 6, mtime=0)).decode()
 
 
-def _soil(law: str, ground: Ground, shape: Shape, control: Control) -> dict[str, Any]:
-    """The soil as it lies, as the kernel takes it; plastic soil is a layer also where it is uniform."""
+def _soil(law: str, ground: Ground, shape: Shape) -> dict[str, Any]:
+    """The soil as it lies, as the kernel takes it."""
     lies, profile = ground_of(law, ground), profile_of(shape)
     numbers = [float(value) for value in lies[:-1]]
     return {
@@ -253,7 +250,7 @@ def _soil(law: str, ground: Ground, shape: Shape, control: Control) -> dict[str,
         "profile": profile.ravel().tolist(),
         "deeper": len(lies.below),
         "points": len(profile),
-        "layers": max(layers_count(law, ground, shape), int(control.unloading != ELASTIC)),
+        "layers": layers_count(law, ground, shape),
     }
 
 
@@ -273,8 +270,7 @@ def _layout() -> dict[str, Any]:
         "layer_room": page_records.LAYER_ROOM,
         "piece_room": page_records.PIECE_ROOM,
         "element_room": page_records.ELEMENT_ROOM,
-        "memory_room": page_records.MEMORY_ROOM,
-        "columns": {**SOURCES, **dict(zip(SecondSpring._fields, SECOND_SPRING_COLUMNS, strict=True))},
+        "columns": SOURCES,
     }
 
 
@@ -382,8 +378,7 @@ def _yaml(settings: Mapping[str, Any], ground: Ground, system: str) -> dict[str,
         "soil": _ground_entries(ground, system),
         "lines": [
             f"criterion: {{{', '.join(limits)}}}",
-            f"model: {{readings: {readings}, soil: {soil}, resistance: {model.get('resistance', RESISTANCES[0])}, "
-            f"unloading: {model.get('unloading', UNLOADINGS[0])}}}",
+            f"model: {{readings: {readings}, soil: {soil}, resistance: {model.get('resistance', RESISTANCES[0])}}}",
             f"solver: {{{accuracy}, horizon: {solver['horizon_s']} s}}",
         ],
     }

@@ -6,21 +6,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from boulder_kernels import (
-    Control,
-    Design,
-    Outcome,
-    Problem,
-    Readings,
-    Record,
-    SecondSpring,
-    simulate,
-)
+from boulder_kernels import Control, Design, Outcome, Problem, Readings, Record, simulate
 from boulder_kernels._jit import array_kernel, inlined, when_compiling
 from boulder_kernels.control import STEP_RATIO
 from boulder_kernels.design import design_in
@@ -33,9 +23,8 @@ from boulder_kernels.error_estimates import (
     step_errors,
 )
 from boulder_kernels.ground import Ground, put_soil
-from boulder_kernels.impact import failed, simulate_last_resort
-from boulder_kernels.outcomes import COARSER, FINER, NONE_NEEDED, SECOND, STEP, THETA_MAX, Status, write_outcome
-from boulder_kernels.plastic import memory_of
+from boulder_kernels.impact import simulate_last_resort
+from boulder_kernels.outcomes import COARSER, FINER, NONE_NEEDED, SECOND, STEP, THETA_MAX, write_outcome
 from boulder_kernels.rules import (
     SLOWER_SPEEDS,
     Confirmation,
@@ -52,17 +41,17 @@ from boulder_kernels.rules import (
     put_ruling,
     ruling_of,
 )
-from boulder_kernels.soil_laws import ELEMENT_LAWS, SoilProfile, constants_in
+from boulder_kernels.soil_laws import SoilProfile, constants_in
 from boulder_kernels.time_history import sample_of, state_of
-from boulder_kernels.unloading import plastic_work, recall
 from boulder_sweep.report.page_records import (
     BELOW,
     CHECKED,
+    DESIGN_COUNT,
     ELEMENT_ROOM,
     GROUND_COUNT,
+    HISTORY_COUNT,
     LAYER_ROOM,
     LIMITS_COUNT,
-    MEMORY_ROOM,
     ONCE,
     PAIRED_AT,
     PIECE_ROOM,
@@ -73,24 +62,22 @@ from boulder_sweep.report.page_records import (
     D,
     H,
     copy_row,
+    elements_from,
     first_control,
     flag_inputs_at,
     given_control,
     halved_control,
     layers_from,
-    memory_from,
     outcome_at,
     outcomes_from,
     outlined_elements_from,
     pieces_from,
     readings_from,
     table_from,
-    taking_elements,
     tested_from,
-    written_out,
 )
 
-EXPORTS = {"rows": "pippipipipppippppp", "history": "pppipipipppippppppp"}
+EXPORTS = {"rows": "pippipipipppippppp", "history": "pppipipipppipppppp"}
 """The functions that the page calls, and their arguments: p for a pointer to doubles, i for a whole number."""
 carray: Any = None
 """`numba.carray`, which is there when kernels are compiled: a report is written without Numba."""
@@ -131,23 +118,20 @@ def put_soils(
 
 @inlined
 def write_history(
-    first: Any,
+    c: Any,
     design: Design,
-    second: SecondSpring,
     readings: Readings,
     record: Record,
     out: np.ndarray,
     centre: np.ndarray,
 ) -> None:
-    """Evaluate motion, force and energies of a record whose constants are `first` until a second spring takes over."""
-    centre[0], centre[1] = first.c_x, first.c_y
-    memory = memory_of(first)
+    """Evaluate motion, force and energies of a record."""
+    centre[0], centre[1] = c.c_x, c.c_y
     for i in range(record.times.size):
         y = state_of(record, i)
         if np.isnan(y.x_b):
             break
-        recall(i, memory)
-        sample = sample_of(record, i, first, second, design.m_v, readings)
+        sample = sample_of(record, i, c, design.m_v, readings)
         stored, touching = sample.stored, record.touching[i] > 0.0
         drag, damper, restoring, pull = (
             record.exchanged[i, 0],
@@ -158,25 +142,21 @@ def write_history(
         out[0, i], out[1, i], out[2, i], out[3, i], out[4, i], out[5, i] = y
         out[6, i] = record.touching[i]
         out[7, i] = -design.m_v * sample.rate.a_v if touching else 0.0
-        before, since = plastic_work(y, first, memory)
         out[8, i], out[9, i], out[10, i], out[11, i] = (
             stored.truck_kinetic,
             stored.boulder_kinetic,
             stored.boulder_rotational,
-            stored.soil_elastic - since,
+            stored.soil_elastic,
         )
-        out[17, i] = before + since
         out[12, i] = stored.crush_elastic
         out[13, i] = stored.gravity if readings.restoring_gravity else restoring
-        # What is spent where the second spring takes over is lasting crush, as what the damper takes up.
-        out[14, i], out[15, i], out[16, i] = drag, damper + sample.spent, -pull
+        out[14, i], out[15, i], out[16, i] = drag, damper, -pull
 
 
 @inlined
 def simulate_recorded(
     profile: Any,
     design: Design,
-    second: SecondSpring,
     readings: Readings,
     control: Control,
     record: Record,
@@ -184,29 +164,11 @@ def simulate_recorded(
     centre: np.ndarray,
 ) -> Outcome:
     """Simulate one design in the profile of its soil, and where `centre` has room evaluate the record."""
-    outcome = simulate(Problem(design, profile, second), readings, control, record)
+    outcome = simulate(Problem(design, profile), readings, control, record)
     if centre.size > 0:
-        first = constants_in(design, readings, control.elements, profile)
-        write_history(first, design, second, readings, record, out, centre)
+        c = constants_in(design, readings, control.elements, profile)
+        write_history(c, design, readings, record, out, centre)
     return outcome
-
-
-def by_element_laws() -> Callable[..., Outcome]:
-    """Return a kernel that simulates one design in soil elements of the law that its control asks for."""
-    last = "design, second, readings, control, record, out, centre"
-    lines, names = [f"def simulate(layers, room, memories, {last}):"], {}
-    for code, law in enumerate(ELEMENT_LAWS):
-        names[f"elements_{code}"] = taking_elements(law.record)
-        memory = None if law.gap is None else f"memory_from(room, control.elements, {law.gap}, memories)"
-        lines.append(f"if control.unloading == {code}:")
-        lines.append(f" soil_{code} = SoilProfile(layers, elements_{code}(room, control.elements), {memory})")
-        lines.append(f" return simulate_recorded(soil_{code}, {last})")
-    lines.append("return failed(INVALID)")
-    known = {"SoilProfile": SoilProfile, "memory_from": memory_from, "simulate_recorded": simulate_recorded}
-    return written_out("\n ".join(lines), failed=failed, INVALID=Status.INVALID.value, **known, **names)
-
-
-simulate_by_elements = by_element_laws()
 
 
 @array_kernel
@@ -215,7 +177,6 @@ def simulate_in_soil(
     outline: np.ndarray,
     soil_at: Any,
     design: Design,
-    second: SecondSpring,
     readings: Readings,
     control: Control,
     record: Record,
@@ -223,28 +184,26 @@ def simulate_in_soil(
     centre: np.ndarray,
 ) -> Outcome:
     """Simulate one design in its soil; layers, outline and room for the soil are as of `history`."""
-    m, points, n, samples = len(layers), len(outline), control.elements, record.times.size
-    kept = samples * (2 * n + 1)
-    room = carray(soil_at, (kept + ELEMENT_ROOM * n + MEMORY_ROOM,))[kept:]
+    m, points, n = len(layers), len(outline), control.elements
+    room = carray(soil_at, (ELEMENT_ROOM * n + 1,))
     if m == 0 and control.last_resort and control.stop_at_limit:
-        return simulate_last_resort(Problem(design, None, second), readings, control, record)
+        return simulate_last_resort(design, readings, control, record)
     if m == 0:
-        return simulate_recorded(None, design, second, readings, control, record, out, centre)
+        return simulate_recorded(None, design, readings, control, record, out, centre)
     if points > 0 and n == 0:
         k = m + points - 2
         pieces = pieces_from(carray(soil_at, (7, k)), carray(soil_at, (PIECE_ROOM * k,))[7 * k :], outline)
-        in_pieces = SoilProfile(layers, pieces, None)
-        return simulate_recorded(in_pieces, design, second, readings, control, record, out, centre)
+        in_pieces = SoilProfile(layers, pieces)
+        return simulate_recorded(in_pieces, design, readings, control, record, out, centre)
     if points > 0:
-        beside = SoilProfile(layers, outlined_elements_from(room, n, outline), None)
-        return simulate_recorded(beside, design, second, readings, control, record, out, centre)
+        beside = SoilProfile(layers, outlined_elements_from(room, n, outline))
+        return simulate_recorded(beside, design, readings, control, record, out, centre)
     if n == 0:
-        in_layers = SoilProfile(
-            layers, layers_from(carray(soil_at, (6, m)), carray(soil_at, (LAYER_ROOM * m,))[6 * m :]), None
-        )
-        return simulate_recorded(in_layers, design, second, readings, control, record, out, centre)
-    memories = carray(soil_at, (samples, 2 * n + 1))
-    return simulate_by_elements(layers, room, memories, design, second, readings, control, record, out, centre)
+        numbers = layers_from(carray(soil_at, (6, m)), carray(soil_at, (LAYER_ROOM * m,))[6 * m :])
+        in_layers = SoilProfile(layers, numbers)
+        return simulate_recorded(in_layers, design, readings, control, record, out, centre)
+    by_elements = SoilProfile(layers, elements_from(room, n))
+    return simulate_recorded(by_elements, design, readings, control, record, out, centre)
 
 
 @array_kernel
@@ -260,10 +219,10 @@ def solve(
     record: Record,
 ) -> int:
     """Simulate one design, write its outcome with the error of its steps, and return which second one it needs."""
-    design, second = design_in(designs, row), SecondSpring(designs[15, row], designs[16, row])
-    nothing, nowhere = carray(soil_at, (18, 0)), carray(soil_at, (0,))
+    design = design_in(designs, row)
+    nothing, nowhere = carray(soil_at, (HISTORY_COUNT, 0)), carray(soil_at, (0,))
     soil = layers[row], outlines[row], soil_at
-    outcome = simulate_in_soil(*soil, design, second, readings, control, record, nothing, nowhere)
+    outcome = simulate_in_soil(*soil, design, readings, control, record, nothing, nowhere)
     out[:, row] = np.nan
     write_outcome(out, row, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
     second_solution = int(out[SECOND, row])  # stands where the step is written
@@ -289,7 +248,7 @@ def solve_for_error(
     readings, given, way = readings_from(settings), given_control(settings), int(settings[PAIRED_AT])
     estimated = given.error_estimate
     nothing = carray(soil_at, (0,))
-    record = Record(nothing, carray(soil_at, (0, 6)), nothing, nothing, carray(soil_at, (0, 4)), nothing)
+    record = Record(nothing, carray(soil_at, (0, 6)), nothing, nothing, carray(soil_at, (0, 4)))
     first = first_control(given, estimated)
     second = solve(finer, row, designs, layers, outlines, soil_at, readings, first, record)
     if not estimated or way == ONCE or (way == CHECKED and second == NONE_NEEDED):
@@ -386,13 +345,13 @@ def rows(
     profile_at, points
         Profile of the boulders, shape (points, 4); no points for boxes.
     layers_at, m
-        Room for the layers of their soil, shape (n, m, 6), see `boulder_kernels.layered`; none for a uniform elastic
-        soil beside boxes.
+        Room for the layers of their soil, shape (n, m, 6), see `boulder_kernels.layered`; none for a uniform soil
+        beside boxes.
     outlines_at
         Room for the outlines of the boulders, shape (n, points, 4), see `boulder_kernels.outlined`.
     soil_at
         Room for the soil of one design: for its layers, LAYER_ROOM m numbers, for its pieces beside an outline,
-        PIECE_ROOM (m + points - 2), or for N soil elements ELEMENT_ROOM N + MEMORY_ROOM.
+        PIECE_ROOM (m + points - 2), or for N soil elements ELEMENT_ROOM N + 1.
     controls_at, count
         Settings, shape (count, len(SETTINGS)): the first, and finer ones in the order of
         `boulder_sweep.judge.refinement.finer_controls`. With one alone a late row counts as it is, and slower trucks
@@ -408,7 +367,7 @@ def rows(
     """
     controls, numbers = carray(controls_at, (count, SETTINGS_COUNT)), carray(limits_at, (LIMITS_COUNT,))
     limits, tested = limits_in(numbers), tested_from(numbers)
-    designs, sizes = carray(designs_at, (17, n)), carray(sizes_at, (SIZES_COUNT, n))
+    designs, sizes = carray(designs_at, (DESIGN_COUNT, n)), carray(sizes_at, (SIZES_COUNT, n))
     layers, outlines = carray(layers_at, (n, m, 6)), carray(outlines_at, (n, points, 4))
     put_soils(designs, ground_at, below_at, deeper, carray(profile_at, (points, 4)), layers, outlines)
     room = carray(room_at, (3, 11, n))
@@ -448,7 +407,6 @@ def history(
     states_at: Any,
     modes_at: Any,
     exchanged_at: Any,
-    offset_at: Any,
     history_at: Any,
     centre_at: Any,
 ) -> None:
@@ -459,14 +417,13 @@ def history(
     design_from
         Inputs, shape (len(DESIGN),); K_epsilon is written over.
     ground_at, below_at, deeper, profile_at, points, layers_at, m, outline_at, soil_at
-        The soil as it lies and room for what follows from it, as of `rows` for one design; with soil elements the
-        last is room for n samples, too.
+        The soil as it lies and room for what follows from it, as of `rows` for one design.
     settings_at
         Settings, shape (len(SETTINGS),).
     n, times_at
         Times of the samples, ascending [s], shape (n,).
-    states_at, modes_at, exchanged_at, offset_at
-        Room for the record, shapes (n, 6), (2, n), (n, 4) and (n,).
+    states_at, modes_at, exchanged_at
+        Room for the record, shapes (n, 6), (2, n) and (n, 4).
     history_at
         Where the results go, shape (len(HISTORY), n); NaN where the simulation does not get.
     centre_at
@@ -475,14 +432,17 @@ def history(
     s = carray(settings_at, (SETTINGS_COUNT,))
     readings, control = readings_from(s), given_control(s)
     control = first_control(control, control.error_estimate)
-    designs = carray(design_from, (17, 1))
+    designs = carray(design_from, (DESIGN_COUNT, 1))
     layers, outlines = carray(layers_at, (1, m, 6)), carray(outline_at, (1, points, 4))
     put_soils(designs, ground_at, below_at, deeper, carray(profile_at, (points, 4)), layers, outlines)
-    design, second = design_in(designs, 0), SecondSpring(designs[15, 0], designs[16, 0])
-    out, modes = carray(history_at, (18, n)), carray(modes_at, (2, n))
-    exchanged, offset = carray(exchanged_at, (n, 4)), carray(offset_at, (n,))
-    record = Record(carray(times_at, (n,)), carray(states_at, (n, 6)), modes[0], modes[1], exchanged, offset)
+    design = design_in(designs, 0)
+    out, modes, exchanged = (
+        carray(history_at, (HISTORY_COUNT, n)),
+        carray(modes_at, (2, n)),
+        carray(exchanged_at, (n, 4)),
+    )
+    record = Record(carray(times_at, (n,)), carray(states_at, (n, 6)), modes[0], modes[1], exchanged)
     out[:] = np.nan
     record.states[:] = np.nan
     centre = carray(centre_at, (2,))
-    simulate_in_soil(layers[0], outlines[0], soil_at, design, second, readings, control, record, out, centre)
+    simulate_in_soil(layers[0], outlines[0], soil_at, design, readings, control, record, out, centre)

@@ -9,7 +9,7 @@ page's script finds figures and sources by name and sets their data.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,8 +17,6 @@ from bokeh.models import ColumnDataSource, DataRange1d, HoverTool, TapTool
 from bokeh.models.annotations import BoxAnnotation, Legend
 from bokeh.plotting import figure
 
-from boulder_kernels import Control
-from boulder_kernels.plastic import is_plastic
 from boulder_sweep.settings.model import Ground
 from boulder_sweep.settings.shape import BOX, Shape
 from boulder_sweep.views.pictures import VERDICTS
@@ -28,7 +26,6 @@ COLOURS = {**VERDICTS, "none": "#BBBBBB"}
 HATCHES = {"sensitive": "/", "open": "."}
 """Patterns of passes that are not robust, by their grade."""
 LINES = ("#1E88C9", "#D55E00", "#009E73")
-PLASTIC_WORK = "soil_plastic"
 PARTS = {
     "vehicle_kinetic": ("vehicle, moving", "#0072B2"),
     "crush_damper": ("vehicle, crushed for good", "#56B4E9"),
@@ -37,7 +34,6 @@ PARTS = {
     "boulder_angular": ("boulder, turning", "#E69F00"),
     "gravity": ("boulder, lifted", "#F0E442"),
     "soil_elastic": ("soil, pressed", "#009E73"),
-    PLASTIC_WORK: ("soil, pressed for good", "#9A6324"),
     "soil_drag": ("soil, dragged", "#7FCFB5"),
 }
 """Energies in stacking order: word and colour."""
@@ -51,26 +47,19 @@ CAB_M = 0.85
 """How far the cab stands above the hood."""
 
 
-def parts_of(control: Control) -> list[str]:
-    """Return the energies that there are in a soil, in stacking order."""
-    return [part for part in PARTS if part != PLASTIC_WORK or is_plastic(control.unloading)]
-
-
-def curves(panel: str, parts: Sequence[str]) -> list[figure]:
+def curves(panel: str) -> list[figure]:
     """Return the figures of one simulated design.
 
     Parameters
     ----------
     panel
         Name of the part of the page; the names of figures and sources begin with it.
-    parts
-        Energies that are drawn, of `PARTS`.
     """
     motion = ColumnDataSource(
         {name: [0.0, 1.0] for name in ("time", "rotation", "limit", "boulder", "vehicle", "force")},
         name=f"{panel}-motion",
     )
-    energies = ColumnDataSource({name: [0.0, 1.0] for name in ("time", *parts)}, name=f"{panel}-energies")
+    energies = ColumnDataSource({name: [0.0, 1.0] for name in ("time", *PARTS)}, name=f"{panel}-energies")
     rotation = _plot(panel, "rotation", [("time", "@time{0.000} s"), ("rotation", "@rotation{0.00}")])
     rotation.line("time", "rotation", source=motion, line_width=2, color=LINES[0])
     rotation.line("time", "limit", source=motion, line_width=2, color=LINES[1], line_dash="dashed")
@@ -87,11 +76,11 @@ def curves(panel: str, parts: Sequence[str]) -> list[figure]:
     force.line("time", "force", source=motion, line_width=2, color=LINES[0])
     energy = _plot(panel, "energy", [])
     energy.varea_stack(
-        list(parts),
+        list(PARTS),
         x="time",
         source=energies,
-        color=[PARTS[part][1] for part in parts],
-        legend_label=[PARTS[part][0] for part in parts],
+        color=[colour for _, colour in PARTS.values()],
+        legend_label=[words for words, _ in PARTS.values()],
     )
     for plot in (displacement, energy):
         beside = plot.legend[0]

@@ -16,7 +16,7 @@ from bokeh.resources import INLINE
 from boulder_kernels import Control, Readings
 from boulder_sweep.report.contents import held_at, page_data, reading_words, table_data, thinned
 from boulder_sweep.report.export import setting_lines
-from boulder_sweep.report.figures import curves, parts_of, sketch_of, verdict_map
+from boulder_sweep.report.figures import curves, sketch_of, verdict_map
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import shown_settings
 from boulder_sweep.text import script_data
@@ -97,7 +97,7 @@ def assembled(
     mapped = table is not None and table["mapped"]
     panels = ["live", *(f"chosen{k}" for k in range(len(chosen)))]
     document = Document()
-    curved = [plot for panel in panels for plot in curves(panel, parts_of(control))]
+    curved = [plot for panel in panels for plot in curves(panel)]
     for plot in [*curved, *map(verdict_map, ["live", "sweep"] if mapped else ["live"])]:
         document.add_root(plot)
     docs, items = standalone_docs_json_and_render_items(list(document.roots))

@@ -10,19 +10,17 @@ from typing import Any, get_type_hints
 
 import numpy as np
 
-from boulder_kernels import Control, Design, DesignTable, OutcomeTable, Readings, SecondSpring
+from boulder_kernels import Control, Design, DesignTable, OutcomeTable, Readings
 from boulder_kernels._jit import function_of, inlined
 from boulder_kernels.control import EVENT_TOLERANCE
 from boulder_kernels.ground import Ground
 from boulder_kernels.layered import SoilElements, SoilLayers, SoilSums
 from boulder_kernels.outlined import OutlinedElements, OutlinedPieces
-from boulder_kernels.plastic import LAST, Memory, is_plastic
 from boulder_kernels.rules import RULINGS, SIZES, FlagInputs, Tested, VerdictLimits
-from boulder_kernels.soil_laws import ELEMENT_LAWS
 
-DESIGN = (*Design._fields, *SecondSpring._fields)
-"""Inputs of a design, in this order; SI, phi in rad, beta in MN/m^3. A vehicle without a second spring has one like its
-first, from a crush on that it never reaches: its results have the same bits."""
+DESIGN = Design._fields
+"""Inputs of a design, in this order; SI, phi in rad, beta in MN/m^3."""
+DESIGN_COUNT = len(DESIGN)
 V_0, D, H = (DESIGN.index(name) for name in ("v_0", "d", "H"))
 SETTINGS = (*Readings._fields, *Control._fields)
 """Settings of the simulation, in this order; booleans are 0 or 1."""
@@ -42,9 +40,10 @@ HISTORY = (
     *("x_b", "v_b", "theta_b", "omega_b", "x_v", "v_v"),
     *("touching", "F_v"),
     *("vehicle_kinetic", "boulder_linear", "boulder_angular", "soil_elastic", "crush_spring"),
-    *("gravity", "soil_drag", "crush_damper", "pull", "soil_plastic"),
+    *("gravity", "soil_drag", "crush_damper", "pull"),
 )
 """Columns of a time history, in this order; m, rad, N, J. The parts of the energy as in `EnergyLedger`."""
+HISTORY_COUNT = len(HISTORY)
 ENERGY = HISTORY.index("vehicle_kinetic")
 """Index of the first energy."""
 GROUND = (*Ground._fields[:-1], "layered", "slices")
@@ -73,7 +72,7 @@ def changing_control(arguments: str, **changed: str) -> Callable[..., Control]:
     """Return a kernel that takes a control c and other arguments, and changes fields to expressions of them."""
     fields = [changed.get(name, f"c.{name}") for name in Control._fields]
     source = f"def change({arguments}):\n return Control({', '.join(fields)})"
-    return written_out(source, Control=Control, is_plastic=is_plastic)
+    return written_out(source, Control=Control)
 
 
 readings_from, given_control = taking(Readings), taking(Control, len(Readings._fields))
@@ -90,12 +89,7 @@ flag_inputs_at = written_out(
     FlagInputs=FlagInputs,
 )
 """What the flags of one design depend on."""
-first_control = changing_control(
-    "c, refined",
-    refined="refined",
-    locate_yield="c.locate_yield and not is_plastic(c.unloading)",  # what yields in plastic soil depends on its memory
-    paired="False",
-)
+first_control = changing_control("c, refined", refined="refined", paired="False")
 """Control of a solution, with its step or a third of it."""
 halved_control = changing_control("c", h="0.5 * c.h", locate_yield="True", event_tolerance=repr(EVENT_TOLERANCE))
 """Control of a second solution, `boulder_kernels.table.halved`."""
@@ -114,11 +108,8 @@ LAYER_ROOM = len(SoilLayers._fields) - 1 + len(SoilSums._fields)
 
 PIECE_ROOM = len(OutlinedPieces._fields) - 1
 """The same for each piece of the soil beside a boulder with an outline: of M layers and P points M + P - 2."""
-MEMORY_AT = max(len(law.record._fields) for law in ELEMENT_LAWS)
-"""Where the memory of N soil elements begins, over N."""
-ELEMENT_ROOM, MEMORY_ROOM = MEMORY_AT + 2, LAST + 6
-"""The same for each of N soil elements with what it remembers, and once for all; before them, where a record is kept,
-2 N + 1 for each of its samples."""
+ELEMENT_ROOM = len(SoilElements._fields)
+"""The same for each of N soil elements, and one more for the weight beside an outline."""
 
 
 @inlined
@@ -127,13 +118,10 @@ def layers_from(t: np.ndarray, sums: np.ndarray) -> SoilLayers:
     return SoilLayers(t[0], t[1], t[2], t[3], t[4], t[5], sums)
 
 
-def taking_elements(record: Any) -> Callable[[np.ndarray, int], Any]:
-    """Return a kernel that takes the first numbers of an array as n soil elements of one design."""
-    fields = [f"room[{k} * n : {k + 1} * n]" for k in range(len(record._fields))]
-    return written_out(f"def take(room, n):\n return Record({', '.join(fields)})", Record=record)
-
-
-elements_from = taking_elements(SoilElements)
+@inlined
+def elements_from(room: np.ndarray, n: int) -> SoilElements:
+    """Return the first numbers of an array as n soil elements of one design."""
+    return SoilElements(room[:n], room[n : 2 * n], room[2 * n : 3 * n], room[3 * n : 4 * n])
 
 
 @inlined
@@ -146,10 +134,3 @@ def pieces_from(t: np.ndarray, lean: np.ndarray, outline: np.ndarray) -> Outline
 def outlined_elements_from(room: np.ndarray, n: int, outline: np.ndarray) -> OutlinedElements:
     """Return the first numbers of an array as n soil elements of one design beside an outline."""
     return OutlinedElements(elements_from(room, n), room[4 * n : 4 * n + 1], outline)
-
-
-@inlined
-def memory_from(room: np.ndarray, n: int, gap: bool, samples: np.ndarray) -> Memory:
-    """Return the numbers behind n soil elements as what they remember."""
-    front, back = MEMORY_AT * n, (MEMORY_AT + 1) * n
-    return Memory(room[front:back], room[back : ELEMENT_ROOM * n], gap, room[ELEMENT_ROOM * n :], samples)

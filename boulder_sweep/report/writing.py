@@ -32,7 +32,7 @@ from boulder_sweep.store.files import check_target, put_file
 from boulder_sweep.store.provenance import identity as identity_of
 from boulder_sweep.store.provenance import versions
 from boulder_sweep.text import counted, printable, why
-from boulder_sweep.views.wording import UNLOADING_WORDS, name_of, value_text
+from boulder_sweep.views.wording import name_of, value_text
 
 KINDS = (".html", ".htm", ".pdf")
 PACKAGES = ("boulder-sweep", "numba", "llvmlite", "numpy", "pyarrow", "python")
@@ -252,8 +252,6 @@ def _general_notes(settings: Mapping[str, Any], control: Control, units: str) ->
         notes.append(f"Friction angles are design values, with a partial factor of {factor:g} on their tangent.")
     if not control.error_estimate:
         notes.append("Numerical errors are those of one solution: a verdict nearer to a limit than that is undecided.")
-    if control.unloading:
-        notes.append(f"The soil has {UNLOADING_WORDS[control.unloading]}.")
     if control.elements > MOST_ELEMENTS:
         notes.append(
             f"The settings ask for {control.elements:,} soil elements; what is simulated in this page uses "

@@ -221,7 +221,7 @@ class Run:
     def compute(self, progress: Report | None, commit_every_s: float) -> None:
         """Compute and write what is missing."""
         evaluation = self._evaluation
-        computation = Computation(evaluation, self._sweep.block, self._metadata, evaluation.warm_up, evaluation.columns)
+        computation = Computation(evaluation, self._sweep.block, self._metadata, evaluation.warm_up)
         workers = self._workers(computation, commit_every_s)
         committer = Committer(self._folder, computation, workers)
         try:

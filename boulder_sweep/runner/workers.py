@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from boulder_sweep.columns import OUTCOMES, OutcomeColumn
 from boulder_sweep.errors import ComputationError
 from boulder_sweep.judge.judged import Judged, joined, not_computed
 from boulder_sweep.runner.pool import Call, call, telling_start_failure
@@ -51,8 +50,6 @@ class Computation:
         Metadata of the files of parts.
     warm_up
         Loads or compiles what `evaluate` calls.
-    specs
-        Outcome columns that `evaluate` gives.
     """
 
     def __init__(
@@ -61,13 +58,11 @@ class Computation:
         make_block: MakeBlock,
         metadata: Mapping[bytes, bytes],
         warm_up: Callable[[], None] = lambda: None,
-        specs: Sequence[OutcomeColumn] = OUTCOMES,
     ):
         self._evaluate = evaluate
         self._make_block = make_block
         self._metadata = dict(metadata)
         self._warm_up = warm_up
-        self._columns = tuple(spec.name for spec in specs)
         self._failures = 0
 
     def warm_up(self) -> None:
@@ -101,7 +96,7 @@ class Computation:
         from boulder_sweep.store.provenance import cpu_metadata
         from boulder_sweep.store.schema import encode, part_table, verdict_counts  # imports pyarrow
 
-        judged = joined(list(pieces)).only(self._columns)
+        judged = joined(list(pieces))
         rows = len(judged.verdict)
         table = part_table(self._make_block(first, first + rows), judged, {**self._metadata, **cpu_metadata()})
         return EncodedPart(first, rows, encode(table), verdict_counts(judged))

@@ -11,14 +11,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from boulder_sweep.columns import BOULDER_MASS, SECOND_SPRING_COLUMNS, WAY_OUT
+from boulder_sweep.columns import BOULDER_MASS, WAY_OUT
 from boulder_sweep.designs import LEAST_SOLIDITY, MOST_SOLIDITY, SIDES
 from boulder_sweep.investigation import api_curve, off_families, terzaghi_curve
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.distributions import BOUNDED, Distribution, SetDistributions
 from boulder_sweep.settings.entries import Entries
 from boulder_sweep.settings.fields import BY_NAME, Field
-from boulder_sweep.settings.model import UNLOADINGS, WATER_KG_M3, Layer, Model, SolverSettings
+from boulder_sweep.settings.model import WATER_KG_M3, Layer, Model, SolverSettings
 from boulder_sweep.settings.problems import Position, Problem
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.sweep import Sweep
@@ -129,8 +129,6 @@ def check_pairs(entries: Entries) -> None:
         key = "hood_height" if "vehicle.hood_height" in entries.given else "bumper_height"
         entries.report(f"vehicle.{key}", f"the hood ({hood:g} m) is lower than the bumper ({bumper:g} m)")
     _check_impact_height(entries, bumper)
-    _check_second_spring(entries)
-    _check_shape(entries)
     _check_mass(entries)
     _check_solver(entries)
     _check_uncertain(entries)
@@ -150,30 +148,9 @@ def _check_impact_height(entries: Entries, bumper: float | None) -> None:
         entries.problems.add(entries.leaves["impact_height_m"].position, "site.impact_height", message)
 
 
-def _check_second_spring(entries: Entries) -> None:
-    """Report half of a second spring, and one that is softer than the first."""
-    both = [BY_NAME[name] for name in SECOND_SPRING_COLUMNS]
-    given = [field for field in both if field.path in entries.given or field.name in entries.listed]
-    if len(given) == 1:
-        lacking = next(field for field in both if field not in given)
-        entries.report(given[0].path, f"needs {lacking.key} beside it")
-    spring, second = entries.single("vehicle_spring_N_m"), entries.single(both[0].name)
-    if spring is not None and second is not None and second < spring:
-        message = f"{second:g} N/m is softer than the first spring of {spring:g} N/m; a front that softens is refused"
-        entries.report(both[0].path, message)
-
-
 def shape_in(entries: Entries) -> Shape:
     """Return the shape of the boulders, as far as it can be read."""
     return Model(**{name: entries.settings[name] for name in ("profile", "taper") if name in entries.settings}).shape
-
-
-def _check_shape(entries: Entries) -> None:
-    """Report soil that is not elastic beside a boulder that is no box."""
-    key = "profile" if "profile" in entries.settings else "taper"
-    if not shape_in(entries).is_box and entries.settings.get("unloading", UNLOADINGS[0]) != UNLOADINGS[0]:
-        message = f"soil that is not elastic is modelled beside boxes only; remove boulder.{key} or model.unloading"
-        entries.report(f"boulder.{key}", message)
 
 
 def _check_mass(entries: Entries) -> None:
@@ -360,8 +337,6 @@ def _off_front(values: Mapping[str, np.ndarray], groups: list[dict[str, np.ndarr
 
     The crush grows with mass and speed, and falls with spring and damper, so the ends of axes suffice.
     """
-    if "vehicle_second_spring_N_m" in values:
-        return ""  # its front is no single spring and damper
     listed = [group for group in groups if len(group) > 1 and set(group) & set(_FRONT)]
     front = []
     for name in _FRONT:

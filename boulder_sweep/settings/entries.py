@@ -20,7 +20,7 @@ from boulder_sweep.settings.soil_readings import CORRELATION, METHODS, SOIL_KEYS
 from boulder_sweep.settings.sweep import SECTION, DesignList
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
 from boulder_sweep.settings.values import meant_by, read_single
-from boulder_sweep.settings.vehicle import APPROACH, unfold_approaches, unfold_springs
+from boulder_sweep.settings.vehicle import APPROACH, unfold_approaches
 
 NAMED_SETS = ("soil", "vehicle")
 """Blocks that may be a list of named sets."""
@@ -103,8 +103,6 @@ class Entries:
 
     def _unfold(self) -> None:
         """Replace what stands for other entries by these."""
-        with self.reporting("vehicle.spring", ["vehicle.spring"]) as mistakes:
-            unfold_springs(self.root, mistakes)
         with self.reporting(f"vehicle.{APPROACH}", ["vehicle.speed"]) as mistakes:
             approaches = unfold_approaches(self.root, mistakes)
         self.derived |= {APPROACH: approaches} if approaches else {}

@@ -163,22 +163,6 @@ INPUTS: tuple[Field, ...] = (
         also=("c_v", "damping", "dashpot"),
     ),
     _input(
-        "vehicle.second_spring",
-        "vehicle_second_spring_N_m",
-        Bound(1.0, 1e13, _CONSTANT),
-        Usual(2e5, 5e7, "truck fronts; a bare number is in N/m, not in kN/m"),
-        held=True,
-        also=("k_2", "second_stiffness"),
-        optional=True,
-    ),
-    _input(
-        "vehicle.second_spring_from",
-        "vehicle_second_spring_from_m",
-        Bound(1e-3, 100.0, "counted from the first touch"),
-        also=("s_2", "beyond"),
-        optional=True,
-    ),
-    _input(
         "vehicle.bumper_height",
         "bumper_height_m",
         _ABOVE_GROUND,

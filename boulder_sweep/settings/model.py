@@ -42,11 +42,8 @@ FOOT_WORDS = {
 }
 """What every answer says of it."""
 
-UNLOADINGS = ("elastic", "plastic", "plastic_with_gap")
-"""How the soil unloads, in the order of `boulder_kernels.soil_laws.ELEMENT_LAWS`; the first is the paper's."""
-PLASTIC_UNLOADINGS = UNLOADINGS[1:3]  # after which boulders come to rest
-PLASTIC_ELEMENTS = 200
-"""Soil elements where the soil is not elastic and no number is given; a note says what fewer cost."""
+ENOUGH_ELEMENTS = 200
+"""Soil elements that come near their limit; a note says what fewer cost."""
 
 
 class Bound(NamedTuple):
@@ -320,14 +317,6 @@ class Model:
         kind="a law for a second opinion",
         shown_default=NO_OPINION,
     )
-    unloading: str = setting(
-        "model.unloading",
-        "",
-        "elastic or plastic soil, and whether a gap opens behind the boulder",
-        UNLOADINGS[0],
-        choices=UNLOADINGS,
-        kind="a way in which the soil unloads",
-    )
     layers: tuple[Layer, ...] = setting(
         "soil.layers", "", "layers below the uppermost, which the other entries describe", ()
     )
@@ -391,14 +380,9 @@ class Model:
     """Whether the density of the rock is `ROCK_KG_M3` because the file gives the mass of the boulders only."""
 
     @property
-    def elements(self) -> int:
-        """Number of soil elements that is computed with; 0 for the closed form, which elastic soil has."""
-        return self.soil_elements or (0 if self.unloading == UNLOADINGS[0] else PLASTIC_ELEMENTS)
-
-    @property
     def has_few_elements(self) -> bool:
         """Whether the file asks for fewer soil elements than it takes to come near their limit."""
-        return 0 < self.soil_elements < PLASTIC_ELEMENTS
+        return 0 < self.soil_elements < ENOUGH_ELEMENTS
 
     @property
     def ground(self) -> Ground:
@@ -424,7 +408,7 @@ class Model:
 def completed(settings: dict[str, Any]) -> dict[str, Any]:
     """Return the resolved settings of a table with today's defaults for entries that are newer than it."""
     model = Model()
-    more = {name: getattr(model, name) for name in ("calibrated_crush_m", "resistance", "unloading", "foot")}
+    more = {name: getattr(model, name) for name in ("calibrated_crush_m", "resistance", "foot")}
     return settings | {
         "criterion": asdict(Criterion()) | settings["criterion"],
         "model": more | settings["model"],

@@ -77,8 +77,6 @@ _EXAMPLES: dict[str, tuple[str, str]] = {
     "soil.water_table": ("0.8 m", "2.6 ft"),
     "vehicle.spring": ("3103.3 kN/m", "17720 lb/in"),
     "vehicle.damper": ("138.91 kN*s/m", "793 lb*s/in"),
-    "vehicle.second_spring": ("9000 kN/m", "51000 lb/in"),
-    "vehicle.second_spring_from": ("1 m", "3 ft"),
     "partial_factor.friction_angle": ("1.25",) * 2,
     "solver.step": ("4 ms",) * 2,
 }

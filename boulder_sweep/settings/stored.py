@@ -55,7 +55,6 @@ _CONTROL_BOUNDS = {
     "theta_limit": (math.radians(0.01), math.radians(90.0)),
     "elements": (0, MAX_ELEMENTS),
     "longest_horizon": (0.0, 1e4),
-    "unloading": (0, 2),
     "event_tolerance": (1e-12, 1.0),
 }
 
@@ -84,7 +83,6 @@ class _Model:
     soil: int | Literal["closed_form"]
     calibrated_crush_m: float = _USUAL.calibrated_crush_m
     resistance: str = _USUAL.resistance
-    unloading: str = _USUAL.unloading
     foot: str = _USUAL.foot
     rock_assumed: bool = False
     profile: tuple[ProfilePoint, ...] = ()

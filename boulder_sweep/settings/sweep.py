@@ -265,10 +265,9 @@ class Sweep:
             "model": {
                 "preset": self.model.preset,
                 "readings": self.model.readings.as_dict(),
-                "soil": self.model.elements or CLOSED_FORM,
+                "soil": self.model.soil_elements or CLOSED_FORM,
                 "calibrated_crush_m": self.model.calibrated_crush_m,
                 "resistance": self.model.resistance,
-                "unloading": self.model.unloading,
                 "foot": self.model.foot,
                 **({"rock_assumed": True} if self.model.rock_assumed else {}),
                 **({} if self.model.shape.is_box else {"profile": self.model.shape.as_list()}),

@@ -1,4 +1,4 @@
-"""Entries of a vehicle that stand for others: the stages of its spring, and the street to the boulder for its speed.
+"""The street to the boulder, which stands for the speed of a vehicle.
 
 The vehicle leaves the last curve, or passes the beginning of the run-up, and accelerates up to the boulder:
 ``v^2 = v_0^2 + 2 (a - g sin(atan(grade))) s``. A curve is left with at most ``sqrt(mu g r)``, the speed at which the
@@ -18,12 +18,8 @@ from typing import Any
 from boulder_sweep.settings.model import Bound, entries_of, setting
 from boulder_sweep.settings.problems import Mistakes, wrong
 from boulder_sweep.settings.shown_units import quantity_text
-from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
+from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar
 from boulder_sweep.settings.values import read_block
-
-STAGE_KEYS = ({"stiffness"}, {"beyond", "stiffness"})
-"""Keys of the first stage of a spring and of the second."""
-STAGES_FORM = "[{stiffness: ...}, {beyond: ..., stiffness: ...}]"
 
 G = 9.80665
 """Acceleration of gravity [m/s^2]."""
@@ -36,60 +32,6 @@ NEEDS_ACCELERATION = (
     "lacks acceleration: that of the vehicle at full throttle on level ground, averaged over the run-up, by its maker "
     "or a timed run from rest (2 s / t^2); no values for classes of vehicles are built in"
 )
-
-
-def unfold_springs(root: Mapping, mistakes: Mistakes) -> None:
-    """Replace the stages of every vehicle's spring by entries of their own.
-
-    Parameters
-    ----------
-    root : Mapping
-        The tree of the file, changed in place.
-    mistakes : Mistakes
-        Receives what is wrong with them.
-    """
-    for vehicle in root.blocks("vehicle"):
-        spring = vehicle.get("spring")
-        if isinstance(spring, Sequence) and any(isinstance(item, Mapping) for item in spring.items):
-            with mistakes:
-                _unfold_stages(vehicle, spring)
-
-
-def _unfold_stages(vehicle: Mapping, spring: Sequence) -> None:
-    """Replace the stages of one vehicle's spring.
-
-    Raises
-    ------
-    LeafError
-        With every mistake in them; the spring is taken out of the tree then.
-    """
-    stages = [item for item in spring.items if isinstance(item, Mapping)]
-    if len(stages) < len(spring.items) or len(stages) > 2 or spring.unit is not None:
-        del vehicle.entries["spring"]
-        raise wrong(spring.position, f"takes one stage or two: {STAGES_FORM}")
-    mistakes = Mistakes()
-    for stage, keys in zip(stages, STAGE_KEYS, strict=False):
-        if set(stage.entries) != keys:
-            message = f"a stage of the spring has {' and '.join(sorted(keys))}, as in {STAGES_FORM}"
-            mistakes.add(stage.position, message)
-    entries: dict[str, Entry] = {}
-    for entry in vehicle:
-        if entry.key == "spring" and not mistakes:
-            entries |= _entries_of_stages(stages)
-        elif entry.key in entries and entry.position.line is not None:
-            mistakes.add(entry.position, f"{entry.key} stands in the stages of the spring, too; remove one")
-        elif entry.key != "spring":
-            entries[entry.key] = entry  # what --set gives takes the place of what the file gives
-    vehicle.entries = entries
-    mistakes.raise_if_any()
-
-
-def _entries_of_stages(stages: list[Mapping]) -> dict[str, Entry]:
-    """Return the entries that the stages stand for."""
-    entries = {"spring": stages[0].entries["stiffness"]}
-    for stage in stages[1:]:
-        entries |= {"second_spring_from": stage.entries["beyond"], "second_spring": stage.entries["stiffness"]}
-    return {key: Entry(key, entry.position, entry.value) for key, entry in entries.items()}
 
 
 class NoApproachError(ValueError):

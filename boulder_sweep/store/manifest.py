@@ -19,9 +19,8 @@ from dataclasses import MISSING, asdict, dataclass, field, fields
 from itertools import pairwise
 from typing import Any, get_args, get_origin, get_type_hints
 
-from boulder_sweep.columns import AT_REST, COLUMNS, DESIGN_ID, INPUT_COLUMNS, OPTIONAL_COLUMNS
+from boulder_sweep.columns import COLUMNS, DESIGN_ID, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.locations import Location
-from boulder_sweep.settings.model import PLASTIC_UNLOADINGS
 from boulder_sweep.settings.problems import shorten
 from boulder_sweep.store import failures
 from boulder_sweep.store.files import MANIFEST_NAME, PART_SUFFIX, hidden_name, part_name
@@ -153,14 +152,12 @@ class Manifest:
 
     @property
     def more_columns(self) -> tuple[str, ...]:
-        """Names of the columns that not every table has: of boulders at rest, optional inputs, text of the settings."""
+        """Names of the columns that not every table has: optional inputs, text of the settings."""
         settings = self.identity.get("settings")
         if not isinstance(settings, dict):
             return ()
-        is_plastic = settings.get("model", {}).get("unloading") in PLASTIC_UNLOADINGS
-        resting = [spec.name for spec in AT_REST] if is_plastic else []
         inputs = settings.get("inputs", {})
-        return (*resting, *(name for name in OPTIONAL_COLUMNS if name in inputs), *settings.get("labels", ()))
+        return (*(name for name in OPTIONAL_COLUMNS if name in inputs), *settings.get("labels", ()))
 
 
 def total_verdicts(parts: Iterable[Part]) -> dict[str, int]:

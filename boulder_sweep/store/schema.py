@@ -16,7 +16,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from boulder_sweep.columns import (
-    AT_REST,
     COLUMNS,
     DESIGN_ID,
     GRADES,
@@ -52,8 +51,7 @@ def table_schema(metadata: Mapping[bytes, bytes] | None = None, more: Iterable[s
     metadata
         Goes into the metadata of the file.
     more
-        Names of the columns that not every table has: outcomes and inputs of laws that the settings file switches on,
-        and text columns that it gives.
+        Names of the columns that not every table has: optional inputs, and text columns that the settings file gives.
     """
     specs = [*COLUMNS, *(column_spec(name) for name in more)]
     return pa.schema([_field(spec, _TYPES[spec.type]) for spec in specs], metadata=_complete(metadata, specs))
@@ -78,12 +76,11 @@ def part_table(block: DesignBlock, judged: Judged, metadata: Mapping[bytes, byte
     """
     arrays = [number_array(block.design_id())]
     arrays += [_input_array(block.columns[spec.name]) for spec in INPUTS]
-    resting = [spec for spec in AT_REST if spec.name in judged.columns]
-    arrays += [_outcome_array(spec, judged) for spec in (*OUTCOMES, *resting)]
+    arrays += [_outcome_array(spec, judged) for spec in OUTCOMES]
     optional = [name for name in OPTIONAL_COLUMNS if name in block.columns]
     arrays += [_input_array(block.columns[name]) for name in optional]
     arrays += [word_array(label.codes, label.words) for label in block.labels.values()]
-    specs = [*COLUMNS, *resting, *(column_spec(name) for name in (*optional, *block.labels))]
+    specs = [*COLUMNS, *(column_spec(name) for name in (*optional, *block.labels))]
     fields = [_field(spec, array.type) for spec, array in zip(specs, arrays, strict=True)]
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=_complete(metadata, specs)))
 
@@ -123,7 +120,7 @@ def encode(table: pa.Table) -> memoryview:
 def judged_rows(table: pa.Table) -> Judged:
     """Return the outcomes of a table that was read back, as they were before it was written."""
     columns, words = {}, {}
-    for spec in (*OUTCOMES, *(spec for spec in AT_REST if spec.name in table.column_names)):
+    for spec in OUTCOMES:
         if spec.type == "dictionary":
             words[spec.name], columns[spec.name] = _coded(table[spec.name], spec.words)
         else:

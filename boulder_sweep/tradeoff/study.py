@@ -26,7 +26,6 @@ from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.inputs import sampled_designs
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.runner.pool import THREADING, pool
-from boulder_sweep.settings.model import UNLOADINGS
 from boulder_sweep.store.files import replacing
 from boulder_sweep.tradeoff.points import Method, Point, SampledDesigns, mark_front
 
@@ -212,15 +211,10 @@ def measure(
     Raises
     ------
     NothingToMeasureError
-        No design of the sample can be computed, or its soil is not elastic.
+        No design of the sample can be computed.
     """
     begun = time.monotonic()
     sweep = at_values(sweep)
-    if sweep.model.unloading != UNLOADINGS[0]:
-        raise NothingToMeasureError(
-            f"{sweep.name}: model.unloading is {sweep.model.unloading}, and the methods that are compared here are "
-            f"ways to compute elastic soil (model.unloading: {UNLOADINGS[0]})"
-        )
     if backend != THREADING:
         with pool(1, backend, scheduler) as workers:
             return next(workers([(measure, (sweep,), {"designs": designs, "seconds": seconds})]))

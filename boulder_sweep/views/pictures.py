@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 # Colours of Okabe and Ito: distinct for every kind of colour vision, and in grey.
 BLUE, ORANGE, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 SKY, YELLOW, AMBER, BLACK = "#56B4E9", "#F0E442", "#E69F00", "#222222"
-PALE_ORANGE, BROWN = "#EDB08A", "#8C6D46"
+PALE_ORANGE = "#EDB08A"
 GREY, LIGHT_GREY, DARK_GREY = "#6E6E6E", "#D9D9D9", "#444444"
 VERDICTS = {
     "pass": BLUE,

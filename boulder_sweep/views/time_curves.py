@@ -9,18 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_sweep.errors import PictureError
-from boulder_sweep.settings.model import PLASTIC_UNLOADINGS
 from boulder_sweep.views import pictures
 from boulder_sweep.views.pictures import (
     AMBER,
     BLACK,
     BLUE,
-    BROWN,
     GREEN,
     GREY,
     LIGHT_GREY,
     ORANGE,
-    PALE_ORANGE,
     PURPLE,
     SKY,
     YELLOW,
@@ -34,7 +31,7 @@ if TYPE_CHECKING:
 
 
 BEYOND_LIMIT, AFTER_PEAK = "#F3E7DF", "#F0F0F0"
-"""Behind the curves where the model no longer holds, and where elastic soil returns all the energy that it took."""
+"""Behind the curves where the model no longer holds, and where the soil returns all the energy that it took."""
 
 
 def draw_trajectory(trajectory: Trajectory, path: str | Path, *, units: str = "si") -> None:
@@ -85,8 +82,7 @@ def unreliable_from(trajectory: Trajectory) -> tuple[float, str]:
     Returns
     -------
     float
-        Time of the rotation limit; where it is not reached, of the last peak of rotation and displacement in elastic
-        soil, and never in plastic soil: infinite [s].
+        Time of the rotation limit; where it is not reached, of the last peak of rotation and displacement [s].
     str
         What makes the time after it unreliable.
     """
@@ -94,8 +90,6 @@ def unreliable_from(trajectory: Trajectory) -> tuple[float, str]:
     if reached is not None:
         limit = math.degrees(trajectory.motion.control.theta_limit)
         return reached, f"shaded: beyond {limit:g}° the model no longer holds"
-    if trajectory.settings["model"].get("unloading") in PLASTIC_UNLOADINGS:
-        return math.inf, ""
     peak = max(maxima.t_theta, maxima.t_x_b)
     return peak, "shaded: rebound (the soil of the model has no memory)"
 
@@ -234,10 +228,6 @@ def draw_energy(trajectory: Trajectory, path: str | Path, *, units: str = "si") 
         axes = fig.subplots()
         above, below = np.zeros_like(time), np.zeros_like(time)
         layers = [(getattr(ledger, name) / size, label, colour) for name, label, colour in LAYERS]
-        if ledger.soil_plastic_J.max() > 0.0:
-            layers.insert(3, (ledger.soil_plastic_J / size, "soil: pressed for good", BROWN))
-        if ledger.crush_spent_J.any():
-            layers.insert(1, (ledger.crush_spent_J / size, "crush of the vehicle (spent as it stiffened)", PALE_ORANGE))
         if np.abs(ledger.pull_J).max() > 0.0:
             layers.append((ledger.pull_J / size, "out of nothing (printed separation)", BLACK))
         handles = []

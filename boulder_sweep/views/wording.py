@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.columns import BY_NAME
-from boulder_sweep.settings.model import UNLOADINGS, Ground
+from boulder_sweep.settings.model import Ground
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import number_text, shown_unit
 from boulder_sweep.text import NO_BREAK_SPACE
@@ -110,8 +110,6 @@ REASON_WORDS = {
 
 LAW_WORDS = {"broms": "3 K_p (Broms)", "width_capped": "capped by the width"}
 """Laws of the soil's resistance that are not the paper's."""
-UNLOADING_WORDS = ("elastic unloading", "plastic unloading", "plastic unloading with a gap")
-"""How the soil unloads, in the order of the kernels."""
 NOT_A_TEST = "Simulation, not a rating by test"
 
 
@@ -142,11 +140,9 @@ def model_words(settings: Mapping[str, Any], units: str = "si") -> str:
     """Return the readings of the paper, and the laws of the soil and its ground where they are not the paper's."""
     model = settings["model"]
     law = LAW_WORDS.get(model.get("resistance", ""), "")
-    unloading = UNLOADINGS.index(model.get("unloading", UNLOADINGS[0]))
     words = (
         f"readings {model['preset'].replace('_', ' ')}",
         f"resistance {law}" if law else "",
-        UNLOADING_WORDS[unloading] if unloading else "",
         ground_words(settings, units),
         Shape.of_model(settings["model"]).words,
     )

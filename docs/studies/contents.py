@@ -22,7 +22,6 @@ from docs.studies import (
     site_data,
     soil,
     stones,
-    unloading,
 )
 from docs.studies.coverage import NUMBERS, coverage_table, coverages, grid_table, random_table
 from docs.studies.extremes import admitted_table, box_shares_table, refusal_table
@@ -175,18 +174,6 @@ def _soil_grid(root: Path) -> str:
     return soil.grid_table(root / GRID).markdown()
 
 
-def _unloading_tests(_: Path) -> str:
-    return unloading.tests_table().markdown()
-
-
-def _unloading_grid(root: Path) -> str:
-    return unloading.grid_table(root / GRID).markdown()
-
-
-def _unloading_elements(root: Path) -> str:
-    return unloading.elements_table(root / GRID).markdown()
-
-
 def _pushover(_: Path) -> str:
     return against_tests.pushover_table().markdown()
 
@@ -273,9 +260,6 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "soil-tests": _soil_tests,
     "soil-grid": _soil_grid,
     "soil-ground": _soil_ground,
-    "unloading-tests": _unloading_tests,
-    "unloading-grid": _unloading_grid,
-    "unloading-elements": _unloading_elements,
     "pushover": _pushover,
     "post-speeds": _post_speeds,
     "crush-words": _crush_words,

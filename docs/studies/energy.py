@@ -125,7 +125,7 @@ def audit(preset: str, steps: Steps, count: int = AUDIT_DESIGNS, seed: int = 0) 
         record = _blank_record()
         outcome = simulate_design(design, readings, control, record)
         reached = np.isfinite(record.states).all(axis=1)
-        kept = Record(*(field[reached] for field in record[:-1]))
+        kept = Record(*(field[reached] for field in record))
         motion = Motion(design, readings, constants_of(design, readings, 0), control, kept, outcome)
         residuals[row] = ledger_of(motion).largest_residual
     return residuals

@@ -81,7 +81,6 @@ def schema() -> Schema:
         **_what_is_required(),
         "$defs": {
             "count": {"type": "integer", "minimum": 1, "maximum": MAX_AXIS},
-            "stages": _stages(),
             "list_as_text": {"type": "string", "pattern": r"^\s*\[.*\]\s*[^\[\],]*$"},
             **{_named(unit): _quantity(unit) for unit in units},
             **{f"{_named(field.unit)}_mean": _mean(field.unit) for field in INPUTS},
@@ -109,7 +108,7 @@ def _block(section: str, words: str) -> Schema:
     if section not in NAMED_SETS:
         return {"type": ["object", "null"], **block}
     inputs = {
-        field.key: {"anyOf": [_ref(field.path), _ref(f"{_named(field.unit)}_distribution"), *_more_forms(field)]}
+        field.key: {"anyOf": [_ref(field.path), _ref(f"{_named(field.unit)}_distribution")]}
         for field in INPUTS
         if field.section == section
     }
@@ -139,20 +138,7 @@ def _entry(field: Field) -> Schema:
     step = _object({"from": value, "to": value, "step": _ref(_named(field.unit))}, ("from", "to", "step"))
     count = _object({"from": value, "to": value, "count": _ref("count")}, ("from", "to", "count"))
     spread = _ref(f"{_named(field.unit)}_distribution")
-    return {"anyOf": [value, _list(value), _ref("list_as_text"), step, count, spread, *_more_forms(field)]}
-
-
-def _more_forms(field: Field) -> list[Schema]:
-    """Return what else an input may be."""
-    return [_ref("stages")] if field.path == "vehicle.spring" else []
-
-
-def _stages() -> Schema:
-    """Return the form of a vehicle's spring in stages, each number as an input of its own."""
-    first = {"stiffness": _entry(BY_NAME["vehicle_second_spring_N_m"])}
-    second = {"beyond": _entry(BY_NAME["vehicle_second_spring_from_m"]), **first}
-    items = [_object(keys, tuple(keys)) for keys in (first, second)]
-    return {"type": "array", "minItems": 1, "prefixItems": items, "items": False}
+    return {"anyOf": [value, _list(value), _ref("list_as_text"), step, count, spread]}
 
 
 def _mean(unit: str) -> Schema:

@@ -1,4 +1,4 @@
-"""What two laws that are switched off by default move: Broms' resistance of the soil, and a front that stiffens."""
+"""What a law that is switched off by default moves: Broms' resistance of the soil."""
 
 from __future__ import annotations
 
@@ -10,22 +10,7 @@ from boulder_sweep.crash_tests.tables import Table, number
 from boulder_sweep.impact.simulation import simulate
 
 SITE = Path("configs/uncertain_site.yaml")
-STIFFER = 3
-"""Second spring over the first, an assumption: no value is published."""
-BROMS = "model.resistance=broms"
-
-
-def _spring(beyond: str) -> str:
-    return f"vehicle.spring=[{{stiffness: 3103.3 kN/m}}, {{beyond: {beyond}, stiffness: {STIFFER * 3103.3:.1f} kN/m}}]"
-
-
-CHOICES = {
-    "as the files are": (),
-    "3 K_p for K_p²": (BROMS,),
-    f"spring {STIFFER} times as stiff from 1 m on": (_spring("1 m"),),
-    f"spring {STIFFER} times as stiff from 0.5 m on": (_spring("0.5 m"),),
-    f"3 K_p, and {STIFFER} times as stiff from 0.5 m on": (BROMS, _spring("0.5 m")),
-}
+CHOICES = {"as the files are": (), "3 K_p for K_p²": ("model.resistance=broms",)}
 
 
 def moves_table(root: Path) -> Table:

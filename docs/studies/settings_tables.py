@@ -24,7 +24,7 @@ FORMS = {
     "accuracy": "`fast`, `balanced`, `fine`, or an angle such as `0.01 deg` ([accuracy](accuracy.md))",
 }
 """What a setting may be, where it is neither a quantity nor one of some words."""
-PAGES = {"resistance": " ([soil](soil.md))", "unloading": " ([unloading](soil.md#unloading))"}
+PAGES = {"resistance": " ([soil](soil.md))"}
 """Where the words are explained."""
 
 

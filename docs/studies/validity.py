@@ -65,8 +65,8 @@ def crush_words(grid: Path) -> str:
         )
     return (
         f"The test that passed crushes the front by {in_test:.2f} m at the point of contact, by the model. Of a "
-        f"sample of `configs/{grid.name}`, {'; '.join(found.values())}. The swing back is that of elastic soil; it is "
-        "not counted, nor is it over when the verdict is final."
+        f"sample of `configs/{grid.name}`, {'; '.join(found.values())}. "
+        "The last is not counted, nor is the motion over at the verdict."
     )
 
 

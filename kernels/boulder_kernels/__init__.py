@@ -10,16 +10,11 @@ from ._jit import when_compiling
 from .control import Control
 from .design import Constants, Design, DesignTable, Readings, as_printed, constants_of, corrected
 from .impact import Problem, simulate, simulate_design
-from .outcomes import SIMULATED, Maxima, Outcome, OutcomesAtRest, OutcomeTable, Status
-from .plastic import ELASTIC, PLASTIC, PLASTIC_WITH_GAP
-from .second_spring import SecondSpring, SecondSprings
+from .outcomes import SIMULATED, Maxima, Outcome, OutcomeTable, Status
 from .table import simulate_table
 from .time_history import Record, no_record
 
 __all__ = [
-    "ELASTIC",
-    "PLASTIC",
-    "PLASTIC_WITH_GAP",
     "SIMULATED",
     "Constants",
     "Control",
@@ -28,12 +23,9 @@ __all__ = [
     "Maxima",
     "Outcome",
     "OutcomeTable",
-    "OutcomesAtRest",
     "Problem",
     "Readings",
     "Record",
-    "SecondSpring",
-    "SecondSprings",
     "Status",
     "as_printed",
     "constants_of",

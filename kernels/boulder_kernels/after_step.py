@@ -28,7 +28,6 @@ from .events import (
 from .modes import LIMIT, GapFactors, gap_factors, gaps_at, gaps_of
 from .numerics import ITERATIONS, sine_versine
 from .outcomes import Compression, Maxima, Status, compression_of, grown, highest, updated_maxima
-from .plastic import is_plastic
 from .settling import barrier_energy, boulder_energy, inside_maxima, proof_is_possible, stays_below
 from .soil import soil_kinematics
 
@@ -339,5 +338,4 @@ def ending_of(control: Control, readings: Readings, h_full: float) -> Ending:
     longest = control.horizon
     if control.stop_at_limit:
         longest = max(longest, min(control.longest_horizon, most))
-    stopping = control.stop_at_limit and not is_plastic(control.unloading)
-    return Ending(control.theta_limit, control.horizon, longest, stopping, proof_is_possible(readings))
+    return Ending(control.theta_limit, control.horizon, longest, control.stop_at_limit, proof_is_possible(readings))

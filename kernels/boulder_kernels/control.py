@@ -26,7 +26,6 @@ from .design import Constants
 from .modes import AT_END, TOLERANCE, GapFactors, needs_moment
 from .numerics import sine_versine
 from .outcomes import Status
-from .plastic import ELASTIC
 from .soil import Kinematics
 from .soil_laws import soil_reaction
 
@@ -65,10 +64,6 @@ class Control(NamedTuple):
     last_resort: bool = False
     """Whether a design that needs more steps than are allowed is simulated all the same, see
     `boulder_kernels.impact.simulate_last_resort`."""
-    unloading: int = ELASTIC
-    """How the soil unloads: ELASTIC, or another of `boulder_kernels.soil_laws.ELEMENT_LAWS`, for which there must be
-    elements. In plastic soil simulations go on until the boulder is at rest, and are not ended by a proof before the
-    horizon."""
     paired: bool = False
     """Where errors are estimated: whether every design is solved twice for it, and not only doubtful ones."""
     event_tolerance: float = TOLERANCE

@@ -157,8 +157,6 @@ class Constants(NamedTuple):
     """Depth of the lowest element below the centre of mass [m]."""
     theta_corner: float
     """Angle beyond which sin(gamma_N + theta_b) < 0 [rad]; infinite where no reading asks for it."""
-    u_0: float
-    """Compression at which the vehicle's spring exerts no force [m]: 0, but for a vehicle on its second spring."""
 
 
 @inlined
@@ -381,7 +379,6 @@ def constants_with(
         C_sin,
         d_N,
         theta_corner,
-        0.0,
     )
 
 

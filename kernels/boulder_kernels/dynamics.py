@@ -127,11 +127,8 @@ def contact_displacement(x_b: float, sin: float, versin: float, c: Constants) ->
 
 @inlined
 def spring_compression(x_v: float, v_v: float, x_c: float, c: Constants) -> float:
-    """Compression u of the vehicle's spring [m]; below zero the truck has come off (Eq 45, integrated).
-
-    On a second spring it is counted from where that exerts no force, u - u_0 (Eq 111).
-    """
-    return x_v - x_c - c.tau_v * (c.v_0 - v_v) - c.u_0
+    """Compression u of the vehicle's spring [m]; below zero the truck has come off (Eq 45, integrated)."""
+    return x_v - x_c - c.tau_v * (c.v_0 - v_v)
 
 
 @inlined

@@ -15,8 +15,6 @@ others, see `docs/studies/wild.py`. Which design is solved twice, and how, is sa
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ._jit import kernel
@@ -214,17 +212,3 @@ def confirm_errors(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable,
     """
     for row in range(fine.status.size):
         confirm_error(coarse, fine, table, safety, row)
-
-
-def add_rest_error(coarse: Any, fine: Any, safety: float) -> None:
-    """Add the numerical error to the doubt of where boulders come to rest.
-
-    Parameters
-    ----------
-    coarse, fine
-        `OutcomesAtRest` by a step and by a third of it; the error goes into the finer.
-    safety
-        Factor from the difference of the two to the error.
-    """
-    differing = np.maximum(abs(coarse.theta_rest - fine.theta_rest), abs(coarse.swing_back - fine.swing_back))
-    fine.rest_error[:] += safety * differing

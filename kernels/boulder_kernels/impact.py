@@ -31,7 +31,6 @@ from .after_step import (
     initial_state,
     is_finite,
     keep_step,
-    kept_up_to,
     passed_maxima,
     passes,
 )
@@ -55,24 +54,9 @@ from .error_estimates import error_time
 from .events import NONE, SHORTEN, locate_limit
 from .modes import change_mode, changes_counted, initial_modes, length_after
 from .outcomes import Outcome, Status, compression_at, no_maxima, undefined_maxima
-from .plastic import memory_of
-from .second_spring import (
-    STIFFENS,
-    SecondSpring,
-    is_second_spring,
-    largest_crush,
-    offset_of,
-    on_second_spring,
-    provable_so_far,
-    reached,
-    stiffest,
-    times,
-    with_spring,
-)
 from .settling import NO_PROOF, boulder_energy
 from .soil_laws import constants_in
 from .time_history import Record, add_exchanged, nothing_exchanged, write_samples
-from .unloading import forget, rate_after, remember, until_rest
 
 FULL_TURN = math.pi
 """Rotation at which a simulation that does not stop at the limit ends [rad]: the boulder is upside down."""
@@ -90,15 +74,13 @@ class Problem(NamedTuple):
     design: Design
     """The design, SI."""
     profile: Any
-    """`SoilProfile` of its soil; None for the uniform elastic soil of the design."""
-    second: Any
-    """`SecondSpring` of its vehicle; None for a vehicle without."""
+    """`SoilProfile` of its soil; None for the uniform soil of the design."""
 
 
 @kernel
 def simulate_design(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
-    """Simulate one impact of a vehicle with one spring in a uniform elastic soil; see `simulate`."""
-    return simulate(Problem(design, None, None), readings, control, record)
+    """Simulate one impact in a uniform soil; see `simulate`."""
+    return simulate(Problem(design, None), readings, control, record)
 
 
 @kernel
@@ -108,7 +90,7 @@ def simulate(problem: Problem, readings: Readings, control: Control, record: Rec
     Parameters
     ----------
     problem
-        Design, soil and vehicle. Kernels are compiled for each kind of soil and vehicle.
+        Design and soil. Kernels are compiled for each kind of soil.
     readings
         Which formulas are read as printed.
     control
@@ -131,31 +113,23 @@ def simulate(problem: Problem, readings: Readings, control: Control, record: Rec
     if misses(problem.design):
         return failed(Status.NO_CONTACT.value)
     c = constants_in(problem.design, readings, control.elements, problem.profile)
-    return simulate_motion(c, readings, control, record, problem.second)
+    if not is_computable(c):
+        return failed(Status.INVALID.value)
+    theta_stop = control.theta_limit if control.stop_at_limit else FULL_TURN
+    h, status = first_step(control, theta_stop, c)
+    if status != ACCEPTED:
+        return failed(status)
+    outcome = simulate_by_steps(h, h, c, readings, control, theta_stop, record)
+    while outcome.status == Status.UNSTABLE.value and control.horizon <= MOST_STEPS * h:
+        h *= RETRY
+        outcome = simulate_by_steps(h, h, c, readings, control, theta_stop, record)
+    return outcome
 
 
 @inlined
 def misses(design: Design) -> bool:
     """Whether the truck passes over the boulder."""
     return design.H - design.d <= design.e_bumper
-
-
-@kernel
-def simulate_motion(
-    c: Constants, readings: Readings, control: Control, record: Record, second: SecondSpring | None
-) -> Outcome:
-    """Simulate one impact of known constants; see `simulate`, which also asks whether the truck hits at all."""
-    if not is_computable(c) or not is_second_spring(c, second):
-        return failed(Status.INVALID.value)
-    theta_stop = control.theta_limit if control.stop_at_limit else FULL_TURN
-    h, status = first_step(control, theta_stop, stiffest(c, second))
-    if status != ACCEPTED:
-        return failed(status)
-    outcome = simulate_by_steps(h, h, c, readings, control, theta_stop, record, second)
-    while outcome.status == Status.UNSTABLE.value and control.horizon <= MOST_STEPS * h:
-        h *= RETRY
-        outcome = simulate_by_steps(h, h, c, readings, control, theta_stop, record, second)
-    return outcome
 
 
 @kernel
@@ -167,14 +141,8 @@ def simulate_by_steps(
     control: Control,
     theta_stop: float,
     record: Record,
-    second: SecondSpring | None,
 ) -> Outcome:
-    """Simulate one impact with given time steps [s] while the truck touches and while not; see `simulate`.
-
-    A step in which the crush reaches a second spring is cut there, as at an event.
-    """
-    memory = memory_of(c)
-    forget(memory)
+    """Simulate one impact with given time steps [s] while the truck touches and while not; see `simulate`."""
     ending = ending_of(control, readings, h_apart)
     budget = float(MOST_STEPS) if control.last_resort else attempt_budget(h_apart, ending.longest)
     h_full = h_touching
@@ -189,16 +157,12 @@ def simulate_by_steps(
     attempts = 0
     h_next = first_length(h_full, factors, c)
     barrier, horizon = NO_PROOF, control.horizon
-    latest, stiffening = 1.0, True
     error = rotation_changes = 0.0
     while attempts < budget:
         attempts += 1
         h = min(h_next, horizon - t)
         y_end, k_end, step_error = step(y, k1, h, switches, c)
         passing, end = passes(y, y_end, k_end, factors, switches, c, 0.0)
-        if second is not None and stiffening:
-            crush, latest = largest_crush(start, end, h)
-            passing = passing and crush < second.s_2
         # Where nothing proves that the motion may end, there is no energy to compare.
         provable = barrier > NO_PROOF and y_end.v_v <= 0.0
         if passing and h < horizon - t and not (provable and not boulder_energy(y_end, c) >= barrier):
@@ -212,14 +176,7 @@ def simulate_by_steps(
             if kept.event == SHORTEN:
                 h_next = kept.tau * h
                 continue
-            provable_kept = kept
-            if second is not None and stiffening:
-                tau = reached(second.s_2, start, latest, dense, switches, c)
-                if tau < kept.tau:
-                    kept = kept_up_to(float(STIFFENS), tau, t, y_end, start, m, dense, switches, c)
-                provable_kept = provable_so_far(kept, c.k_v, second.k_2)
-            decided = decide(t, h, y, provable_kept, barrier, horizon, ending, c)
-            decided = until_rest(decided, kept.y, ending, c, memory)
+            decided = decide(t, h, y, kept, barrier, horizon, ending, c)
             end = compression_at(kept.y, switches, c)
         h_next, m, barrier, horizon = h_full, kept.m, decided.barrier, decided.horizon
         error += step_error
@@ -232,7 +189,6 @@ def simulate_by_steps(
             if recording:
                 written = write_samples(record, written, t, h, kept.tau, dense, modes, switches, c, exchanged)
                 exchanged = add_exchanged(exchanged, dense, h, kept.tau, modes, switches, c)
-        remember(y, kept.y, kept.tau * h, c, memory)
         begun, t = t, decided.t
         if decided.status != RUNNING:
             if decided.status == Status.LIMIT.value:
@@ -241,11 +197,8 @@ def simulate_by_steps(
             yield_located = control.locate_yield and control.elements == 0
             moved = error_time(h_full, yield_located) * error
             return Outcome(decided.status, m, t_limit, t, attempts, moved, kept.y.omega_b, rotation_changes)
-        y, k1, start = kept.y, rate_after(k_end, kept.y, switches, c, memory), end
+        y, k1, start = kept.y, k_end, end
         if kept.event > NONE:
-            if second is not None and kept.event == STIFFENS:
-                c = on_second_spring(c, second.k_2, offset_of(start.u, c.k_v, second.k_2))
-                stiffening = False
             rotation_changes += changes_counted(kept.event, begun, modes)
             y, modes = change_mode(int(kept.event), y, rate_of(y, switches, c).M, modes, c)
             switches, factors = enter_modes(
@@ -267,6 +220,16 @@ NO_SPRING = 1e-12
 
 
 @kernel
+def with_spring(design: Design, factor: float) -> Design:
+    """Return a design whose vehicle has its spring times a factor."""
+    p = design
+    k_v = factor * p.k_v
+    return Design(
+        p.L, p.W, p.H, p.rho_b, p.d, p.e, p.rho_s, p.phi, p.beta, p.K_epsilon, p.m_v, p.v_0, k_v, p.c_v, p.e_bumper
+    )  # fmt: skip
+
+
+@kernel
 def spring_to_follow(r: Rates, control: Control) -> float:
     """Factor on a spring that leaves it no faster than the steps can follow."""
     slowing = r.truck / r.relaxation  # c_v over the masses
@@ -281,32 +244,27 @@ def longest_step(theta_limit: float, c: Constants) -> float:
 
 
 @kernel
-def simulate_last_resort(problem: Problem, readings: Readings, control: Control, record: Record) -> Outcome:
+def simulate_last_resort(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
     """Simulate one impact; what cannot be decided within the steps allowed keeps the status it is refused with.
-
-    Of two springs each is made softer only as far as it is too stiff to follow.
 
     Parameters
     ----------
-    problem
-        Design and vehicle; the soil is the uniform elastic soil of the design.
+    design
+        The design, in uniform soil.
     readings, control, record
         As of `boulder_kernels.impact.simulate`; the record keeps nothing.
     """
-    design, second = problem.design, problem.second
     c = constants_of(design, readings, control.elements)
-    if misses(design) or not is_computable(c) or not is_second_spring(c, second):
-        return simulate(problem, readings, control, record)
-    _, status = first_step(control, control.theta_limit, stiffest(c, second))
+    if misses(design) or not is_computable(c):
+        return simulate_design(design, readings, control, record)
+    _, status = first_step(control, control.theta_limit, c)
     if status == ACCEPTED:
-        return simulate(problem, readings, control, record)
-    c = stiffest(c, second)
+        return simulate_design(design, readings, control, record)
     factor = spring_to_follow(rates_of(control.theta_limit, c), control)
-    softer = times(second, factor)
-    c = constants_of(with_spring(design, min(1.0, factor * (c.k_v / design.k_v))), readings, control.elements)
+    c = constants_of(with_spring(design, factor), readings, control.elements)
     apart = constants_of(with_spring(design, NO_SPRING), readings, control.elements)
     ratio = STEP_RATIO if control.refined else 1.0
-    h = min(control.h, RESOLVED * longest_step(control.theta_limit, stiffest(c, softer))) / ratio
+    h = min(control.h, RESOLVED * longest_step(control.theta_limit, c)) / ratio
     h_apart = min(control.h, longest_step(control.theta_limit, apart)) / ratio if readings.separation_released else h
-    outcome = simulate_by_steps(h, h_apart, c, readings, control, control.theta_limit, record, softer)
+    outcome = simulate_by_steps(h, h_apart, c, readings, control, control.theta_limit, record)
     return failed(status) if outcome.status == Status.STEP_BUDGET.value else outcome

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections import namedtuple
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -81,8 +80,7 @@ class Maxima(NamedTuple):
     t_F_v: float
     crush: float
     """Largest crush of the truck's front while it drives forward, x_v less the displacement of the contact point [m]:
-    final once the truck has stopped. What the boulder may add as it swings back, in elastic soil, is
-    not counted."""
+    final once the truck has stopped. What the boulder may add as it swings back is not counted."""
     t_crush: float
 
 
@@ -152,11 +150,6 @@ class OutcomeTable(NamedTuple):
     """Step asked for of the solution that is reported [s]; NaN where there is none."""
 
 
-_record: Any = namedtuple
-OutcomesAtRest = _record("OutcomesAtRest", (*OutcomeTable._fields, "theta_rest", "swing_back", "rest_error"))
-"""The fields of `OutcomeTable`, and for plastic soil, NaN where nothing is known of it: the rotation in which
-the boulder comes to rest, signed, how far it swings back from its largest rotation, and by how much that rest may
-be wrong, by the numerical error and by the energy that is left at the end of the simulation [rad]."""
 OUTCOME_FIELDS = OutcomeTable._fields
 ROWS = len(OUTCOME_FIELDS)
 STATUS, THETA_MAX, X_B_MAX, X_V_MAX, F_V_MAX, CRUSH_MAX, T_LIMIT, T_END, THETA_ERROR, X_ERROR, STEP = range(ROWS)

@@ -225,8 +225,8 @@ def energy_between(low: float, high: float, A: float, slope_x: float, piece: Pie
         r = low + NODES[g] * length
         x, P = A - slope_x * r, piece.P_0 + piece.P_1 * r
         elastic = 0.5 * piece.K * r * x * x
-        plastic = P * abs(x) - share * (2.0 * piece.P_0 + piece.P_1 * r) * piece.P_1
-        total += WEIGHTS[g] * length * (plastic if yielding else elastic) * (piece.w_0 + piece.w_1 * r)
+        yielded = P * abs(x) - share * (2.0 * piece.P_0 + piece.P_1 * r) * piece.P_1
+        total += WEIGHTS[g] * length * (yielded if yielding else elastic) * (piece.w_0 + piece.w_1 * r)
     P_2 = piece.P_0 * piece.P_0 * share if yielding else 0.0
     linear = P_2 * piece.w_1 * length
     V += total - linear - P_2 * piece.w_0 * math.log(max(high, TINY) / max(low, TINY))

@@ -16,7 +16,6 @@ from ._jit import exact_inlined, exact_kernel
 from .control import VALID_ROTATION, Control
 from .error_estimates import LEAST_LATE_M
 from .outcomes import OutcomeTable, Status
-from .plastic import is_plastic
 
 RULES = (
     ("error", ""),  # which has a reason of its own
@@ -347,11 +346,9 @@ def confirmations(rule: Any, t_end: Any, control: Control) -> Any:
     """Return how many others must agree with a late row before it passes, with or without `VALIDITY`, or fails.
 
     One is enough for how far the truck gets: nothing amplifies its error. `AGREEING` must for what rocking decides.
-    Never where errors are not confirmed, as by ``fast``. Nor in plastic soil, where every motion goes on until it
-    rests, and loses its energy to the soil instead of rocking.
+    Never where errors are not confirmed, as by ``fast``.
     """
-    counted = control.error_estimate and not is_plastic(control.unloading)
-    late = counted & (t_end > control.horizon)
+    late = control.error_estimate & (t_end > control.horizon)
     rocking = (rule == PASSES) | (rule == VALIDITY) | (rule == OVERTURNS)
     return late * (AGREEING * rocking + (rule == PENETRATION))
 

@@ -26,14 +26,12 @@ turn back freely, and a truck that the air pulls on, feed energy. It does happen
 from __future__ import annotations
 
 import math
-from typing import Any
 
-from ._jit import inlined, kernel, unless_none
+from ._jit import inlined, kernel
 from .design import Constants, Readings
 from .dynamics import State, contact_displacement, least_couple, lift_of, spring_compression
-from .numerics import ITERATIONS, Bracket, narrowed, next_guess, sine_versine
+from .numerics import Bracket, narrowed, next_guess, sine_versine
 from .outcomes import Maxima
-from .plastic import Memory, memory_of
 from .soil import Potential, soil_kinematics
 from .soil_laws import soil_potential
 
@@ -48,8 +46,6 @@ BALANCED_FROM, BALANCED_TO = 0.66, 0.71
 1/sqrt(2) where all of it yields."""
 MOVED_FROM = 0.75
 """Fraction of the largest rotation from which on a boulder mostly is where moving takes the least energy."""
-RESTING_PRECISION = 1e-13
-"""Precision of the least energy where a position of rest is looked for, as a fraction of it."""
 CAUTION = 1.0 - 1e-6
 """The energy must be below the barrier by the integrator's own error, and more."""
 LEAST_ANGLE = 1e-9
@@ -99,67 +95,6 @@ def least_elastic_energy(slope_x: float, c: Constants) -> float:
     return least
 
 
-@kernel
-def least_plastic_energy(slope_x: float, c: Any) -> float:
-    """Lower bound of the least work that brings plastic soil to a rotation, wherever the boulder stands [J].
-
-    Parameters
-    ----------
-    slope_x
-        Decrease of displacement over the depth, sin(theta) d [m].
-    c
-        `PlasticConstants` of the design.
-
-    Notes
-    -----
-    The least has its displacement between one that presses no front and one that presses no back.
-    """
-    soil, memory = c.soil, c.memory
-    low, high = memory.back[0] + slope_x * soil.ratio[0], memory.front[0] + slope_x * soil.ratio[0]
-    for n in range(soil.ratio.size):
-        low = min(low, memory.back[n] + slope_x * soil.ratio[n])
-        high = max(high, memory.front[n] + slope_x * soil.ratio[n])
-    start, end = soil_potential(low, slope_x, c), soil_potential(high, slope_x, c)
-    if start.V_A >= 0.0:
-        return start.V
-    if end.V_A <= 0.0:
-        return end.V
-    bracket = Bracket(low, start.V_A, high, end.V_A, 0.0)
-    least = 0.0
-    for _ in range(ITERATIONS):
-        A = next_guess(bracket)
-        p = soil_potential(A, slope_x, c)
-        below = max(p.V_A * (A - low), p.V_A * (A - high))
-        least = max(least, p.V - below)
-        if below <= RESTING_PRECISION * p.V:
-            break
-        bracket = narrowed(bracket, A, p.V_A)
-    return least
-
-
-@kernel
-def least_plastic_energy_either_way(slope_x: float, c: Any, memory: Memory) -> float:
-    """Return the lesser of `least_plastic_energy` for a rotation forward and back."""
-    return min(least_plastic_energy(slope_x, c), least_plastic_energy(-slope_x, c))
-
-
-least_soil_energy = unless_none(
-    "slope_x c memory",
-    least_plastic_energy_either_way,
-    "least_elastic_energy(slope_x, c)",
-    least_elastic_energy=least_elastic_energy,
-)
-"""Lower bound of the energy of the soil at a rotation by a modulus, wherever the boulder stands [J].
-
-Parameters
-----------
-slope_x
-    Decrease of displacement over the depth, sin|theta| d [m]; not negative.
-c, memory
-    Constants of the design, and their memory; None for elastic soil.
-"""
-
-
 @inlined
 def energy_to_turn(theta_max: float, c: Constants) -> float:
     """Lower bound of the potential energy at theta = +-theta_max [J].
@@ -172,7 +107,7 @@ def energy_to_turn(theta_max: float, c: Constants) -> float:
         Constants of a design whose restoring moment is the couple of the weight.
     """
     sin, versin = sine_versine(theta_max)
-    return least_couple(c) * sin + c.C_sin * versin + least_soil_energy(c.d * sin, c, memory_of(c))
+    return least_couple(c) * sin + c.C_sin * versin + least_elastic_energy(c.d * sin, c)
 
 
 @inlined

@@ -4,8 +4,7 @@ A law is one `SoilLaw`. Which one holds follows from the type of the constants o
 of a uniform soil, others carry the record of their soil. Inside kernels the function is chosen when they are compiled,
 so a uniform soil has the code it would have if there were no other.
 
-To add a law: write its record and functions in a module beside `boulder_kernels.layered_soil`, and a line in `LAWS`;
-if it is one by elements, a line in `ELEMENT_LAWS`, too, by which settings choose it.
+To add a law: write its record and functions in a module beside `boulder_kernels.layered_soil`, and a line in `LAWS`.
 """
 
 from __future__ import annotations
@@ -26,7 +25,6 @@ from .layered import (
     SoilSums,
     fill_elements,
     fill_layers,
-    uniform_layers,
 )
 from .layered_soil import (
     potential_of_elements,
@@ -59,15 +57,6 @@ from .outlined_soil import (
     reaction_of_pieces,
     reaction_of_taper,
 )
-from .plastic import (
-    ELASTIC,
-    Memory,
-    PlasticConstants,
-    empty_memory,
-    potential_of_plastic_elements,
-    power_of_plastic_elements,
-    reaction_of_plastic_elements,
-)
 from .soil import Kinematics, Potential, Reaction, uniform_drag_power, uniform_potential, uniform_reaction
 
 
@@ -84,17 +73,6 @@ class SoilLaw(NamedTuple):
     """Works out the record from the layers of a design, and returns what follows from them."""
 
 
-class ElementLaw(NamedTuple):
-    """Which elements a soil consists of where it is computed by elements."""
-
-    record: Any = SoilElements
-    """Type of their record, one of `LAWS`; its fields are arrays of shape (N,)."""
-    gap: bool | None = None
-    """Whether a gap opens between plastic elements and boulder; None for elements without memory."""
-
-
-ELEMENT_LAWS = (ElementLaw(), ElementLaw(gap=False), ElementLaw(gap=True))
-"""By `boulder_kernels.control.Control.unloading`: ELASTIC, PLASTIC and PLASTIC_WITH_GAP."""
 UNIFORM = SoilLaw(uniform_reaction, uniform_potential, uniform_drag_power)
 LAWS: dict[type, SoilLaw] = {
     SoilElements: SoilLaw(reaction_of_elements, potential_of_elements, power_of_elements, fill_elements),
@@ -109,9 +87,8 @@ LAWS: dict[type, SoilLaw] = {
     OutlinedPieces: SoilLaw(reaction_of_pieces, potential_of_pieces, power_of_pieces, fill_outlined_pieces),
     FewPieces: SoilLaw(reaction_of_pieces, potential_of_pieces, power_of_pieces),
     TaperedSoil: SoilLaw(reaction_of_taper, potential_of_taper, power_of_taper),
-    Memory: SoilLaw(reaction_of_plastic_elements, potential_of_plastic_elements, power_of_plastic_elements),
 }
-"""The law of each record of a soil, the last of those that constants carry."""
+"""The law of each record of a soil."""
 
 
 def type_of(record: Any) -> type:
@@ -120,15 +97,9 @@ def type_of(record: Any) -> type:
     return kind
 
 
-def records_of(c: Any) -> tuple[str, ...]:
-    """Names of the records of the soil that constants carry."""
-    kind: Any = type_of(c)
-    return tuple(kind._fields[len(Constants._fields) :]) if kind in (LayeredConstants, PlasticConstants) else ()
-
-
 def law_of(c: Any) -> SoilLaw:
     """Return the law of the soil of constants, or of the record of a soil."""
-    return LAWS.get(type_of(c[-1] if records_of(c) else c), UNIFORM)
+    return LAWS.get(type_of(c[-1] if type_of(c) is LayeredConstants else c), UNIFORM)
 
 
 def by_law(field: str, *names: str) -> Callable[..., Any]:
@@ -139,7 +110,7 @@ def by_law(field: str, *names: str) -> Callable[..., Any]:
     field
         Field of `SoilLaw`.
     names
-        Names of the arguments. The last is constants, whose records are passed on in their place, or a record.
+        Names of the arguments. The last is constants, whose record is passed on in their place, or a record.
     """
 
     def call(*arguments: Any) -> Any:
@@ -147,13 +118,12 @@ def by_law(field: str, *names: str) -> Callable[..., Any]:
         c = arguments[-1]
         if type(c) is Constants:
             return uniform(*arguments)
-        records = c[len(Constants._fields) :] if records_of(c) else (c,)
-        return getattr(law_of(c), field)(*arguments[:-1], *records)
+        return getattr(law_of(c), field)(*arguments[:-1], c.soil if type(c) is LayeredConstants else c)
 
     def write_call(*arguments: Any) -> Callable[..., Any]:
         """Return the call for arguments of these Numba types."""
-        records = [f"{names[-1]}.{record}" for record in records_of(arguments[-1])]
-        passed = ", ".join([*names[:-1], *(records or names[-1:])])
+        record = f"{names[-1]}.soil" if type_of(arguments[-1]) is LayeredConstants else names[-1]
+        passed = ", ".join([*names[:-1], record])
         source = f"def {field}_by_law({', '.join(names)}):\n return of_law({passed})"
         return function_of(source, of_law=getattr(law_of(arguments[-1]), field))
 
@@ -180,29 +150,23 @@ def soil_energy(k: Kinematics, c: Constants) -> float:
 
 
 class SoilProfile(NamedTuple):
-    """The soil of one design where it is not that of its `Design` all the way down, or not elastic."""
+    """The soil of one design where it is not that of its `Design` all the way down."""
 
     layers: np.ndarray
     """Layers from the top down, shape (M, 6), see `boulder_kernels.layered`."""
     soil: Any
     """`SoilElements` or `SoilLayers`, worked out from the layers by whoever computes the constants."""
-    memory: Memory | None
-    """Memory of plastic elements; None for elastic soil."""
 
 
-def with_records(c: Constants, soil: Any, memory: Memory | None) -> Any:
-    """Return constants together with the records of their soil."""
-    return LayeredConstants(*c, soil) if memory is None else PlasticConstants(*c, soil, memory)
+def with_record(c: Constants, soil: Any) -> Any:
+    """Return constants together with the record of their soil."""
+    return LayeredConstants(*c, soil)
 
 
-@overload(with_records)
-def _with_records(c: Any, soil: Any, memory: Any) -> Callable[..., Any]:
+@overload(with_record)
+def _with_record(c: Any, soil: Any) -> Callable[..., Any]:
     values = ", ".join(f"c.{name}" for name in Constants._fields)
-    if hasattr(memory, "instance_class"):
-        source, record = f"def with_records(c, soil, memory):\n return Record({values}, soil, memory)", PlasticConstants
-    else:
-        source, record = f"def with_records(c, soil, memory):\n return Record({values}, soil)", LayeredConstants
-    return function_of(source, Record=record)
+    return function_of(f"def with_record(c, soil):\n return Record({values}, soil)", Record=LayeredConstants)
 
 
 def keep_lean(body: Body, design: Design, gravity: bool, soil: Any) -> None:
@@ -225,12 +189,12 @@ def _keep_lean(body: Any, design: Any, gravity: Any, soil: Any) -> Callable[...,
 
 @exact_inlined
 def constants_in_profile(design: Design, readings: Readings, elements: int, profile: SoilProfile) -> Any:
-    """Constants of the motion of one design in layers of soil, or in plastic soil; see `constants_in`."""
+    """Constants of the motion of one design in layers of soil; see `constants_in`."""
     lumped = fill_soil(design, profile.layers, profile.soil)
     b, body = lumped.bounds, body_beside(design, profile.soil)
     keep_lean(body, design, readings.restoring_gravity, profile.soil)
     c = constants_with(design, body, readings, b.elements, lumped.mass, b.K_soil, b.R_soil, b.x_yield)
-    return with_records(c, profile.soil, profile.memory)
+    return with_record(c, profile.soil)
 
 
 constants_in = unless_none(
@@ -250,46 +214,28 @@ readings
 elements
     Number N of elements of a uniform soil, or 0 for the closed form.
 profile
-    Its `SoilProfile`, whose records the constants keep; None for the uniform elastic soil of the design.
+    Its `SoilProfile`, whose record the constants keep; None for the uniform soil of the design.
 
 Returns
 -------
-Constants, LayeredConstants or PlasticConstants
+Constants or LayeredConstants
     Non-finite or non-positive where the design is impossible, see `boulder_kernels.design.is_computable`.
 """
 
 
-def empty_soil(layers: int, elements: int, outline: np.ndarray | None = None, unloading: int = ELASTIC) -> Any:
+def empty_soil(layers: int, elements: int, outline: np.ndarray | None = None) -> Any:
     """Return a soil to fill: N elements, or where N is 0 as many layers as there are, for which it is exact.
 
-    Beside an outline, shape (P, 4), each of its points may cut a layer in two; the soil is elastic there.
+    Beside an outline, shape (P, 4), each of its points may cut a layer in two.
     """
     if outline is not None:
         return empty_outlined(layers + len(outline) - 2, elements, outline)
     if elements > 0:
-        record = ELEMENT_LAWS[unloading].record
-        return record(*np.empty((len(record._fields), elements)))
+        return SoilElements(*np.empty((len(SoilElements._fields), elements)))
     to, K, inverse_K, P_0, P_1, R = np.empty((6, layers))
     return SoilLayers(to, K, inverse_K, P_0, P_1, R, np.empty(len(SoilSums._fields)))
 
 
-def profile_of(
-    design: Design,
-    layers: np.ndarray | None,
-    elements: int,
-    outline: np.ndarray | None = None,
-    unloading: int = ELASTIC,
-    samples: int = 0,
-) -> SoilProfile | None:
-    """Return the soil of a design in layers, by N elements or, where N is 0, exactly; beside an outline if it has one.
-
-    Without layers it is the uniform soil of the design: None where it is elastic, else its only layer. Plastic elements
-    have room for what they remember at some samples of a record.
-    """
-    if layers is None:
-        if unloading == ELASTIC and outline is None:
-            return None
-        layers = uniform_layers(design)
-    gap = ELEMENT_LAWS[unloading].gap
-    memory = None if gap is None else empty_memory(elements, gap, samples)
-    return SoilProfile(layers, empty_soil(len(layers), elements, outline, unloading), memory)
+def profile_of(layers: np.ndarray, elements: int, outline: np.ndarray | None = None) -> SoilProfile:
+    """Return a soil in layers, by N elements or, where N is 0, exactly; beside an outline if the boulder has one."""
+    return SoilProfile(layers, empty_soil(len(layers), elements, outline))

@@ -9,63 +9,44 @@ import numpy as np
 from ._jit import array_kernel, kernel, plain, unless_none
 from .control import EVENT_TOLERANCE, STEP_RATIO, Control
 from .design import DesignTable, Readings, design_at, design_in
-from .dynamics import State
 from .error_estimates import (
     SAFETY,
     SAFETY_CONFIRMED,
     SAFETY_PRINTED,
-    add_rest_error,
     confirm_errors,
     estimate_errors,
     step_errors,
 )
-from .impact import Problem, failed, misses, simulate, simulate_last_resort, simulate_motion
+from .impact import Problem, simulate, simulate_last_resort
 from .lanes import simulate_lanes
 from .layered import (
     LAYERED,
     PRESSURE,
-    PRESSURE_SLOPE,
-    LayeredTable,
     OutlinedTable,
     filled_layers,
     lanes_count,
-    uniform_layers,
 )
 from .outcomes import (
     COARSER,
     FINER,
-    NONE_NEEDED,
     PAIR,
     SECOND,
-    SIMULATED,
-    Outcome,
-    OutcomesAtRest,
     OutcomeTable,
-    Status,
     empty_outcomes,
     outcome_table,
     write_outcome,
 )
 from .outlined import given_beside, with_outline
-from .plastic import ELASTIC, LAST, SWING, is_plastic, memory_of
-from .second_spring import SecondSpring, SecondSprings
 from .settling import proof_is_possible
-from .soil_laws import SoilProfile, constants_in, empty_soil, profile_of
+from .soil_laws import SoilProfile, empty_soil, profile_of
 from .time_history import Record, no_record
-from .unloading import rest_of
 from .workspace import LayeredLanes, OutlinedLanes, TaperedLanes
 
 
 @array_kernel
 def take_profile(row: int, soil: Any, layers: np.ndarray) -> SoilProfile:
     """Return the soil of one design of a table in layers, shape (n, M, 6)."""
-    return SoilProfile(layers[row], soil, None)
-
-
-@kernel
-def take_second_spring(row: int, springs: np.ndarray) -> SecondSpring:
-    """Return the second spring of one vehicle, from rows as of `SecondSprings`."""
-    return SecondSpring(springs[0, row], springs[1, row])
+    return SoilProfile(layers[row], soil)
 
 
 @array_kernel
@@ -78,8 +59,6 @@ soil_in = unless_none("row soil outlines", take_outline, "soil")
 """The soil to fill for one design of a table."""
 profile_in = unless_none("row soil layers", take_profile, "None")
 """The soil of one design of a table; None for the uniform soil of the design."""
-second_spring_in = unless_none("row springs", take_second_spring, "None")
-"""The second spring of one vehicle; None for a vehicle without."""
 
 
 @array_kernel
@@ -88,7 +67,6 @@ def run_rows(
     layers: np.ndarray | None,
     outlines: np.ndarray | None,
     soil: Any,
-    springs: np.ndarray | None,
     readings: Readings,
     control: Control,
     record: Record,
@@ -96,26 +74,18 @@ def run_rows(
 ) -> None:
     """Simulate designs one by one; arguments: see `simulate_rows`, a record that keeps nothing, and its result."""
     for row in range(designs.shape[1]):
-        profile, second = profile_in(row, soil_in(row, soil, outlines), layers), second_spring_in(row, springs)
+        profile = profile_in(row, soil_in(row, soil, outlines), layers)
         design = design_in(designs, row)
-        outcome = simulate(Problem(design, profile, second), readings, control, record)
+        outcome = simulate(Problem(design, profile), readings, control, record)
         write_outcome(out, row, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
 
 
 @kernel
-def run_last_resort(
-    designs: np.ndarray,
-    springs: np.ndarray | None,
-    readings: Readings,
-    control: Control,
-    record: Record,
-    out: np.ndarray,
-) -> None:
+def run_last_resort(designs: np.ndarray, readings: Readings, control: Control, record: Record, out: np.ndarray) -> None:
     """The same for designs that need more steps than are allowed, see `boulder_kernels.impact.simulate_last_resort`."""
     for row in range(designs.shape[1]):
         design = design_in(designs, row)
-        problem = Problem(design, None, second_spring_in(row, springs))
-        outcome = simulate_last_resort(problem, readings, control, record)
+        outcome = simulate_last_resort(design, readings, control, record)
         write_outcome(out, row, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
 
 
@@ -124,11 +94,10 @@ def simulate_rows(
     layers: np.ndarray | None,
     outlines: np.ndarray | None,
     soil: Any,
-    springs: np.ndarray | None,
     readings: Readings,
     control: Control,
 ) -> np.ndarray:
-    """Simulate designs one by one, in any elastic soil.
+    """Simulate designs one by one, in any soil.
 
     Parameters
     ----------
@@ -140,75 +109,21 @@ def simulate_rows(
         Outlines of the boulders, shape (n, P, 4), see `boulder_kernels.outlined`, of designs in layers; None for boxes.
     soil
         Elements or layers that every design fills anew; None for uniform soils.
-    springs
-        Rows as of `SecondSprings`, or None for vehicles without a second spring.
     readings, control
         As of `simulate_table`.
     """
     out = empty_outcomes(designs.shape[1])
-    run_rows(designs, layers, outlines, soil, springs, readings, control, no_record(), out)
+    run_rows(designs, layers, outlines, soil, readings, control, no_record(), out)
     return out
 
 
-class Impact(NamedTuple):
-    """One impact of a table; of a boulder in plastic soil also where it comes to rest, else NaN."""
-
-    outcome: Outcome
-    constants: Any
-    """Constants of the design, with what plastic soil remembers in the end and remembered at every sample."""
-    theta_rest: float
-    """Rotation in which the boulder comes to rest [rad]; NaN where nothing is known of it."""
-    doubt: float
-    """By how much it may be another, by the energy that is left [rad]."""
-    swing_back: float
-    """How far the boulder has swung back from its largest rotation [rad]."""
-
-
-def problem_at(
-    table: DesignTable, row: int, control: Control, springs: SecondSprings | None = None, samples: int = 0
-) -> Problem:
-    """Return one row of a table as a problem, with room for as many samples as a record has."""
+def problem_at(table: DesignTable, row: int, control: Control) -> Problem:
+    """Return one row of a table as a problem."""
     design = design_at(table, row)
-    second = None if springs is None else SecondSpring(springs.k_2[row], springs.s_2[row])
-    layers = table.layers[row] if isinstance(table, LAYERED) else None
+    if not isinstance(table, LAYERED):
+        return Problem(design, None)
     outline = table.outlines[row] if isinstance(table, OutlinedTable) else None
-    return Problem(design, profile_of(design, layers, control.elements, outline, control.unloading, samples), second)
-
-
-def simulate_impact(problem: Problem, readings: Readings, control: Control, record: Record) -> Impact:
-    """Simulate one impact, and find where a boulder in plastic soil comes to rest; arguments: see `simulate`.
-
-    In plastic soil no step is cut where the soil yields, because what yields depends on what it remembers.
-    """
-    c = constants_in(problem.design, readings, control.elements, problem.profile)
-    if memory_of(c) is None:
-        return Impact(simulate(problem, readings, control, record), c, np.nan, np.nan, np.nan)
-    if misses(problem.design):
-        return Impact(failed(Status.NO_CONTACT.value), c, np.nan, np.nan, np.nan)
-    outcome = simulate_motion(c, readings, control._replace(locate_yield=False), record, problem.second)
-    y = State(*c.memory.so_far[LAST:])
-    if outcome.status not in SIMULATED or outcome.status == Status.LIMIT:
-        return Impact(outcome, c, np.nan, np.nan, np.nan)
-    swing_back = float(c.memory.so_far[SWING])
-    if y.v_v > 0.0 or not plain(proof_is_possible)(readings):
-        return Impact(outcome, c, np.nan, np.nan, swing_back)
-    rest = rest_of(y, control.theta_limit, c)
-    return Impact(outcome, c, rest.theta, rest.doubt, swing_back)
-
-
-def simulate_plastic_rows(
-    table: DesignTable, readings: Readings, control: Control, springs: SecondSprings | None
-) -> Any:
-    """Simulate every design of a table once in plastic soil; ``rest_error`` is without a numerical error."""
-    n = len(table.L)
-    out, rest = empty_outcomes(n), np.full((3, n), np.nan)
-    for row in range(n):
-        problem = problem_at(table, row, control, springs)
-        impact = simulate_impact(problem, readings, control, no_record())
-        errors = step_errors(impact.outcome, problem.design, control.theta_limit, control.horizon)
-        write_outcome(out, row, impact.outcome, errors)
-        rest[:, row] = impact.theta_rest, impact.swing_back, impact.doubt
-    return OutcomesAtRest(*outcome_table(out, step_of_solution(control)), *rest)
+    return Problem(design, profile_of(table.layers[row], control.elements, outline))
 
 
 def finer_step(step: float) -> float:
@@ -259,9 +174,7 @@ def is_taper(layers: np.ndarray, outlines: np.ndarray) -> bool:
     return layers.shape[1] + outlines.shape[1] == 3 and not layers[:, :, PRESSURE].any()
 
 
-def simulate_once(
-    table: DesignTable, readings: Readings, control: Control, springs: SecondSprings | None = None
-) -> tuple[OutcomeTable, np.ndarray]:
+def simulate_once(table: DesignTable, readings: Readings, control: Control) -> tuple[OutcomeTable, np.ndarray]:
     """Simulate every design of a table once: in lanes where they can be, else one by one.
 
     Returns
@@ -272,20 +185,13 @@ def simulate_once(
         Which second solution each of them needs, see `boulder_kernels.outcomes.StepErrors`.
     """
     n = len(table.L)
-    if control.unloading != ELASTIC and not isinstance(table, LAYERED):
-        uniform = np.array([uniform_layers(design_at(table, row)) for row in range(n)])
-        table = LayeredTable(*table, uniform.reshape(n, 1, PRESSURE_SLOPE + 1))
-    if is_plastic(control.unloading):
-        outcomes: OutcomeTable = simulate_plastic_rows(table, readings, control, springs)
-        return outcomes, np.full(n, NONE_NEEDED)
     designs = np.stack(table[: len(DesignTable._fields)])
-    stacked = None if springs is None else np.stack(springs)
     layers: np.ndarray | None = getattr(table, "layers", None)
     outlines: np.ndarray | None = getattr(table, "outlines", None)
-    side_by_side = control.side_by_side and springs is None and control.elements == 0 and control.stop_at_limit
+    side_by_side = control.side_by_side and control.elements == 0 and control.stop_at_limit
     if control.last_resort and layers is None:
         out = empty_outcomes(n)
-        run_last_resort(designs, stacked, readings, control, no_record(), out)
+        run_last_resort(designs, readings, control, no_record(), out)
         return outcome_table(out, step_of_solution(control)), out[SECOND]
     given = given_to_lanes(designs, layers, outlines) if side_by_side else None
     if given is not None:
@@ -296,8 +202,8 @@ def simulate_once(
         soil = None
         if layers is not None:
             outline = None if outlines is None else outlines[0]
-            soil = empty_soil(layers.shape[1], control.elements, outline, control.unloading)
-        out = simulate_rows(designs, layers, outlines, soil, stacked, readings, control)
+            soil = empty_soil(layers.shape[1], control.elements, outline)
+        out = simulate_rows(designs, layers, outlines, soil, readings, control)
     return outcome_table(out, step_of_solution(control)), out[SECOND]
 
 
@@ -312,9 +218,9 @@ def is_paired(readings: Readings, control: Control, *, layered: bool) -> bool:
     """Return whether every design is solved twice for its error, where errors are estimated.
 
     What is read as printed may jump within a step, unseen by the error of the steps, and a soil in layers yields at
-    many instants. The error time of element sums and of plastic soil has not been measured.
+    many instants. The error time of element sums has not been measured.
     """
-    measured = control.elements == 0 and control.unloading == ELASTIC and not (layered or control.last_resort)
+    measured = control.elements == 0 and not (layered or control.last_resort)
     return control.paired or not measured or not plain(proof_is_possible)(readings)
 
 
@@ -328,28 +234,26 @@ def some_rows(table: Any, rows: np.ndarray) -> Any:
     return type(table)(*(np.ascontiguousarray(column[rows]) for column in table))
 
 
-def simulate_checked(
-    table: DesignTable, readings: Readings, control: Control, springs: SecondSprings | None
-) -> OutcomeTable:
+def simulate_checked(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
     """Simulate every design once, and a second time those whose error needs to be confirmed.
 
     Parameters
     ----------
-    table, readings, springs
+    table, readings
         As of `simulate_table`.
     control
         How they are simulated first. A design that cannot be simulated by the finer steps of `halved` has a coarser
         second solution instead.
     """
-    out, second = simulate_once(table, readings, control, springs)
+    out, second = simulate_once(table, readings, control)
     coarser = control._replace(refined=False)
     for kind, how in ((FINER, halved(control)), (COARSER, coarser), (PAIR, coarser)):
         rows = np.flatnonzero(second == kind)
         if not len(rows):
             continue
-        some, theirs = some_rows(table, rows), None if springs is None else some_rows(springs, rows)
+        some = some_rows(table, rows)
         designs = DesignTable(*some[: len(DesignTable._fields)])
-        first, (other, _) = some_rows(out, rows), simulate_once(some, readings, how, theirs)
+        first, (other, _) = some_rows(out, rows), simulate_once(some, readings, how)
         if kind == FINER:
             confirm_errors(first, other, designs, SAFETY_CONFIRMED)
             failed = np.isnan(other.theta_max)
@@ -363,9 +267,7 @@ def simulate_checked(
     return out
 
 
-def simulate_table(
-    table: DesignTable, readings: Readings, control: Control, springs: SecondSprings | None = None
-) -> OutcomeTable:
+def simulate_table(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
     """Simulate every design of a table.
 
     Parameters
@@ -380,23 +282,19 @@ def simulate_table(
         ``error_estimate`` designs are simulated by a third of the step, and some a second time: by half of that, and
         are reported by it, or by the step itself. Where `is_paired` says so, every design is simulated with the step
         and with a third of it, and the finer result is reported.
-    springs
-        Second springs of the vehicles, where they have any; such designs are simulated one by one.
 
     Returns
     -------
     OutcomeTable
-        Arrays of shape (n,), in the order of the designs; `OutcomesAtRest` for plastic soil.
+        Arrays of shape (n,), in the order of the designs.
     """
     if not control.error_estimate:
-        return simulate_once(table, readings, control, springs)[0]
+        return simulate_once(table, readings, control)[0]
     refined = control._replace(refined=True)
     if not is_paired(readings, control, layered=is_layered(table)):
-        return simulate_checked(table, readings, refined, springs)
-    out, _ = simulate_once(table, readings, control, springs)
-    fine, _ = simulate_once(table, readings, refined, springs)
+        return simulate_checked(table, readings, refined)
+    out, _ = simulate_once(table, readings, control)
+    fine, _ = simulate_once(table, readings, refined)
     safety = SAFETY if readings.restoring_gravity else SAFETY_PRINTED
     estimate_errors(out, fine, DesignTable(*table[: len(DesignTable._fields)]), safety)
-    if is_plastic(control.unloading):
-        add_rest_error(out, fine, safety)
     return fine

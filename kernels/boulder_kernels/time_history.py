@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import inlined, kernel, unless_none
+from ._jit import inlined, kernel
 from .design import Constants, Readings
 from .dormand_prince import DenseOutput, state_at
 from .dynamics import (
@@ -29,11 +29,8 @@ from .dynamics import (
     switches_of,
 )
 from .numerics import sine_versine
-from .plastic import memory_of
-from .second_spring import SecondSpring, on_second_spring, spent_energy
 from .soil import soil_kinematics
 from .soil_laws import drag_power, soil_energy
-from .unloading import note, plastic_work, recall
 
 GAUSS_NODES = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262)
 GAUSS_WEIGHTS = (0.17392742256872692, 0.32607257743127305, 0.32607257743127305, 0.17392742256872692)
@@ -158,8 +155,6 @@ class Record(NamedTuple):
     """Whether the truck touched, bool, shape (n,)."""
     exchanged: np.ndarray
     """Energy exchanged up to each [J], shape (n, 4), order of `Exchanged`."""
-    offset: np.ndarray = np.empty(0)
-    """Offset u_0 of the vehicle's spring at each [m], shape (n,), see `boulder_kernels.second_spring`; may be empty."""
 
 
 def no_record() -> Record:
@@ -170,7 +165,6 @@ def no_record() -> Record:
         np.empty(0, np.int8),
         np.empty(0, np.bool_),
         np.empty((0, 4), np.float64),
-        np.empty(0, np.float64),
     )
 
 
@@ -195,7 +189,6 @@ def write_samples(
         states = record.states[written]
         states[0], states[1], states[2] = y.x_b, y.v_b, y.theta_b
         states[3], states[4], states[5] = y.omega_b, y.x_v, y.v_v
-        note(written, memory_of(c))
         record.turning[written] = modes.turning
         record.touching[written] = modes.touching
         so_far = add_exchanged(exchanged, dense, h, tau, modes, switches, c)
@@ -206,8 +199,6 @@ def write_samples(
             so_far.restoring,
             so_far.pull,
         )
-        if record.offset.size > 0:
-            record.offset[written] = c.u_0
         written += 1
     return written
 
@@ -218,27 +209,7 @@ class Sample(NamedTuple):
     rate: Acceleration
     """Accelerations, and the moment of soil and truck without the restoring moment."""
     stored: StoredEnergies
-    """Stored energies [J]; of plastic soil, what its elements would give back."""
-    spent: float
-    """Energy that was spent when a second spring took over [J] (Eq 112)."""
-
-
-@inlined
-def moved(u_0: float, c: Any, second: SecondSpring) -> Any:
-    """Return the constants of a motion whose vehicle's spring is offset by u_0 [m]; 0 for the first spring."""
-    return c if u_0 == 0.0 else on_second_spring(c, second.k_2, u_0)
-
-
-@inlined
-def spent_by(u_0: float, c: Any, second: SecondSpring) -> float:
-    """Energy that was spent when a second spring took over [J]; nothing before."""
-    return spent_energy(u_0, c.k_v, second.k_2)
-
-
-constants_at = unless_none("u_0 c second", moved, "c")
-"""Constants of the motion at a sample with an offset u_0 of the vehicle's spring [m], of the first constants."""
-spent_at = unless_none("u_0 c second", spent_by, "0.0")
-"""Energy that was spent by then when a second spring took over [J]."""
+    """Stored energies [J]."""
 
 
 @inlined
@@ -257,42 +228,34 @@ def state_of(record: Record, sample: int) -> State:
 
 
 @inlined
-def sample_of(
-    record: Record, sample: int, first: Any, second: SecondSpring | None, m_v: float, readings: Readings
-) -> Sample:
+def sample_of(record: Record, sample: int, c: Any, m_v: float, readings: Readings) -> Sample:
     """Evaluate one sample; arguments: see `evaluate_samples`."""
-    u_0 = record.offset[sample]
-    y, c = state_of(record, sample), constants_at(u_0, first, second)
+    y = state_of(record, sample)
     touching = record.touching[sample] > 0
     modes = modes_of(y, int(record.turning[sample]), touching, c)
     rate = acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, switches_of(modes, readings, c), c)
     # Printed separation: the spring goes on pulling the truck after release, so it holds energy all along.
     holds = touching or not readings.separation_released
-    stored = stored_energies(y, m_v, holds, readings.restoring_gravity, c)
-    return Sample(rate, stored, spent_at(u_0, first, second))
+    return Sample(rate, stored_energies(y, m_v, holds, readings.restoring_gravity, c))
 
 
 @kernel
 def evaluate_samples(
     record: Record,
-    first: Any,
-    second: SecondSpring | None,
+    c: Any,
     m_v: float,
     readings: Readings,
     rates: np.ndarray,
     stored: np.ndarray,
-    spent: np.ndarray,
 ) -> None:
-    """Evaluate the samples of a record in elastic or plastic soil.
+    """Evaluate the samples of a record.
 
     Parameters
     ----------
     record
         The record, with n samples.
-    first
-        Constants of the motion on the vehicle's first spring. What plastic soil remembers in them is overwritten.
-    second
-        Second spring of the vehicle, or None.
+    c
+        Constants of the motion.
     m_v
         Mass of the vehicle [kg].
     readings
@@ -301,17 +264,10 @@ def evaluate_samples(
         Where the fields of `Acceleration` go, shape (4, n).
     stored
         Where those of `StoredEnergies` go, shape (6, n) [J].
-    spent
-        Where the energies go that were spent when a second spring took over, by plastic soil up to the step of the
-        sample, and by it since then, shape (3, n) [J]. The last is a part of the elastic energy of the soil.
     """
-    memory = memory_of(first)
     for i in range(record.times.size):
-        recall(i, memory)
-        s = sample_of(record, i, first, second, m_v, readings)
+        s = sample_of(record, i, c, m_v, readings)
         rates[0, i], rates[1, i], rates[2, i], rates[3, i] = s.rate.a_b, s.rate.alpha_b, s.rate.a_v, s.rate.M
         e = s.stored
         stored[0, i], stored[1, i], stored[2, i] = e.truck_kinetic, e.boulder_kinetic, e.boulder_rotational
         stored[3, i], stored[4, i], stored[5, i] = e.soil_elastic, e.crush_elastic, e.gravity
-        before, since = plastic_work(state_of(record, i), first, memory)
-        spent[0, i], spent[1, i], spent[2, i] = s.spent, before, since

@@ -31,10 +31,10 @@ LANES = 8
 """Designs that are integrated side by side: one vector of eight doubles. More of them hide no more latency and take
 more of the fastest memory (measured: 2 to 5 % slower with 16 or 32)."""
 
-KNOWN: dict[str, object] = {"elements": 0, "c_x": 0.0, "c_y": 0.0, "d_N": 0.0, "u_0": 0.0}
+KNOWN: dict[str, object] = {"elements": 0, "c_x": 0.0, "c_y": 0.0, "d_N": 0.0}
 KNOWN |= {name: 0.0 for name in Maxima._fields if name.startswith("t_")}
-"""Fields that are not kept: lanes know the closed form of the soil only, one spring and no times of maxima; and no
-motion depends on three lengths from which other constants have been made."""
+"""Fields that are not kept: lanes know the closed form of the soil only and no times of maxima; and no motion depends
+on three lengths from which other constants have been made."""
 
 
 GROUPS = 2

@@ -62,8 +62,6 @@ def test_every_entry_is_in_it_and_every_optional_line_holds(tmp_path, units):
                 "boulder.profile": "is part of boulder.profile",
                 "boulder.scan": "follows from the scan; remove one of them",
                 "soil.correlation": "needs a distribution",
-                "vehicle.second_spring": "needs second_spring_from",
-                "vehicle.second_spring_from": "needs second_spring ",
             }
             assert [p for p in found if alternatives.get(field.path, "-") not in p] == [], field.path
 

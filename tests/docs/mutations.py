@@ -18,11 +18,9 @@ class Mutation(NamedTuple):
 _DESIGN, _SOIL = "kernels/boulder_kernels/design.py", "kernels/boulder_kernels/soil.py"
 _DYNAMICS = "kernels/boulder_kernels/dynamics.py"
 _WALL, _TRAJECTORY = "boulder_sweep/crash_tests/rigid_wall.py", "boulder_sweep/impact/trajectory.py"
-_DESIGNS, _SECOND = "boulder_sweep/designs.py", "kernels/boulder_kernels/second_spring.py"
+_DESIGNS = "boulder_sweep/designs.py"
 _GROUND = "kernels/boulder_kernels/ground.py"
 _LAYERED, _LAYERS = (f"kernels/boulder_kernels/{name}.py" for name in ("layered", "layered_soil"))
-
-_PLASTIC, _UNLOADING = (f"kernels/boulder_kernels/{name}.py" for name in ("plastic", "unloading"))
 _HEAVE, _STEPS, _OPINION = (f"kernels/boulder_kernels/{name}.py" for name in ("heave", "heave_steps", "second_opinion"))
 _BESIDE, _OUTLINED = (f"kernels/boulder_kernels/{name}.py" for name in ("outlined", "outlined_soil"))
 
@@ -94,16 +92,6 @@ MUTATIONS = (
     Mutation((108,), _LAYERS, "length * powers + P_2 * logarithm", "length * powers - P_2 * logarithm"),
     Mutation((108,), _LAYERS, "0.5 * w.F_2 + (1.0 / 3.0) * w.G_3", "0.5 * w.F_2 + 0.5 * w.G_3"),
     Mutation((108,), _LAYERS, "0.5 * (2.0 * w.D_1 - sums.Z_1)", "0.5 * (w.D_1 - sums.Z_1)"),
-    Mutation((111,), _SECOND, "return u * (1.0 - k_v / k_2)", "return u * (1.0 + k_v / k_2)"),
-    Mutation((111,), _SECOND, "k_m=c.k_m * (k_2 / c.k_v)", "k_m=c.k_m"),
-    Mutation((111,), _DYNAMICS, "(c.v_0 - v_v) - c.u_0", "(c.v_0 - v_v) + c.u_0"),
-    Mutation((112,), _SECOND, "/ (1.0 - k_v / k_2) if k_2 > k_v", "* (1.0 - k_v / k_2) if k_2 > k_v"),
-    Mutation((121,), _PLASTIC, "F_n = behind - ahead", "F_n = -behind - ahead"),
-    Mutation((122,), _PLASTIC, "= max(front, u - y)", "= max(front, u)"),
-    Mutation((122,), _PLASTIC, "min(max(front, u - y), u + y)", "min(max(front, u), u + y)"),
-    Mutation((123,), _PLASTIC, "work += soil.ultimate[n] * max(", "work += 0.5 * soil.ultimate[n] * max("),
-    Mutation((124,), _PLASTIC, "(pressed * pressed - over * over)", "(pressed * pressed)"),
-    Mutation((124,), _UNLOADING, "c.C_cos * abs(sin) + c.C_sin", "c.C_cos * abs(sin) - c.C_sin"),
     Mutation((131,), _HEAVE, "f.b_b * cos - f.a_b * sin", "f.b_b * cos + f.a_b * sin"),
     Mutation(
         (131,), _HEAVE, "turning = Q.Q_theta - i.S * omega_b * omega_b", "turning = Q.Q_theta + i.S * omega_b * omega_b"

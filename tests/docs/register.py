@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-EQUATIONS = (*range(1, 56), 101, 102, *range(105, 109), 111, 112, *range(121, 125), *range(131, 138), *range(141, 148))
+EQUATIONS = (*range(1, 56), 101, 102, *range(105, 109), *range(131, 138), *range(141, 148))
 """Those of the paper, and those added to it."""
 WAYS = ("implemented", "derived", "explained")
 SWITCHES = ("inertia", "impact_arm", "contact", "restoring", "separation")

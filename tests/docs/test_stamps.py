@@ -20,10 +20,10 @@ def files_of(name: str) -> set[str]:
 
 
 def test_what_is_simulated_depends_on_kernels_and_on_the_way_to_them() -> None:
-    for name in ("need-site", "coverage", "soil-grid", "moves", "validation-table", "unloading-tests"):
+    for name in ("need-site", "coverage", "soil-grid", "moves", "validation-table"):
         files = files_of(name)
         assert "kernels/boulder_kernels/lanes.py" in files, name
-        assert "kernels/boulder_kernels/plastic.py" in files, name
+        assert "kernels/boulder_kernels/settling.py" in files, name
         assert "boulder_sweep/judge/inputs.py" in files, name
         # The study of coverage calls the kernels itself.
         assert ("boulder_sweep/judge/evaluation.py" in files) == (name != "coverage"), name

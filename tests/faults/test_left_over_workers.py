@@ -47,7 +47,7 @@ def test_a_worker_of_a_killed_run_that_goes_on_changes_no_row_of_the_next(tmp_pa
     killed = open_folder(out, rows=ROWS)
     slow = grid_of(ROWS, friction="36 deg")
     evaluation = evaluation_of(slow, accuracy_of(slow), held)
-    computation = Computation(evaluation, slow.block, {}, evaluation.warm_up, evaluation.columns)
+    computation = Computation(evaluation, slow.block, {}, evaluation.warm_up)
     work = remote.Work(killed.token, computation, SIZE, SIZE, str(out), ROWS, remote.fingerprint())
     worker = multiprocessing.get_context("spawn").Process(target=remote.compute, args=(work, 0, 2 * SIZE, False))
     worker.start()

@@ -10,5 +10,5 @@ from boulder_sweep.judge.inputs import Designs
 
 def plain_designs(n: int = 1, *, bed_offset: float = 2.9, **changes: float) -> Designs:
     """Return a usual design n times, with other values where they are given by the kernels' names."""
-    one = PLAIN_DESIGN.table._replace(**{name: np.array([value]) for name, value in changes.items()})
-    return PLAIN_DESIGN._replace(table=one, bed_offset=np.array([bed_offset])).rows(np.zeros(n, dtype=int))
+    one = PLAIN_DESIGN._replace(**{name: np.array([value]) for name, value in changes.items()})
+    return Designs(one, bed_offset=np.array([bed_offset])).rows(np.zeros(n, dtype=int))

@@ -9,7 +9,6 @@ import pytest
 from boulder_sweep import simulate
 from boulder_sweep.judge.few_elements import DESIGNS, words_of_few_elements
 from boulder_sweep.settings import load
-from boulder_sweep.settings.model import PLASTIC_ELEMENTS
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -25,7 +24,6 @@ def rwg(*overrides):
         (("model.soil.elements=1",), True),
         (("model.soil.elements=199",), True),
         (("model.soil.elements=200",), False),
-        (("model.unloading=plastic",), False),
     ],
 )
 def test_below_200_elements_are_few(overrides, few):
@@ -50,12 +48,6 @@ def test_the_difference_falls_with_the_number():
 
     assert 6.0 < off(1) < 7.0
     assert 0.0 < off(100) < 0.01 < off(10) < 1.0
-
-
-def test_plastic_soil_is_compared_with_200_elements():
-    words = words_of_few_elements(rwg("model.soil.elements=20", "model.unloading=plastic"))
-    assert words.startswith("20 soil elements against 200: another verdict for 0 of 1 design of this file")
-    assert words.endswith(f"; take {PLASTIC_ELEMENTS} or more")
 
 
 def test_designs_that_cannot_be_computed_are_left_out():

@@ -75,11 +75,6 @@ def test_stones_are_sampled_with_their_shape() -> None:
     assert found.lost["broms"] == pytest.approx(np.mean(fails(by_broms)[own]))
 
 
-def test_soil_that_stays_pressed_is_sampled_as_elastic() -> None:
-    sweep = grid()
-    assert firmness_of(replace(sweep, model=replace(sweep.model, unloading="plastic"))) == firmness_of(sweep)
-
-
 def test_it_stands_in_summary_and_metadata_and_repeats_itself(tmp_path: Path) -> None:
     sweep = grid()
     summary = run(sweep, tmp_path / "one", jobs=1)

@@ -154,8 +154,6 @@ def test_other_outcomes_do_not_change() -> None:
         "model.readings=as_printed",
         "soil.water_table=0.5 m",
         "soil.cohesion=5 kPa",
-        "model.unloading=plastic",
-        "vehicle.spring=[{stiffness: 3103 kN/m}, {beyond: 0.5 m, stiffness: 9000 kN/m}]",
     ],
 )
 def test_where_second_opinions_know_nothing_a_pass_is_open(override: str) -> None:

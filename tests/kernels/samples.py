@@ -13,7 +13,6 @@ from boulder_kernels.design import ultimate_pressure
 from boulder_kernels.dynamics import State, contact_displacement, spring_compression
 from boulder_kernels.layered import LayeredTable
 from boulder_kernels.soil_laws import constants_in, profile_of
-from boulder_kernels.table import Impact, simulate_impact
 from tests import oracle
 
 BUMPER = 0.5  # height of the underside of the bumper [m]
@@ -155,15 +154,6 @@ def same_bits(a: np.ndarray, b: np.ndarray) -> bool:
     return a.shape == b.shape and a.tobytes() == b.tobytes()
 
 
-def layered_constants(
-    design: bk.Design, layers: np.ndarray, readings: bk.Readings, elements: int, unloading: int = bk.ELASTIC
-) -> Any:
+def layered_constants(design: bk.Design, layers: np.ndarray, readings: bk.Readings, elements: int) -> Any:
     """Constants of one design in layers of soil, by elements or, where there are none, exactly."""
-    return constants_in(design, readings, elements, profile_of(design, layers, elements, None, unloading))
-
-
-def simulate_plastic(design: bk.Design, readings: bk.Readings, how: bk.Control, record: bk.Record) -> Impact:
-    """Simulate one impact in plastic soil."""
-    profile = profile_of(design, None, how.elements, unloading=how.unloading, samples=len(record.times))
-    problem = bk.Problem(design, profile, None)
-    return simulate_impact(problem, readings, how, record)
+    return constants_in(design, readings, elements, profile_of(layers, elements))

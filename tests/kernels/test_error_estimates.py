@@ -174,7 +174,7 @@ def test_some_designs_are_solved_twice() -> None:
     first, needed = simulate_once(table, CORRECTED, how)
     finer, _ = simulate_once(table, CORRECTED, halved(how))
     coarser, _ = simulate_once(table, CORRECTED, how._replace(refined=False))
-    found = simulate_checked(table, CORRECTED, how, None)
+    found = simulate_checked(table, CORRECTED, how)
     assert set(needed) == {NONE_NEEDED, FINER, COARSER}
     assert np.mean(needed != NONE_NEEDED) < 0.05
     for name in ("status", "theta_max", "x_b_max", "x_v_max", "F_v_max", "crush_max", "t_limit", "t_end", "step"):
@@ -197,15 +197,15 @@ def test_a_second_solution_that_cannot_be_computed(monkeypatch: pytest.MonkeyPat
     how = control(0.012, 1.0, LIMIT, stop_at_limit=True, error_estimate=True)._replace(refined=True)
     first, _ = simulate_once(table, CORRECTED, how)
 
-    def failing(table: bk.DesignTable, readings: bk.Readings, how: bk.Control, springs: None) -> object:
-        out, _ = simulate_once(table, readings, how, springs)
+    def failing(table: bk.DesignTable, readings: bk.Readings, how: bk.Control) -> object:
+        out, _ = simulate_once(table, readings, how)
         if how.h < 0.012:
             for column in out[1:]:
                 column[:] = np.nan
         return out, np.full(1, FINER)
 
     monkeypatch.setattr("boulder_kernels.table.simulate_once", failing)
-    found = simulate_checked(table, CORRECTED, how, None)
+    found = simulate_checked(table, CORRECTED, how)
     assert found.theta_max == first.theta_max
     assert found.step == 0.004
     assert 0.0 < found.x_error < 1e-3
@@ -218,7 +218,7 @@ def test_where_all_designs_are_solved_twice() -> None:
     assert not is_paired(CORRECTED._replace(inertia_box=False), how, layered=False)
     assert is_paired(CORRECTED._replace(restoring_gravity=False), how, layered=False)
     assert is_paired(CORRECTED._replace(separation_released=False), how, layered=False)
-    for changed in ({"elements": 50}, {"unloading": bk.PLASTIC}, {"paired": True}, {"last_resort": True}):
+    for changed in ({"elements": 50}, {"paired": True}, {"last_resort": True}):
         assert is_paired(CORRECTED, how._replace(**changed), layered=False)
 
 

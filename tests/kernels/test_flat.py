@@ -44,7 +44,7 @@ for elements in (0, 50):
 def sums(count: int) -> tuple[float, ...]:
     """Force and moment of one design by so many elements of a uniform soil, and by those of a soil in layers."""
     design = random_designs(1, seed=31)[0]
-    profile = profile_of(design, uniform_layers(design), count)
+    profile = profile_of(uniform_layers(design), count)
     assert profile is not None
     fill_soil(design, profile.layers, profile.soil)
     uniform = element_sums(LINES, constants_of(design, bk.corrected(), count))

@@ -15,7 +15,6 @@ from boulder_kernels.lanes import start_again
 from boulder_kernels.layered import PRESSURE, SUBGRADE, TO, uniform_layers
 from boulder_kernels.modes import AT_END, TOLERANCE, initial_modes
 from boulder_kernels.numerics import field
-from boulder_kernels.plastic import PLASTIC
 from boulder_kernels.workspace import (
     CONSTANTS,
     EVENTS,
@@ -95,7 +94,7 @@ def test_a_step_to_the_onset_ends_just_behind_it() -> None:
 
 
 def test_the_onset_is_the_same_by_every_law_of_the_soil() -> None:
-    """In one layer, by elements, in plastic soil, and with cohesion; in a softer layer it is another."""
+    """In one layer, by elements, and with cohesion; in a softer layer it is another."""
     known = onset_of(constants_of(RWG, CORRECTED, 0))
     layers = uniform_layers(RWG)
     assert onset_of(layered_constants(RWG, layers, CORRECTED, 0)) == pytest.approx(known, rel=1e-9)
@@ -104,8 +103,7 @@ def test_the_onset_is_the_same_by_every_law_of_the_soil() -> None:
     assert onset_of(layered_constants(RWG, strong, CORRECTED, 0)) == pytest.approx(known, rel=1e-9)
     for elements in (200, 400):
         in_layers = layered_constants(RWG, layers, CORRECTED, elements)
-        plastic = layered_constants(RWG, layers, CORRECTED, elements, PLASTIC)
-        for c in (constants_of(RWG, CORRECTED, elements), in_layers, plastic):
+        for c in (constants_of(RWG, CORRECTED, elements), in_layers):
             assert onset_of(c) == pytest.approx(known, rel=20.0 / elements**2)
     soft = np.vstack([layers, layers])
     soft[0, TO], soft[0, SUBGRADE] = 0.5 * RWG.d, 0.01 * RWG.beta

@@ -210,7 +210,7 @@ def turned(step_s: float, tolerance: float) -> float:
     )
     record.times[0] = 0.04
     how = control(step_s, 0.05, np.radians(20.0))._replace(locate_yield=True, event_tolerance=tolerance)
-    simulate(Problem(SHALLOW, None, None), bk.corrected(), how, record)
+    simulate(Problem(SHALLOW, None), bk.corrected(), how, record)
     return float(record.states[0, 3])
 
 

@@ -222,7 +222,6 @@ def test_what_is_asked_of_one_row_in_the_page_is_asked_of_many_in_a_table(contro
         (CRUSH, 1.5, CONTROL, 0),
         (UNPROVED, 10.0, CONTROL, 0),
         (PASSES, 1.5, CONTROLS[1], 0),
-        (PASSES, 1.5, CONTROL._replace(unloading=bk.PLASTIC, elements=50), 0),
     ],
 )
 def test_a_row_that_passes_or_fails_past_the_horizon_needs_others_that_agree(rule, t_end, control, expected):

@@ -23,9 +23,6 @@ from .vehicle import crush_force, jerk
 
 Array = NDArray[np.float64]
 
-REMEMBERED = 11
-"""Where in the state, behind the seven of Eq 52 and four path integrals, that begins what the soil remembers."""
-
 Rotation = Literal["held", "forward", "backward", "clockwise", "anticlockwise"]
 Contact = Literal["touching", "clipped", "coasting"]
 
@@ -46,15 +43,11 @@ class Modes:
         (printed reading: the boulder feels no force while the vehicle still obeys Eq 45).
     sign : float
         sign(sin(gamma_N + theta)) of Eqs 37 and 39, used by the printed 'forward' mode alone.
-    stage : int
-        1 until the crush x_v - x_contact has first reached s_2, 2 from then on. The force is continuous; what changes
-        is the spring of Eq 41, and with it the jerk of Eq 45.
     """
 
     rotation: Rotation
     contact: Contact
     sign: float = 1.0
-    stage: int = 1
 
 
 @dataclass(frozen=True)
@@ -97,9 +90,8 @@ def problem(inputs: Inputs, readings: Readings, elements: int | None = None) -> 
 
 
 def motion_of(y: Array) -> Motion:
-    """Motion of the boulder out of the states of Eq 52: x_1, x_3, x_2, x_4; behind them what the soil remembers."""
-    bearing = np.asarray(y[REMEMBERED:]) if len(y) > REMEMBERED else None
-    return Motion(x_b=float(y[0]), theta=float(y[2]), v_b=float(y[1]), omega=float(y[3]), bearing=bearing)
+    """Motion of the boulder out of the states of Eq 52: x_1, x_3, x_2, x_4."""
+    return Motion(x_b=float(y[0]), theta=float(y[2]), v_b=float(y[1]), omega=float(y[3]))
 
 
 def loads(impact: Problem, y: Array, modes: Modes) -> Loads:
@@ -153,7 +145,7 @@ def rate_under(impact: Problem, y: Array, modes: Modes, load: Loads) -> Array:
         a_v = x_v_3 = 0.0
     else:
         a_v = y[6]
-        x_v_3 = jerk(inputs.m_v, inputs.spring(modes.stage), inputs.c_v, y[6], y[5], load.v_contact)
+        x_v_3 = jerk(inputs.m_v, inputs.k_v, inputs.c_v, y[6], y[5], load.v_contact)
     v_b_1 = (load.soil.F + load.F_v) / impact.constants.m_eff
     # held: exactly no rotation, not just up to rounding
     omega_1 = 0.0 if modes.rotation == "held" else (load.net + load.M_R) / impact.constants.J_eff

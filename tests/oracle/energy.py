@@ -29,8 +29,6 @@ class Ledger:
         Stored in the soil springs; dissipated by the drag.
     crush_spring, crush_damper : ndarray
         Stored in the spring of the Maxwell element; dissipated by its damper.
-    crush_spent : ndarray
-        Spent where a second spring took over: at the same force it holds less than the first.
     gravity : ndarray
         Done against the restoring moment: a potential energy under the gravity reading, under the printed
         reading the work of M_R, which is no potential.
@@ -46,7 +44,6 @@ class Ledger:
     soil_drag: Array
     crush_spring: Array
     crush_damper: Array
-    crush_spent: Array
     gravity: Array
     clipped: Array
 
@@ -69,7 +66,7 @@ def path_rates(impact: Problem, y: Array, load: Loads) -> Array:
     )
 
 
-def ledger(impact: Problem, states: Array, stiff: Array | bool = False, F_stiff: float = 0.0) -> Ledger:
+def ledger(impact: Problem, states: Array) -> Ledger:
     """Energy at each of the states.
 
     Parameters
@@ -78,10 +75,6 @@ def ledger(impact: Problem, states: Array, stiff: Array | bool = False, F_stiff:
         The impact.
     states : ndarray, shape (11, n)
         The seven states of Eq 52, then the path integrals.
-    stiff : ndarray of bool, shape (n,)
-        Whether the second spring has taken over.
-    F_stiff : float
-        Force at which it did [N].
     """
     lumped, inputs = impact.constants, impact.inputs
     if impact.readings.restoring == "gravity":
@@ -94,9 +87,8 @@ def ledger(impact: Problem, states: Array, stiff: Array | bool = False, F_stiff:
         boulder_angular=lumped.J_eff * states[3] ** 2 / 2,
         soil_elastic=np.array([impact.soil.elastic_energy(motion_of(y)) for y in states.T]),
         soil_drag=states[DRAG],
-        crush_spring=(inputs.m_v * states[6]) ** 2 / (2 * np.where(stiff, inputs.k_2, inputs.k_v)),
+        crush_spring=(inputs.m_v * states[6]) ** 2 / (2 * inputs.k_v),
         crush_damper=states[DAMPER],
-        crush_spent=np.where(stiff, F_stiff**2 / 2 * (1 / inputs.k_v - 1 / inputs.k_2), 0.0) * np.ones(states.shape[1]),
         gravity=gravity,
         clipped=states[CLIPPED],
     )

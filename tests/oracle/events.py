@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,20 +70,7 @@ def watches(impact: Problem, modes: Modes, contact_at_release: float) -> list[Wa
         rotation = _gravity_watches(impact, modes)
     else:
         rotation = _printed_watches(impact, modes)
-    return [*rotation, _contact_watch(impact, modes, contact_at_release), *_crush_watches(impact, modes)]
-
-
-def _crush_watches(impact: Problem, modes: Modes) -> list[Watch]:
-    """The crush reaches the second spring of the vehicle, once and for all."""
-    if modes.stage == 2 or impact.inputs.s_2 == inf:
-        return []
-    return [
-        Watch(
-            "second spring",
-            lambda y: impact.inputs.s_2 - (float(y[4]) - contact_displacement(impact, y)),
-            lambda y: (replace(modes, stage=2), y),
-        )
-    ]
+    return [*rotation, _contact_watch(impact, modes, contact_at_release)]
 
 
 def _gravity_watches(impact: Problem, modes: Modes) -> list[Watch]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.integrate import DOP853, OdeSolution, Radau
 from scipy.optimize import brentq
 
-from .dynamics import Problem, contact_displacement, loads, motion_of, problem, rate_under
+from .dynamics import Problem, contact_displacement, loads, problem, rate_under
 from .energy import path_rates
 from .events import Watch, first_modes, kinks, watches
 from .inputs import Inputs, Readings
@@ -42,7 +42,6 @@ def simulate(
     rtol: float = 1e-10,
     land_on_kinks: bool = True,
     stiff: bool = False,
-    unloading: str = "elastic",
 ) -> Impact:
     """Simulate one impact; the same one again is not simulated again.
 
@@ -64,8 +63,6 @@ def simulate(
         Also land a step where the rates are not smooth (see `tests.oracle.events.kinks`).
     stiff : bool
         Integrate by Radau's implicit method.
-    unloading : {'elastic', 'plastic', 'plastic_with_gap'}
-        Whether the soil springs back; if not, `elements` must be given. What it remembers stands in the state.
 
     Returns
     -------
@@ -77,7 +74,7 @@ def simulate(
         If the integrator fails or the modes change without end.
     """
     impact = problem(inputs, readings, elements)
-    runner = _Runner(impact, horizon, rotation_limit, rtol, land_on_kinks, Radau if stiff else DOP853, unloading)
+    runner = _Runner(impact, horizon, rotation_limit, rtol, land_on_kinks, Radau if stiff else DOP853)
     return runner.run()
 
 
@@ -92,9 +89,7 @@ class _Runner:
         rtol: float,
         land_on_kinks: bool,
         method: type[DOP853] | type[Radau],
-        unloading: str,
     ) -> None:
-        self.unloading = unloading
         self.method = method
         self.impact = impact
         self.horizon = horizon
@@ -104,9 +99,7 @@ class _Runner:
         self.modes = first_modes(impact)
         self.contact_at_release = 0.0
         self.t = 0.0
-        remembered = 0 if unloading == "elastic" else 2 * (impact.constants.elements or 0)
-        self.y = np.concatenate((impact.start, np.zeros(4 + remembered)))
-        self.absolute = np.concatenate((_ABSOLUTE, np.full(remembered, 1e-11)))
+        self.y = np.concatenate((impact.start, np.zeros(4)))
         self.steps = [0.0]
         self.pieces: list[Dense] = []
         self.events = [Event(0.0, "first touch", self.modes)]
@@ -123,11 +116,7 @@ class _Runner:
 
     def _rate(self, _t: float, y: Array) -> Array:
         load = loads(self.impact, y, self.modes)
-        rates = np.concatenate((rate_under(self.impact, y, self.modes, load), path_rates(self.impact, y, load)))
-        if self.unloading == "elastic":
-            return rates
-        sliding = self.impact.soil.bearing_rates(motion_of(y), self.unloading == "plastic_with_gap")
-        return np.concatenate((rates, sliding))
+        return np.concatenate((rate_under(self.impact, y, self.modes, load), path_rates(self.impact, y, load)))
 
     def _beyond_limit(self, y: Array) -> bool:
         return self.rotation_limit is not None and abs(float(y[2])) >= self.rotation_limit
@@ -145,7 +134,7 @@ class _Runner:
             self.y,
             self.horizon,
             rtol=self.rtol,
-            atol=self.absolute * (self.rtol / 1e-10),
+            atol=_ABSOLUTE * (self.rtol / 1e-10),
             max_step=_LONGEST_STEP,
         )
         while solver.status == "running":

@@ -62,8 +62,6 @@ class Inputs:
         Strain-rate factor on the ultimate soil pressure, Eq 27.
     resistance : {'kp_squared', 'broms', 'width_capped'}
         Law of the ultimate soil pressure: Eq 27, or one of the two that are not the paper's.
-    k_2, s_2 : float
-        Second spring of the vehicle [N/m], and the crush [m] from which it takes the place of k_v; none by default.
     ground : Ground, optional
         The soil where it is not the same at every depth; rho_s, phi and beta are those of `Inputs` without it.
     """
@@ -83,13 +81,7 @@ class Inputs:
     c_v: float
     K_epsilon: float = 1.0
     resistance: str = "kp_squared"
-    k_2: float = inf
-    s_2: float = inf
     ground: Ground | None = None
-
-    def spring(self, stage: int) -> float:
-        """Spring of the vehicle [N/m] in a stage of its crush, 1 or 2."""
-        return self.k_v if stage == 1 else self.k_2
 
 
 CORRECTED_NAMES = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import inf, nan
+from math import nan
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -73,14 +73,7 @@ class Impact:
 
     def energy(self, t: ArrayLike) -> Ledger:
         """Energy ledger at times `t` [s]."""
-        t = np.atleast_1d(t)
-        stiff_from = self.time_of("second spring")
-        F_stiff = float(self.force(stiff_from)[0]) if stiff_from <= self.t_end else 0.0
-        return ledger(self.problem, np.asarray(self.solution(t)), t >= stiff_from, F_stiff)
-
-    def time_of(self, name: str) -> float:
-        """Time of the first event of a name [s]; infinite where there is none."""
-        return next((event.time for event in self.events if event.name == name), inf)
+        return ledger(self.problem, np.asarray(self.solution(np.atleast_1d(t))))
 
     @property
     def samples(self) -> Array:

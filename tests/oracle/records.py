@@ -115,7 +115,7 @@ def arguments_of(case: dict[str, Any]) -> tuple[Inputs, Readings, dict[str, Any]
 def summary_from(found: dict[str, Any]) -> Summary:
     """Return a summary from its plain values."""
     peaks = {name: Peak(**value) for name, value in found.items() if isinstance(value, dict)}
-    return Summary(**(found | peaks | {"left": tuple(found["left"])}))
+    return Summary(**(found | peaks))
 
 
 def recorded_impact(inputs: Inputs, readings: Readings, *, may_be_new: bool = False, **options: Any) -> Summary:

@@ -30,9 +30,6 @@ class Motion:
     theta: float
     v_b: float
     omega: float
-    bearing: Array | None = None
-    """What the soil remembers of N elements, where it does: displacements [m] at which their fronts, then their backs
-    come to bear, shape (2 N,)."""
 
 
 @dataclass(frozen=True)
@@ -109,25 +106,6 @@ def spring_energies(k_n: Array, F_u: Array, dx_n: Array) -> Array:
     return np.where(within, k_n * dx_n**2 / 2, F_u * np.abs(dx_n) - F_u**2 / (2 * k_n))
 
 
-def remembering_forces(k_n: Array, F_u: Array, dx_n: Array, bearing: Array) -> Array:
-    """Spring forces [N] of elements whose fronts and backs come to bear where their sliders have moved to."""
-    front, back = np.split(bearing, 2)
-    ahead = np.where(dx_n > front, np.minimum(k_n * (dx_n - front), F_u), 0.0)
-    behind = np.where(dx_n < back, np.minimum(k_n * (back - dx_n), F_u), 0.0)
-    return ahead - behind
-
-
-def bearing_rates(k_n: Array, F_u: Array, dx_n: Array, v_n: Array, bearing: Array, gap: bool) -> Array:
-    """Rates [m/s] at which sliders move: with the element, where its spring is at its cap and pressed on.
-
-    Without a gap both sides of an element are one; with a gap each has a slider of its own.
-    """
-    front, back = np.split(bearing, 2)
-    ahead = np.where((k_n * (dx_n - front) >= F_u) & (v_n > 0), v_n, 0.0)
-    behind = np.where((k_n * (back - dx_n) >= F_u) & (v_n < 0), v_n, 0.0)
-    return np.concatenate((ahead, behind) if gap else (ahead + behind, ahead + behind))
-
-
 def drag_forces(inputs: Inputs, height: Array, v_n: Array) -> Array:
     """Drag forces F_c,n [N], Eqs 34 and 36, with d/N = height."""
     return inputs.rho_s * inputs.W * height * v_n**2 * np.sign(v_n)
@@ -197,26 +175,9 @@ class Soil:
         k_n = spring_constants(self.inputs, alpha, height)
         F_u = ultimate_forces(self.inputs, alpha, height)
         F_c = drag_forces(self.inputs, height, v_n)
-        if motion.bearing is None:
-            F_k = spring_forces(k_n, F_u, dx_n)
-        else:
-            F_k = remembering_forces(k_n, F_u, dx_n, motion.bearing)
-        F_n = -(F_k + F_c)  # Eq 19
+        F_n = -(spring_forces(k_n, F_u, dx_n) + F_c)  # Eq 19
         M_n = -F_n * R_n * np.cos(gamma_n + motion.theta - pi)  # Eq 20
         return SoilTotals(float(F_n.sum()), float(M_n.sum()), float((F_c * v_n).sum()))
-
-    def bearing_rates(self, motion: Motion, gap: bool) -> Array:
-        """Rates of what the elements remember [m/s], shape (2 N,)."""
-        alpha, height, R_n, gamma_n = self.nodes(motion)
-        assert motion.bearing is not None
-        return bearing_rates(
-            spring_constants(self.inputs, alpha, height),
-            ultimate_forces(self.inputs, alpha, height),
-            stretch(R_n, gamma_n, motion),
-            velocity(R_n, gamma_n, motion),
-            motion.bearing,
-            gap,
-        )
 
     def elastic_energy(self, motion: Motion) -> float:
         """Energy stored in the springs [J]."""

@@ -3,14 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
 
-import numpy as np
-
-from .dynamics import REMEMBERED
 from .outcome import Impact, Peak
-
-_LOOKED_AT = 4001  # instants after the largest rotation
 
 
 @dataclass(frozen=True)
@@ -23,12 +17,6 @@ class Summary:
         Largest absolute rotation [rad], x_b [m], x_v [m], crush [m] and F_v [N], with their times [s].
     t_end : float
         Simulated time [s].
-    second_spring_from : float
-        Time [s] from which the second spring of the vehicle acts; infinite where it never does.
-    swing_back : float
-        Largest absolute rotation less the least rotation after it [rad].
-    left : tuple of float
-        What the soil remembers at the end: how far the sliders of fronts and backs have moved [m], if they do.
     """
 
     max_rotation: Peak
@@ -37,28 +25,15 @@ class Summary:
     max_crush: Peak
     peak_force: Peak
     t_end: float
-    second_spring_from: float
-    swing_back: float
-    left: tuple[float, ...]
-
-    @property
-    def stiffened(self) -> bool:
-        """Whether the second spring of the vehicle was reached."""
-        return isfinite(self.second_spring_from)
 
 
 def summary_of(impact: Impact) -> Summary:
     """Return what is compared of an impact."""
-    turned = impact.max_rotation
-    after = np.linspace(turned.time, impact.t_end, _LOOKED_AT)
     return Summary(
-        max_rotation=turned,
+        max_rotation=impact.max_rotation,
         max_displacement=impact.max_displacement,
         max_vehicle_displacement=impact.max_vehicle_displacement,
         max_crush=impact.max_crush,
         peak_force=impact.peak_force,
         t_end=impact.t_end,
-        second_spring_from=impact.time_of("second spring"),
-        swing_back=turned.value - float(impact.states(after)[2].min()),
-        left=tuple(float(x) for x in np.asarray(impact.solution(impact.t_end))[REMEMBERED:]),
     )

@@ -26,8 +26,8 @@ PARTS = 20
 def kind(case: dict[str, Any]) -> tuple[str, ...]:
     """What tells impacts apart beside their numbers."""
     given, readings, options = (case[name] for name in ("inputs", "readings", "options"))
-    soil, springs = given["ground"] is not None, given["k_2"] < np.inf
-    return (readings["restoring"], readings["contact"], str(soil), str(springs), *map(str, options.values()))
+    soil = given["ground"] is not None
+    return (readings["restoring"], readings["contact"], str(soil), *map(str, options.values()))
 
 
 def chosen(count: int) -> list[dict[str, Any]]:
@@ -169,7 +169,7 @@ def test_any_source_that_simulates_makes_another_record(tmp_path: Path) -> None:
 
 
 def test_a_record_is_read_as_it_was_written(tmp_path: Path) -> None:
-    case = case_of(RWG, CORRECTED, elements=3, unloading="plastic", horizon=0.01)
+    case = case_of(RWG, CORRECTED, elements=3, horizon=0.01)
     inputs, readings, options = arguments_of(case)
     found = summary_of(simulate(inputs, readings, **options))
     entry = {"case": case, "found": records.asdict(found)}
@@ -180,7 +180,6 @@ def test_a_record_is_read_as_it_was_written(tmp_path: Path) -> None:
     assert header == records.versions()
     assert [records.summary_from(one["found"]) for one in entries] == [found]
     assert arguments_of(entries[0]["case"]) == (inputs, readings, options)
-    assert len(found.left) == 6
 
 
 def test_the_command_runs_what_asks() -> None:

@@ -48,7 +48,7 @@ def stone_of(outline: np.ndarray) -> Stone:
 
 
 def constants(design: bk.Design, outline: np.ndarray, elements: int, readings=None, layers=None):
-    return constants_in(design, readings or bk.corrected(), elements, profile_of(design, layers, elements, outline))
+    return constants_in(design, readings or bk.corrected(), elements, profile_of(layers, elements, outline))
 
 
 def outlined(design: bk.Design, outline: np.ndarray, layers: np.ndarray | None = None) -> OutlinedTable:

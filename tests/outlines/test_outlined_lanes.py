@@ -54,7 +54,7 @@ def test_soils_of_lanes_are_those_of_single_impacts(shape: str, layers: int, cou
     table = outlined(designs, SHAPES[shape], layers, seed=3)
     rng = np.random.default_rng(5)
     for row, design in enumerate(designs):
-        profile = profile_of(design, table.layers[row], 0, table.outlines[row])
+        profile = profile_of(table.layers[row], 0, table.outlines[row])
         known, c = constants_in(design, READINGS, 0, profile), constants_of_lanes(table, row, count)
         np.testing.assert_allclose(c[:-1], known[:-1], rtol=1e-12)
         assert least_couple(c) == pytest.approx(least_couple(known), rel=1e-12)

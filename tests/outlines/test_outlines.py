@@ -120,7 +120,7 @@ def test_pieces_are_the_limit_of_elements(shape, layered):
 
 def test_layers_beside_a_box_outline_are_layers():
     design, layers = design_of(LAYERED), layers_of(LAYERED)
-    plain = constants_in(design, READINGS, 0, profile_of(design, layers, 0))
+    plain = constants_in(design, READINGS, 0, profile_of(layers, 0))
     c = constants(design, box(design), 0, layers=layers)
     rng = np.random.default_rng(8)
     for _ in range(100):

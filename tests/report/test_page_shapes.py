@@ -30,9 +30,8 @@ RUNS = {
     ),
     "water": (RATIOS, "soil.water_table=0.8 m"),
     "soil elements": (RATIOS, "model.soil={elements: 50}"),
-    "plastic": (RATIOS, "model.unloading=plastic", "model.soil={elements: 50}"),
-    "plastic with a gap, layers, water": (
-        *(RATIOS, "model.unloading=plastic_with_gap", "model.soil={elements: 50}"),
+    "soil elements, layers, water": (
+        *(RATIOS, "model.soil={elements: 50}"),
         *(f"soil.layers=[{LAYER}]", "soil.water_table=1 m"),
     ),
     "layers and cohesion": (RATIOS, f"soil.layers=[{LAYER}]", "soil.cohesion=4 kPa"),
@@ -42,7 +41,7 @@ UNCERTAIN = {
     "uncertainty, 1 axis": SITE.replace("angle: 40 deg", "angle: {mean: [36, 40] deg, cov: 5 %}"),
     "uncertainty, shipped": Path("configs/uncertain_site.yaml").read_text(),
 }
-IN_EVERY_RUN = ("no axis", "1 axis", "uncertainty, no axis", "plastic")
+IN_EVERY_RUN = ("no axis", "1 axis", "uncertainty, no axis", "soil elements")
 
 
 def made(shape, folder):

@@ -90,7 +90,7 @@ def test_on_the_command_line_without_anything_heavy(tmp_path):
         ("soil.beta", "did you mean subgrade_reaction?"),
         ("soil.unit_weight", "did you mean density?"),
         ("boulder.length_ft", "did you mean length: 1 ft?"),
-        ("vehicle.second_spring_kN_m", "did you mean second_spring: 1 kN/m?"),
+        ("vehicle.spring_kN_m", "did you mean spring: 1 kN/m?"),
         ("vehicle.k_v", "did you mean spring?"),
         ("vehicle.bumper", "did you mean bumper_height?"),
         ("vehicle.hood", "did you mean hood_height?"),

@@ -164,11 +164,6 @@ def test_a_profile_beside_what_it_stands_for_is_refused(load_it, minimal, more, 
         load_it(with_profile(minimal, POINTS, more))
 
 
-def test_plastic_soil_knows_boxes_only(load_it, minimal):
-    with pytest.raises(SettingsError, match=r"boulder\.profile: .* not elastic is modelled beside boxes only"):
-        load_it(with_profile(minimal, POINTS) + "model: {soil: {elements: 50}, unloading: plastic_with_gap}\n")
-
-
 def test_a_mass_beside_a_profile_is_compared_with_its_volume(load_it, minimal):
     weighed = load_it(with_profile(minimal, POINTS, "  mass: 12 t\n"))
     assert weighed.constants["boulder_mass_kg"] == 12000

@@ -127,8 +127,8 @@ def test_settings_become_layers() -> None:
     )
 
 
-def check_layers(folder: Path, name: str, *more: str) -> float:
-    """Run, simulate and explain a layered soil; return the largest force."""
+def check_layers(folder: Path, name: str, *more: str) -> None:
+    """Run, simulate and explain a layered soil."""
     sweep = boulder_sweep.load("configs/rwg.yaml", (*IN_FILE, *more))
     boulder_sweep.run(sweep, folder / name)
     found = explain(folder / name, 0)
@@ -139,7 +139,6 @@ def check_layers(folder: Path, name: str, *more: str) -> float:
     assert history.energy().largest_residual < 1e-6
     profile = soil_profile(history.motion, 100, 4000)
     assert profile.force_N.sum() == pytest.approx(history.soil_force_N[100], rel=2e-2)
-    return float(found.stored["peak_force_kN"])
 
 
 def test_run_simulate_and_explain_agree(tmp_path: Path) -> None:
@@ -148,21 +147,7 @@ def test_run_simulate_and_explain_agree(tmp_path: Path) -> None:
 
 
 @pytest.mark.nightly  # compiles kernels of its own
-def test_run_simulate_and_explain_agree_by_elements_and_with_other_laws(tmp_path: Path) -> None:
-    force_kN = check_layers(tmp_path, "elements", "model.soil={elements: 60}")
-    sweep = boulder_sweep.load("configs/rwg.yaml", (*IN_FILE, "model.unloading=plastic", "model.soil={elements: 60}"))
-    boulder_sweep.run(sweep, tmp_path / "plastic")
-    assert explain(tmp_path / "plastic", 0).unequal == ()
-    history = boulder_sweep.simulate(sweep)
-    assert history.energy().largest_residual < 1e-4
-    profile = soil_profile(history.motion, 600, 60)
-    assert profile.force_N.sum() == pytest.approx(history.soil_force_N[600], rel=1e-9)
-    stiffer = ("vehicle.second_spring=9 MN/m", "vehicle.second_spring_from=0.5 m")
-    sweep = boulder_sweep.load("configs/rwg.yaml", (*IN_FILE, *stiffer))
-    boulder_sweep.run(sweep, tmp_path / "springs")
-    assert explain(tmp_path / "springs", 0).unequal == ()
-    history = boulder_sweep.simulate(sweep)
-    assert history.summary()["peak_force_kN"] > 1.03 * force_kN
-    assert history.energy().largest_residual < 1e-6
-    weaker = boulder_sweep.simulate(sweep).summary()["max_rotation_deg"]
+def test_run_simulate_and_explain_agree_by_elements(tmp_path: Path) -> None:
+    check_layers(tmp_path, "elements", "model.soil={elements: 60}")
+    weaker = boulder_sweep.simulate(boulder_sweep.load("configs/rwg.yaml", IN_FILE)).summary()["max_rotation_deg"]
     assert weaker > boulder_sweep.simulate("configs/rwg.yaml").summary()["max_rotation_deg"]

@@ -9,17 +9,15 @@ import numpy as np
 import pytest
 
 from boulder_kernels.ground import BROMS, KP_SQUARED, WIDTH_CAPPED
-from boulder_kernels.plastic import ELASTIC, PLASTIC, PLASTIC_WITH_GAP, is_plastic
-from boulder_kernels.soil_laws import ELEMENT_LAWS
 from boulder_sweep.answers.need import need
 from boulder_sweep.answers.uncertainty import uncertainty
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.settings import Sweep
-from boulder_sweep.settings.model import PLASTIC_UNLOADINGS, PRESETS, RESISTANCES, UNLOADINGS, Model
+from boulder_sweep.settings.model import PRESETS, RESISTANCES, Model
 from boulder_sweep.soils import coefficients, with_law
-from boulder_sweep.views.wording import LAW_WORDS, UNLOADING_WORDS, design_line
+from boulder_sweep.views.wording import LAW_WORDS, design_line
 from tests import oracle
 from tests.answers.designs import site
 from tests.judge.plain import plain_designs
@@ -35,15 +33,6 @@ def by(law: str, sweep: Sweep) -> Sweep:
 
 def test_settings_and_kernels_agree_on_laws_and_water() -> None:
     assert tuple(map(RESISTANCES.index, ("kp_squared", "broms", "width_capped"))) == (KP_SQUARED, BROMS, WIDTH_CAPPED)
-
-
-def test_settings_kernels_and_words_agree_on_how_soil_unloads() -> None:
-    """By their order; what comes to rest is what remembers."""
-    assert tuple(map(UNLOADINGS.index, ("elastic", *PLASTIC_UNLOADINGS))) == (ELASTIC, PLASTIC, PLASTIC_WITH_GAP)
-    assert len(UNLOADINGS) == len(ELEMENT_LAWS) == len(UNLOADING_WORDS)
-    for unloading, law in enumerate(ELEMENT_LAWS):
-        assert is_plastic(unloading) == (law.gap is not None) == (UNLOADINGS[unloading] in PLASTIC_UNLOADINGS)
-        assert ("gap" in UNLOADING_WORDS[unloading]) == bool(law.gap)
 
 
 @pytest.mark.parametrize("law", RESISTANCES)

@@ -21,7 +21,7 @@ from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.errors import PictureError
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.impact.trajectory import Trajectory
-from boulder_sweep.settings import load, load_text
+from boulder_sweep.settings import load_text
 from boulder_sweep.views import pictures
 from boulder_sweep.views.pictures import checked_kind
 from boulder_sweep.views.time_curves import AFTER_PEAK, LAYERS, unreliable_from
@@ -73,13 +73,6 @@ def test_the_rebound_is_shaded(held: Trajectory, overturned: Trajectory, tmp_pat
     assert has_colour(picture(tmp_path / "held.png"), AFTER_PEAK, least=20_000)
     assert unreliable_from(overturned)[0] == overturned.row["time_to_limit_s"]
     assert "20°" in unreliable_from(overturned)[1]
-
-
-def test_the_rebound_in_plastic_soil_is_not_shaded(tmp_path: Path) -> None:
-    plastic = simulate(load(CONFIGS / "rwg.yaml", ["model.unloading=plastic"]))
-    assert unreliable_from(plastic) == (math.inf, "")
-    plastic.plot(tmp_path / "plastic.png")
-    assert not has_colour(picture(tmp_path / "plastic.png"), AFTER_PEAK, least=20_000)
 
 
 @pytest.fixture

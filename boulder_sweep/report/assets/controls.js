@@ -156,7 +156,6 @@ class Controls {
 
   /** @param {Record<string, number>} design @returns {string[]} cautions on its vehicle: `boulder_sweep.settings.checks` */
   cautions(design) {
-    if ("vehicle_second_spring_N_m" in design) return [];
     const { calibrated, least, most, beyond, short } = this.front;
     const crush = wallCrush(design);
     const values = { crush: this.units.written(crush, "m", 3), calibrated: this.units.written(calibrated, "m") };

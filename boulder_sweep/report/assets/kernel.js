@@ -3,10 +3,9 @@
 
 /**
  * Names of the numbers that the kernel takes and gives, each in its order, how many numbers a layer of soil has, and how
- * many the kernel makes of it, of a piece beside an outline, of a soil element, and of all elements; written by Python.
+ * many the kernel makes of it, of a piece beside an outline, and of a soil element; written by Python.
  * @typedef {{design: string[], settings: string[], outcome: string[], history: string[], sizes: string[],
- *   rulings: string[], layer: number, layer_room: number, piece_room: number, element_room: number,
- *   memory_room: number}} Layout
+ *   rulings: string[], layer: number, layer_room: number, piece_room: number, element_room: number}} Layout
  */
 
 /**
@@ -78,15 +77,14 @@ class Kernel {
   /**
    * @param {number[]} settings in the order of `Layout.settings`
    * @param {number} n designs
-   * @param {number} [samples] of a motion
    * @returns {number[]} lengths of the arrays for the soil: what is given, and room for layers, outlines and their numbers
    */
-  soilLengths(settings, n, samples = 0) {
-    const { layer, layer_room, piece_room, element_room, memory_room } = this.layout;
+  soilLengths(settings, n) {
+    const { layer, layer_room, piece_room, element_room } = this.layout;
     const { ground, below, profile, points, layers } = this.soil;
     const elements = settings[this.layout.settings.indexOf("elements")];
     const pieces = piece_room * (layers + points);
-    const room = Math.max(layer_room * layers, pieces, samples * (2 * elements + 1) + element_room * elements + memory_room);
+    const room = Math.max(layer_room * layers, pieces, element_room * elements + 1);
     return [ground.length, below.length, profile.length, layer * layers * n, 4 * points * n, room];
   }
 
@@ -153,7 +151,7 @@ class Kernel {
     const { design, history } = this.layout;
     const n = times.length;
     const { at, views } = this.room([
-      2, design.length, ...this.soilLengths(settings, 1, n), settings.length, n, 6 * n, 2 * n, 4 * n, n,
+      2, design.length, ...this.soilLengths(settings, 1), settings.length, n, 6 * n, 2 * n, 4 * n,
       history.length * n, 2,
     ]);
     design.forEach((name, field) => (views[1][field] = one[name]));

@@ -69,8 +69,6 @@ function facesOf(outline, blow) {
 const SAMPLES = 400;
 /** A boulder that overturns is shown for this share of the horizon beyond its limit, as by `sweep simulate`. */
 const SEEN_AFTER = 0.5;
-/** A crush that no vehicle reaches [m]. */
-const NEVER = 1e300;
 /** Before the end of the simulation by so little that rounding cannot put the last sample behind it. */
 const BEFORE_THE_END = 1 - 1e-14;
 
@@ -125,9 +123,7 @@ class Simulator {
     );
     // What is simulated has the mass of the boulder that was weighed.
     if ("boulder_mass_kg" in inputs) design.rho_b = inputs.boulder_mass_kg / (design.L * design.W * design.H * boulder.filled);
-    // Without a second spring it is like the first, from a crush on that is never reached.
-    const springs = { k_2: design.k_2 ?? design.k_v, s_2: design.s_2 ?? NEVER };
-    return { ...design, ...springs };
+    return design;
   }
 
   /** @param {Record<string, number>} inputs @returns {Outline} of the boulder [m] */
@@ -152,8 +148,7 @@ class Simulator {
     const { flat_foot, least_solidity, most_solidity, filled, profile } = this.data.boulder;
     const solidity = solidityOf(inputs, filled);
     let refused = 0;
-    if (solidity > most_solidity) refused = 5;
-    if (inputs.vehicle_second_spring_N_m < inputs.vehicle_spring_N_m) refused = 4;
+    if (solidity > most_solidity) refused = 4;
     if (!this.data.face && impact > exposed * (1 + 1e-12) && exposed > bumper) refused = 3;
     if (hood < bumper) refused = 2;
     if (exposed <= 0) refused = 1;
