@@ -275,8 +275,8 @@ def open_text(path: Location, most_lines: int, known: Sequence[str], problems: P
             lines = _Lines(stream, label, most_lines)
             try:
                 yield _table_of(lines, known, problems)
-            except csv.Error as error:
-                message = f"cannot be read as CSV ({error}); is a quotation mark not closed?"
+            except csv.Error:
+                message = "cannot be read as CSV; is a quotation mark not closed, or does text follow a closed one?"
                 raise refuse(label, message, lines.begun, 1) from None
     except UnicodeDecodeError:
         raise refuse(label, "is not UTF-8 text; save it as CSV in UTF-8") from None
