@@ -85,8 +85,9 @@ class TextTable:
         if len(names) > MAX_COLUMNS:
             raise refuse(label, f"has {len(names):,} columns; at most {MAX_COLUMNS:,} are read")
         if all(_is_number(name) for name in names if name):
-            sample = (delimiter or ", ").join(known[: max(2, len(names))])
-            words = f"such as {sample}; known names are {', '.join(known)}"
+            sample = (", " if delimiter in ("", "\t") else delimiter).join(known[: max(2, len(names))])
+            tabs = " (with tabs between them)" if delimiter == "\t" else ""
+            words = f"such as {sample}{tabs}; known names are {', '.join(known)}"
             raise refuse(label, f"the first line holds numbers; write a line of names above it, {words}", header[1], 1)
         self._first = int(names[0] in INDEX_NAMES)
         self.names = names[self._first :]
