@@ -92,8 +92,8 @@ def measure() -> Table:
     lines = Kinematics(0.05, 0.03, 2.0, 0.5, 0.4, 1.5)
     layered = {count: np.concatenate([stacked, same_soil(designs, count)]) for count in COUNTS}
 
-    def in_lanes(table: np.ndarray, *form: object) -> Callable[[], object]:
-        return partial(lanes.simulate_lanes, table, readings, control, *form)
+    def in_lanes(table: np.ndarray, form: type | None, count: int) -> Callable[[], object]:
+        return partial(lanes.simulate_lanes, table, readings, control, form, count)
 
     work: dict[str, Callable[[], object]] = {
         "box": in_lanes(stacked, None, 0),
