@@ -16,7 +16,6 @@ from boulder_kernels import Control, Readings
 from boulder_sweep.columns import BY_NAME, INPUT_COLUMNS, OPTIONAL_COLUMNS, OUTCOMES, OutcomeColumn
 from boulder_sweep.designs import embedment_of_ratio
 from boulder_sweep.impact.simulation import history_of
-from boulder_sweep.judge.accuracy import known_control
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.judged import worst_of
 from boulder_sweep.judge.refinement import reported_step_s
@@ -24,7 +23,7 @@ from boulder_sweep.judge.robustness import can_be_asked
 from boulder_sweep.judge.verdict import limits_of
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.settings import Sweep
-from boulder_sweep.settings.model import Criterion, Ground, Model, ReadingChoice, SolverSettings, completed
+from boulder_sweep.settings.model import Criterion, Ground, Model, ReadingChoice, SolverSettings
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import shown_values
 from boulder_sweep.settings.sweep import DesignList, allowed_in
@@ -106,8 +105,7 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
     Returns
     -------
     Explanation
-        The row as stored and as recomputed, and its time history; of another version's table, as far as its settings
-        are understood.
+        The row as stored and as recomputed, and its time history.
 
     Raises
     ------
@@ -128,9 +126,8 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
         "stored": {name: value for name, value in values.items() if isinstance(BY_NAME.get(name), OutcomeColumn)},
         "judged_by": judged_by(there),
     }
-    control, readings = known_control(there["control"]), Readings(**there["readings"])
-    settings = completed(there["settings"])
-    sweep = one_design(settings, inputs, control, values["step_s"] or reported_step_s(control))
+    control, readings = Control(**there["control"]), Readings(**there["readings"])
+    sweep = one_design(there["settings"], inputs, control, values["step_s"] or reported_step_s(control))
     stated = (there["settings"], there["readings"], there["control"], there.get("accuracy"))
     limits = limits_of(sweep)._replace(rotation=control.theta_limit)
     block = sweep.block(0, 1)
@@ -141,7 +138,7 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
     computable = not block.reasons[0]
     return Explanation(
         name=sweep.name,
-        recomputed={spec.name: again[spec.name] for spec in OUTCOMES if spec.name in manifest.columns},
+        recomputed={spec.name: again[spec.name] for spec in OUTCOMES},
         changed=tuple(differences(there, identity(*stated))),
         trajectory=history_of(sweep, 0, evaluation, cases) if computable else None,
         **common,

@@ -26,7 +26,7 @@ from boulder_sweep.runner.running import resume_command as default_resume_comman
 from boulder_sweep.runner.summary import Progress, Summary, summary_of
 from boulder_sweep.runner.workers import COMMIT_EVERY_S
 from boulder_sweep.store.failures import NotASweepError
-from boulder_sweep.store.manifest import Manifest, check_resumable, load
+from boulder_sweep.store.manifest import Manifest, load
 from boulder_sweep.store.opening import ClaimedFolder, claim_output
 from boulder_sweep.store.provenance import file_metadata, identity, new_session
 from boulder_sweep.store.writer import ROWS_PER_PART
@@ -205,7 +205,6 @@ def estimate(
     if resume and folder is not None:
         try:
             there = load(folder)
-            check_resumable(there, folder)
             rows_there, rows_per_part = there.rows_done, there.rows_per_part
         except NotASweepError:
             pass

@@ -8,7 +8,7 @@ from typing import Any
 from boulder_sweep.locations import Location
 from boulder_sweep.store import failures
 from boulder_sweep.store.files import MANIFEST_NAME, is_kept, is_ours, is_part_name
-from boulder_sweep.store.manifest import Manifest, check_resumable, load, save
+from boulder_sweep.store.manifest import Manifest, load, save
 from boulder_sweep.store.provenance import PREFIX, Session, differences
 from boulder_sweep.store.storage import Lock, Storage, storage_of
 from boulder_sweep.store.verify import damaged_parts
@@ -153,8 +153,6 @@ def _allowed(storage: Storage, names: list[str], resume: bool, overwrite: bool) 
         foreign += [name for name in unknown if not _is_written_by_us(out / name)]
         if foreign:
             raise failures.ForeignFilesError(out, foreign)
-    if there is not None and not overwrite:
-        check_resumable(there, out)
     if there is not None and not (resume or overwrite):
         raise failures.OutputExistsError(out, there.rows_done, there.rows)
     return there
