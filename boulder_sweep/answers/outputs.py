@@ -21,7 +21,7 @@ from boulder_sweep.columns import BOULDER_MASS, COLUMNS, DESIGN_ID, GRADES, RATI
 from boulder_sweep.columns import BY_NAME as COLUMN_OF
 from boulder_sweep.designs import SIDES, Label
 from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning
-from boulder_sweep.impact.explanation import model_of
+from boulder_sweep.impact.recomputing import model_of
 from boulder_sweep.locations import Location, RemotePath
 from boulder_sweep.parquet import ParquetError, TableFile
 from boulder_sweep.settings import Sweep

@@ -18,7 +18,7 @@ from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.outputs import CAPACITY, NEED, UNCERTAINTY, AnswerFile, answered, kind_of, result_of
 from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.errors import ReportError
-from boulder_sweep.impact.explanation import one_design
+from boulder_sweep.impact.recomputing import one_design
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.quantities import NEEDED, quantities_by

@@ -110,7 +110,7 @@ def write_report(
     rows = read_rows(location_of(out))
     target = checked_page(page)
     if rows.finished.rows_done == 0:
-        raise ReportError(f"{out} holds no finished designs yet; `sweep status {out}` shows its progress")
+        raise ReportError(f"{out} holds no finished designs yet")
     answer = answer_of(rows)
     named = [Named(f"Design {number}", number) for number in designs] or list(answer.named) or [Named("Design 0", 0)]
     try:

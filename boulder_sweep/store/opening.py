@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
 
@@ -70,11 +71,7 @@ class ClaimedFolder:
     def _resumed(self, manifest: Manifest, there: Manifest) -> OutputFolder:
         """Resume the run in the folder, if it is the same."""
         storage = self._storage
-        different = differences(there.identity, manifest.identity)
-        if there.rows != manifest.rows:
-            different.append(f"rows: {there.rows:,} -> {manifest.rows:,}")
-        if different:
-            raise failures.SettingsDifferError(storage.path, different)
+        refuse_other_settings(there, manifest.identity, manifest.rows, storage.path)
         there.identity = manifest.identity  # the heading of reports may be another
         recover_merge(there, storage)
         # Where the storage checks content itself, reading all of it again may take hours.
@@ -119,6 +116,21 @@ def claim_output(out: Location, *, resume: bool = False, overwrite: bool = False
         if isinstance(problem, OSError):
             raise failures.WriteError(f"cannot write into {out}: {why(problem)}") from problem
         raise
+
+
+def refuse_other_settings(there: Manifest, identity: Mapping[str, Any], rows: int, out: Location) -> None:
+    """Refuse to go on in a folder whose rows are of other settings, kernels or versions.
+
+    Raises
+    ------
+    SettingsDifferError
+        Says what differs.
+    """
+    different = differences(there.identity, identity)
+    if there.rows != rows:
+        different.append(f"rows: {there.rows:,} -> {rows:,}")
+    if different:
+        raise failures.SettingsDifferError(out, different)
 
 
 def _locked(storage: Storage) -> Lock:

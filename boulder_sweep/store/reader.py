@@ -118,7 +118,7 @@ def read_row(folder: Location, design_id: int) -> pa.Table:
         raise IndexError(f"{folder} has {held}, numbered from 0; there is no {design_id}")
     row = finished.row(design_id)
     if row is None:
-        raise IndexError(f"design {design_id} has not been computed yet; `sweep status {folder}` shows how to resume")
+        raise IndexError(f"design {design_id} has not been computed yet; `sweep run` with --resume goes on")
     return row
 
 
@@ -296,8 +296,8 @@ class FinishedRows:
         first, what = next(iter(damaged.items()))
         more = f" and {len(damaged) - 1} more parts" if len(damaged) > 1 else ""
         return DamagedError(
-            f"{self._folder} is damaged ({first}: {what}{more}). `sweep status {self._folder} --verify` lists the "
-            f"damaged parts, and running again with --resume recomputes them"
+            f"{self._folder} is damaged ({first}: {what}{more}). `sweep run` of its settings file with --resume "
+            f"recomputes damaged parts, and with --resume --dry-run lists them"
         )
 
 

@@ -7,7 +7,7 @@ import errno
 import pyarrow as pa
 import pytest
 
-from boulder_sweep.store import status, storage, verify, writer
+from boulder_sweep.store import storage, verify, writer
 from boulder_sweep.store.failures import DamagedError, StoreError, WriteError
 from boulder_sweep.store.files import MANIFEST_NAME
 from boulder_sweep.store.manifest import load
@@ -15,6 +15,7 @@ from boulder_sweep.store.provenance import FORMAT
 from boulder_sweep.store.reader import FinishedRows, finished_table
 from tests.runner.grids import same_bits
 from tests.store.folders import ROWS, commit, open_folder, part_bytes
+from tests.store.states import status
 
 SMALL = [(0, 30), (30, 30), (60, 40)]
 
