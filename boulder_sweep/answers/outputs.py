@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import pyarrow as pa
 
+from boulder_kernels import Control
 from boulder_sweep.answers.keys import key_of
 from boulder_sweep.answers.lightest import DEPTH
 from boulder_sweep.answers.need import Need
@@ -20,21 +21,19 @@ from boulder_sweep.columns import BOULDER_MASS, COLUMNS, DESIGN_ID, GRADES, RATI
 from boulder_sweep.columns import BY_NAME as COLUMN_OF
 from boulder_sweep.designs import SIDES, Label
 from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning
-from boulder_sweep.impact.explanation import model_of
-from boulder_sweep.judge.accuracy import known_control
+from boulder_sweep.impact.recomputing import model_of
 from boulder_sweep.locations import Location, RemotePath
 from boulder_sweep.parquet import ParquetError, TableFile
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.fields import BY_NAME, INPUTS
-from boulder_sweep.settings.model import Criterion, completed
+from boulder_sweep.settings.model import Criterion
 from boulder_sweep.settings.problems import shorten
 from boulder_sweep.settings.stored import check_entries
 from boulder_sweep.settings.sweep import Axis, DesignList, allowed_in
 from boulder_sweep.store.failures import settings_file
 from boulder_sweep.store.files import MANIFEST_NAME
-from boulder_sweep.store.provenance import check_identity, identity_in, judged_by, settings_sha256
+from boulder_sweep.store.provenance import check_identity, identity_in, judged_by, other_version, settings_sha256
 from boulder_sweep.store.reader import FinishedRows
-from boulder_sweep.store.schema import with_columns
 from boulder_sweep.text import counted, why
 
 if TYPE_CHECKING:
@@ -49,8 +48,6 @@ MARKS = {
     UNCERTAINTY: ("p_pass", "p_pass_low", "p_pass_high", "p_pass_driver"),
 }
 """Columns by which the answers of a command are known."""
-LATER = {"time_to_limit_error_s"}
-"""Columns that came after the first such files; one that lacks another column is damaged."""
 OF_ONE_FILE = {"repeat", "commit", "cpu"}
 """Entries of the metadata by which equal files differ."""
 _IDENTITY = {"settings", "settings_sha256", "kernels_sha256", "readings", "control", "versions"}
@@ -82,7 +79,6 @@ class _Chances:
 _QUESTIONS = {NEED: _Need, UNCERTAINTY: _Chances}
 _ADMITTED = {entry.name: entry.admitted for entry in INPUTS if entry.admitted}
 _WORDS = {"verdict": VERDICTS, "rating": RATINGS, "robustness": GRADES}
-"""Words of columns in which every version has the same."""
 OF_ANSWERS = "`sweep need`, `capacity` or `uncertainty`"
 
 
@@ -100,7 +96,7 @@ class AnswerFile:
 
     Attributes
     ----------
-    rows, rows_done, identity, judged_by, columns, lacking
+    rows, rows_done, identity, judged_by, columns
         As of `FinishedRows`.
     question : dict
         What was asked; empty where the command asks nothing more.
@@ -127,12 +123,10 @@ class AnswerFile:
         if not self.kind and not histories:
             what = "a time history" if "time_s" in names else f"no file that -o of {OF_ANSWERS} wrote"
             raise refusal(f"{path} is {what}; `sweep export` takes it")
-        if self.kind and not names >= {spec.name for spec in COLUMNS} - LATER:
+        if self.kind and not names >= {spec.name for spec in COLUMNS}:
             raise refusal(f"{path} is damaged; write it again with `sweep {self.kind}`")
         self._check(names)
-        known = [spec.name for spec in COLUMNS] if self.kind else []
-        self.columns = tuple(dict.fromkeys((*known, *self.table.column_names)))
-        self.lacking = frozenset(self.columns) - frozenset(self.table.column_names)
+        self.columns = tuple(self.table.column_names)
         self.rows = self.rows_done = len(self.table)
 
     def _check(self, names: set[str]) -> None:
@@ -167,7 +161,7 @@ class AnswerFile:
 
     def tables(self, columns: Sequence[str] | None = None, *, verify: bool = True) -> Iterator[pa.Table]:
         """Yield all rows, or some of their columns, at once."""
-        yield self.table if columns is None else with_columns(self.table, columns)
+        yield self.table if columns is None else self.table.select(columns)
 
     def row(self, number: int) -> pa.Table:
         """Return one row.
@@ -179,7 +173,7 @@ class AnswerFile:
         """
         if not 0 <= number < self.rows:
             raise IndexError(f"the file has {counted(self.rows, 'design')}, numbered from 0; there is no {number}")
-        return with_columns(self.table.slice(number, 1), self.columns)
+        return self.table.slice(number, 1)
 
     @property
     def asked(self) -> int:
@@ -225,7 +219,7 @@ class AnswerFile:
 
 
 def _identified(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[pa.Table, dict[str, Any], str]:
-    """Read a Parquet file that a command wrote, and warn where other rules than those of this version judged it.
+    """Read a Parquet file that a command wrote, and warn where other rules judged it.
 
     Parameters
     ----------
@@ -246,7 +240,7 @@ def _identified(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[pa.
     Raises
     ------
     BoulderSweepError
-        It cannot be read, is damaged, or no command wrote it.
+        It cannot be read, is damaged, of another version, or no command wrote it.
     """
     if advice := settings_file(path):
         raise refusal(advice)
@@ -257,6 +251,8 @@ def _identified(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[pa.
         identity = identity_in(table.schema.metadata)
         if not identity.keys() >= _IDENTITY:
             raise refusal(f"{path} is neither the folder of a run nor a file that `sweep` wrote")
+        if said := other_version(identity):
+            raise refusal(f"{path} {said}")
         odd = [name for name, kind in kinds.items() if name in COLUMN_OF and not _is_of(COLUMN_OF[name].type, kind)]
         if odd or settings_sha256(identity["settings"]) != identity["settings_sha256"]:
             raise refusal(f"{path} is damaged; write it again")
@@ -340,7 +336,7 @@ def asked_sweep(identity: Mapping[str, Any], table: pa.Table) -> Sweep:
     table
         The answers, which hold the values of axes and lists that are too long for the settings.
     """
-    settings = completed(identity["settings"])
+    settings = identity["settings"]
     given, order, labels = settings["inputs"], settings["order"], settings.get("labels", {})
     constants = {name: value for name, value in given.items() if isinstance(value, int | float)}
     varying = {name: _values(name, value, table) for name, value in given.items() if isinstance(value, list | dict)}
@@ -358,7 +354,7 @@ def asked_sweep(identity: Mapping[str, Any], table: pa.Table) -> Sweep:
         constants=constants,
         table=listed,
         criterion=Criterion(**settings["criterion"]),
-        model=model_of(settings, known_control(identity["control"])),
+        model=model_of(settings, Control(**identity["control"])),
         allowed=allowed_in(settings),
     )
 

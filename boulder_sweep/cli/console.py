@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from boulder_sweep.runner.estimate import Estimate
     from boulder_sweep.runner.summary import Summary
     from boulder_sweep.settings import Sweep
-    from boulder_sweep.store import RunStatus
 
 
 def grid_lines(sweep: Sweep) -> list[str]:
@@ -162,6 +161,7 @@ def dry_run_lines(sweep: Sweep, out: Location, effort: Estimate) -> list[str]:
         f"would simulate {effort.rows_to_compute:,} of {counted(effort.rows, 'design')} into {out}",
         f"about {duration_text(effort.seconds)} with {counted(effort.jobs, 'worker')}, "
         f"{size_text(effort.disk_bytes)} on disk",
+        *(f"damaged: {name}: {what}" for name, what in effort.damaged.items()),
         *(f"does not fit: {objection}" for objection in effort.objections),
     ]
 
@@ -175,28 +175,6 @@ def verdict_lines(reasons: Mapping[str, int], rows: int) -> list[str]:
         named = {key.partition("/")[2]: count for key, count in of_verdict.items() if "/" in key and count}
         detail = ", ".join(f"{reason} {count:,}" for reason, count in sorted(named.items(), key=lambda i: -i[1]))
         lines.append(f"  {verdict:<10}{total:>13,}{total / max(rows, 1):>8.1%}   {detail}".rstrip())
-    return lines
-
-
-def status_lines(status: RunStatus) -> list[str]:
-    """Return how far a run got, what is missing or damaged, and how to resume it."""
-    state = "finished" if status.complete else ("running" if status.running else "not finished")
-    lines = [
-        f"{status.out}: {state}, {status.rows_done:,} of {counted(status.rows, 'design')} "
-        f"({status.rows_done / max(status.rows, 1):.1%}), {size_text(status.bytes)}",
-        *verdict_lines(status.verdicts, status.rows_done),
-    ]
-    lines += [f"rules    {status.judged_by}"] if status.judged_by else []
-    lines += [f"damaged  {name}: {what}" for name, what in status.damaged.items()]
-    lines += [f"missing  designs {start:,} to {stop - 1:,}" for start, stop in status.missing[:10]]
-    if len(status.missing) > 10:
-        lines.append(f"missing  and {len(status.missing) - 10} more ranges")
-    if status.verified and not status.damaged:
-        lines.append("every part was read and is intact")
-    if status.resume_command and not status.running:
-        lines.append(f"resume   {status.resume_command}")
-        if status.settings_missing:
-            lines.append(f"note     there is no {status.settings_missing}; give its present path instead")
     return lines
 
 

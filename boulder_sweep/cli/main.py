@@ -22,10 +22,10 @@ from boulder_sweep.cli.ask import capacity, need, uncertainty
 from boulder_sweep.cli.compare import compare
 from boulder_sweep.cli.output import ready_streams, say
 from boulder_sweep.cli.quality import tradeoff, validate
-from boulder_sweep.cli.run import run, status
+from boulder_sweep.cli.run import run
 from boulder_sweep.cli.settings_files import check, new
 from boulder_sweep.cli.share import explore, export, plot, report
-from boulder_sweep.cli.simulate import explain, simulate
+from boulder_sweep.cli.simulate import simulate
 from boulder_sweep.cli.stone import stone
 from boulder_sweep.cli.vehicle_commands import fit_vehicle
 from boulder_sweep.errors import (
@@ -69,7 +69,7 @@ def start_light() -> None:
 
 GROUPS = {
     "Ask": (new, check, stone, need, uncertainty, capacity, simulate, explore),
-    "Tables": (run, status, explain, compare),
+    "Tables": (run, compare),
     "Share": (plot, report, export),
     "Model": (tradeoff, validate, fit_vehicle),
 }
@@ -104,7 +104,7 @@ class GroupedCommands(click.Group):
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
         self.headings: dict[str, str] = {}
-        """Heading of every command; one without is not listed."""
+        """Heading of every command."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the commands that are listed."""
@@ -133,7 +133,6 @@ for heading, commands in GROUPS.items():
     for command in commands:
         cli.add_command(command)
         cli.headings[str(command.name)] = heading
-cli.add_command(capacity, "which")  # its name before; not listed, and out with the next release
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
@@ -182,7 +181,7 @@ def execute(arguments: Sequence[str] | None = None) -> int:
         say(_usage_text(error))
         return EXIT_WRONG_USE
     except BrokenPipeError:
-        # The reader of the output has gone (sweep status ... | head); keep Python from reporting it at exit.
+        # The reader of the output has gone (sweep check ... | head); keep Python from reporting it at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except Interrupted as stop:

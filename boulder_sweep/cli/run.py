@@ -1,4 +1,4 @@
-"""``sweep run``: every design of a file simulated into one table; ``sweep status``: how far a run got."""
+"""``sweep run``: every design of a file simulated into one table."""
 
 from __future__ import annotations
 
@@ -19,14 +19,13 @@ from boulder_sweep.cli.options import (
     grid_argument,
     json_option,
     load_sweep,
-    result_argument,
     second_opinion_option,
     set_option,
     take_values,
     talk_options,
 )
 from boulder_sweep.cli.output import Notes, progress, say, show
-from boulder_sweep.errors import EXIT_INTERNAL, Interrupted
+from boulder_sweep.errors import Interrupted
 from boulder_sweep.locations import Location, location_of
 from boulder_sweep.text import counted
 
@@ -146,23 +145,3 @@ def _resume_command(
     for override in overrides:
         words += ["--set", override]
     return shlex.join([*words, "--resume"])
-
-
-STATUS_EXAMPLES = """\b
-Example:
-  sweep status m30-sizing.sweep --verify
-"""
-
-
-@click.command(short_help="Show how far a run got and how to resume it.", epilog=STATUS_EXAMPLES)
-@result_argument
-@click.option("--verify", is_flag=True, help="Read every part and compare its checksum.")
-@json_option
-def status(out: str, verify: bool, as_json: bool) -> int:
-    """Show how far the run into OUT got, what is missing, and the command that resumes it."""
-    from boulder_sweep.cli import console
-    from boulder_sweep.store import status as look
-
-    state = look(out, verify=verify)
-    show(*[json.dumps(state.to_dict(), default=str)] if as_json else console.status_lines(state))
-    return EXIT_INTERNAL if state.damaged else 0

@@ -81,7 +81,7 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes:
     if isinstance(finished, AnswerFile):
         return _plot_answers(finished, target, units, [*filter(None, axes.values()), *given])
     if finished.rows_done == 0:
-        raise PictureError(f"{out} holds no finished designs yet; see `sweep status {out}`")
+        raise PictureError(f"{out} holds no finished designs yet")
     settings = finished.identity["settings"]
     sets = settings.get("labels", {}) if settings["order"] != "table" else {}
     held = {name: _held(name, text, sets) for name, text in given.items()}

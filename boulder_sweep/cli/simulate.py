@@ -1,4 +1,4 @@
-"""One design over time: ``sweep simulate``, and ``sweep explain`` for one row of a result, from the result alone."""
+"""``sweep simulate``: one design over time, of a settings file, or of a result, from the result alone."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from boulder_sweep.cli.options import (
     load_sweep,
     refuse_missing,
     refuse_unwritable_history,
-    result_argument,
     set_option,
     take_values,
     talk_options,
@@ -25,9 +24,10 @@ from boulder_sweep.cli.options import (
 )
 from boulder_sweep.cli.output import say, show, working, wrap
 from boulder_sweep.errors import EXIT_SOME_ROWS_FAILED
+from boulder_sweep.locations import Location, RemotePath, location_of
 
 if TYPE_CHECKING:
-    from boulder_sweep.impact.explanation import Explanation
+    from boulder_sweep.impact.recomputing import Recomputed
     from boulder_sweep.impact.trajectory import Trajectory
     from boulder_sweep.settings.model import Model
 
@@ -36,6 +36,7 @@ Examples:
   sweep simulate configs/rwg.yaml --plot rwg.png
   sweep simulate configs/crash_tests.yaml --design 1 --trajectory rwg.parquet
   sweep simulate configs/abg.yaml --set model.readings=as_printed --json
+  sweep simulate m30-sizing.sweep --design 4711 --all
 """
 
 
@@ -50,7 +51,7 @@ Examples:
     metavar="F.png",
     help="Draw where the energy goes, and add its columns to the time history.",
 )
-@click.option("--all", "every", is_flag=True, help="Print every column of the outcome as well.")
+@click.option("--all", "every", is_flag=True, help="Print every column as well.")
 @click.option("--animate", type=OUTPUT, metavar="F.gif", help="Animate the side view.")
 @units_option
 @at_option
@@ -72,18 +73,34 @@ def simulate(
     quiet: bool,
     verbose: bool,
 ) -> int:
-    """Simulate one design of CASE with its time history, beyond the rotation limit and to the end."""
-    from boulder_sweep.cli import console
+    """Simulate one design of CASE with its time history, beyond the rotation limit and to the end.
 
-    sweep = take_values(load_sweep(case, overrides, quiet, units), at, quiet, units)
-    number = design or 0
-    refuse_missing(sweep, case, number)
-    refuse_unwritable_history(plot, trajectory, energy, animate)
-    if design is None and sweep.n_designs > 1 and not quiet:
-        say(f"note: {case} holds {sweep.n_designs:,} designs; this is number 0 (--design N for another)")
-    reason = sweep.block(number, number + 1).reasons[0]
+    CASE is a settings file, or the result of a run. Of a result, a row is computed again from the result alone; where
+    not every outcome is the same to the last bit, what has changed since is printed: versions, kernels, rules.
+    """
+    from boulder_sweep.cli import console
+    from boulder_sweep.settings.shown_units import shown_values
+
+    number, again, location = design or 0, None, location_of(case)
+    if _is_result(location):
+        if overrides or at is not None:
+            raise click.UsageError(f"--set and --at change the settings of a file; {case} is the result of a run")
+        refuse_unwritable_history(plot, trajectory, energy, animate)
+        again = _computed_again(location, number, quiet or as_json)
+        sweep, designs = again.sweep, again.designs
+        reason = again.stored["reason"] if again.trajectory is None else ""
+    else:
+        sweep = take_values(load_sweep(case, overrides, quiet, units), at, quiet, units)
+        refuse_missing(sweep, case, number)
+        refuse_unwritable_history(plot, trajectory, energy, animate)
+        designs, reason = sweep.n_designs, sweep.block(number, number + 1).reasons[0]
+    if design is None and designs > 1 and not quiet:
+        say(f"note: {case} holds {designs:,} designs; this is number 0 (--design N for another)")
     if reason:
         say(f"design {number} cannot be computed: {reason}")
+        if again is not None:
+            lone = {"design_id": number} | shown_values(again.inputs | again.stored, units) | again.compared(units)
+            show(*[json.dumps(lone)] if as_json else _compared_lines(again))
         return EXIT_SOME_ROWS_FAILED
     if (words := sweep.model.ground.words) and not quiet:
         say(f"note: {words}")
@@ -91,23 +108,26 @@ def simulate(
         say("\n".join(console.value_lines(sweep.resolved())))
     from boulder_sweep.impact.simulation import simulate as simulate_design
     from boulder_sweep.judge.quantiles import words_of
-    from boulder_sweep.settings.shown_units import shown_values
     from boulder_sweep.views.wording import verdict_line
 
-    with working(quiet):
-        result = simulate_design(sweep, number)
-    decided_at = [case for case in sweep.cases if case.taken_at == result.settings["taken_at"]]
+    result = None if again is None else again.trajectory
+    if result is None:
+        with working(quiet):
+            result = simulate_design(sweep, number)
+    decided_at = [case for case in sweep.cases if case.taken_at == result.settings.get("taken_at")]
     if decided_at and not quiet:
         say("\n".join(wrap(f"note: what follows is decided and drawn with {words_of(decided_at[0], units)}")))
     # Before anything else: there may be nothing to draw, and a film takes a while.
-    row = result.summary()
+    row = result.summary() if again is None else {"design_id": number, **again.inputs, **again.stored}
     whole = shown_values(row | _to_build(result), units)
     if as_json:
-        show(json.dumps(whole))
+        show(json.dumps(whole if again is None else whole | again.compared(units)))
     else:
         lines = [] if row["max_rotation_deg"] is None else impact_lines(row, result, units)
+        compared = [] if again is None else _compared_lines(again)
         columns = ["", *console.value_lines(whole)] if every else []
-        show(*wrap(verdict_line(result)), *lines, *_cautions(row | result.inputs, sweep.model), *columns)
+        cautions = _cautions(row | result.inputs, sweep.model, is_asked=again is None or again.is_asked)
+        show(*wrap(verdict_line(result)), *lines, *cautions, *compared, *columns)
     if plot is not None:
         result.plot(plot, units=units)
     if trajectory is not None:
@@ -120,10 +140,37 @@ def simulate(
     for file in (plot, trajectory, energy, animate):
         if file is not None and not quiet:
             say(f"written  {file}")
-    return EXIT_SOME_ROWS_FAILED if result.verdict == "error" else 0
+    return EXIT_SOME_ROWS_FAILED if row["verdict"] == "error" else 0
 
 
-def _cautions(row: dict[str, Any], model: Model) -> list[str]:
+def _is_result(case: Location) -> bool:
+    """Whether a case is the result of a run, or is named like one, and no settings file."""
+    return isinstance(case, RemotePath) or case.is_dir() or case.suffix.lower() in (".sweep", ".parquet")
+
+
+def _computed_again(folder: Location, number: int, quiet: bool) -> Recomputed:
+    """Compute a row of a result again; a row that it does not have is wrong use."""
+    from boulder_sweep.impact.recomputing import recompute
+
+    try:
+        with working(quiet):
+            return recompute(folder, number)
+    except IndexError as problem:
+        raise click.UsageError(str(problem)) from None
+
+
+def _compared_lines(again: Recomputed) -> list[str]:
+    """Return how a row of a result comes out now."""
+    lines = [
+        f"differs now: {name} was {again.stored[name]!r}, comes out as {again.recomputed[name]!r}"
+        for name in again.unequal
+    ]
+    lines += [f"changed since: {line}" for line in again.changed]
+    lines += [f"as stored, the row was {again.judged_by}"] if again.judged_by else []
+    return lines if again.unequal else [*lines, "computed again: the same to the last bit"]
+
+
+def _cautions(row: dict[str, Any], model: Model, *, is_asked: bool) -> list[str]:
     """Return the remarks that go with the result."""
     from boulder_sweep.answers.printing import foot_lines, grade_lines
     from boulder_sweep.judge.validity import NOT_A_RATING, meanings
@@ -131,85 +178,9 @@ def _cautions(row: dict[str, Any], model: Model) -> list[str]:
     cautions = [f"caution: {words}" for words in meanings(row["validity"] or "")]
     cautions += ["see docs/validity.md"] if cautions else []
     if row["verdict"] == "pass":
-        cautions = [*grade_lines([row]), *cautions, f"pass: {NOT_A_RATING}"]
+        grades = grade_lines([row]) if is_asked else ["open: not asked (`sweep run --second-opinion` asks)"]
+        cautions = [*grades, *cautions, f"pass: {NOT_A_RATING}"]
     return [*cautions, *foot_lines(model, [row["reason"]])]
-
-
-EXPLAIN_EXAMPLES = """\b
-Examples:
-  sweep explain m30-sizing.sweep 4711
-  sweep explain m30-sizing.sweep 4711 --plot 4711.png
-"""
-
-
-@click.command("explain", short_help="Recompute one row of a result over time.", epilog=EXPLAIN_EXAMPLES)
-@result_argument
-@click.argument("design_id", type=click.IntRange(min=0))
-@click.option("--plot", type=OUTPUT, metavar="F.png", help="Draw rotation, displacements and forces over time.")
-@click.option("--trajectory", type=OUTPUT, metavar="F.parquet", help="Write the time history.")
-@units_option
-@json_option
-def explain(out: str, design_id: int, plot: str | None, trajectory: str | None, units: str, as_json: bool) -> int:
-    """Compute row DESIGN_ID of the result in OUT again, from the result alone, and say what decided it.
-
-    Says whether every outcome is the same to the last bit and, if not, what has changed since: versions, kernels,
-    rules. As in `sweep simulate`, the time history continues beyond the rotation limit.
-    """
-    from boulder_sweep.cli.console import value_lines
-    from boulder_sweep.impact.explanation import explain as compute_again
-    from boulder_sweep.settings.shown_units import shown_values
-
-    refuse_unwritable_history(plot, trajectory)
-    try:
-        with working(as_json):
-            explanation = compute_again(out, design_id)
-    except IndexError as problem:
-        raise click.UsageError(str(problem)) from None
-    if explanation.trajectory is not None:
-        if plot is not None:
-            explanation.trajectory.plot(plot, units=units)
-        if trajectory is not None:
-            explanation.trajectory.to_parquet(trajectory)
-    elif plot is not None or trajectory is not None:
-        say("note: the design cannot be computed; there is no time history")
-    if as_json:
-        show(json.dumps(explanation.as_dict(units)))
-        return 0
-    values = {"design": shown_values(explanation.inputs, units), "outcome": shown_values(explanation.stored, units)}
-    show(*value_lines(values), *why_lines(explanation, units))
-    for name in explanation.unequal:
-        show(f"differs now: {name} was {explanation.stored[name]!r}, comes out as {explanation.recomputed[name]!r}")
-    for line in explanation.changed:
-        show(f"changed since: {line}")
-    if explanation.judged_by:
-        show(f"as stored, the row was {explanation.judged_by}")
-    if not explanation.unequal:
-        show("computed again: the same to the last bit")
-    return 0
-
-
-def why_lines(explanation: Explanation, units: str = "si") -> list[str]:
-    """Return what decided a row, and how near it came to every limit."""
-    from boulder_sweep.judge.validity import BY_FLAG
-    from boulder_sweep.views.wording import REASON_WORDS, ground_words
-
-    row, history = explanation.stored, explanation.trajectory
-    reason = REASON_WORDS.get(row["reason"], row["reason"])
-    lines = ["why", f"  {row['verdict']}{f': {reason}' if reason else ''}"]
-    if history is None or row["max_rotation_deg"] is None:
-        return lines
-    ground = ground_words(history.settings, units)
-    lines += [f"  soil: {ground}"] if ground else []
-    lines += impact_lines(row, history, units)
-    if row.get("robustness"):
-        stands = row["stands_under"]
-        under = f", stands under {', '.join(stands.split(';'))}" if stands else ""
-        lines.append(f"  second opinion: {row['robustness']}{under}")
-    if row.get("validity"):
-        lines.append("  outside what the model was tested on (docs/validity.md):")
-        names = row["validity"].split(";")
-        lines += [f"    {name}: {BY_FLAG[name].meaning}" if name in BY_FLAG else f"    {name}" for name in names]
-    return lines
 
 
 def impact_lines(row: Mapping[str, Any], history: Trajectory, units: str = "si") -> list[str]:

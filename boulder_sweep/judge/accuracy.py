@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -118,11 +117,6 @@ def steps_of(sweep: Sweep) -> dict[str, Steps]:
 def readings_of(sweep: Sweep) -> Readings:
     """Return the readings of a sweep's model as the kernels name them."""
     return Readings(*sweep.model.readings.corrected)
-
-
-def known_control(recorded: Mapping[str, Any]) -> Control:
-    """Return the control that a table records, without entries of another version that this one does not know."""
-    return Control(**{name: value for name, value in recorded.items() if name in Control._fields})
 
 
 def control_of(sweep: Sweep, accuracy: Accuracy) -> Control:

@@ -56,7 +56,7 @@ def quantities(rows: Mapping[str, Any], shape: Shape, ground: Ground) -> dict[st
 
 
 def quantities_by(rows: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """Return the quantities of designs by the resolved settings of their table, of this or an earlier version."""
+    """Return the quantities of designs by the resolved settings of their table."""
     model = settings["model"]
     return quantities(rows, Shape.of_model(model), Ground.of_dict(model.get("ground", {})))
 

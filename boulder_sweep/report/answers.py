@@ -111,15 +111,13 @@ def _of_answers(rows: ResultRows, need: Need, n: int) -> Answer:
 
 def _flagged(rows: ResultRows, n: int) -> list[Sentence]:
     """Say how many of the n passes lie outside what the model was tested on."""
-    flagged = n - rows.flags.get("", 0) if rows.flags else 0
+    flagged = n - rows.flags.get("", 0)
     if flagged:
         commonest = sorted(((count, name) for name, count in rows.flags.items() if name), reverse=True)
         most = "; ".join(f"{count:,} with {_meaning(name)}" for count, name in commonest[:3])
         lie = verb(flagged, "lie", "lies")
         often = ", most often:" if len(commonest) > 3 else ":"
         return [(f"{flagged:,} of those that pass {lie} outside what the model was tested on{often} {most}.",)]
-    if n and not rows.flags:
-        return [("The table does not say which of those that pass lie outside what the model was tested on.",)]
     return []
 
 
@@ -215,7 +213,7 @@ def _to_build(rows: ResultRows, number: int) -> Sentence:
 
 
 def _meaning(flag: str) -> str:
-    """What a flag says; its name where another version has set it."""
+    """What a flag says; its name where other rules have set it."""
     return BY_FLAG[flag].meaning if flag in BY_FLAG else flag
 
 

@@ -221,7 +221,7 @@ def _table(location: Location, result: FinishedRows | AnswerFile, answers: Itera
     for name in ("verdict", "reason"):
         table[name] = table[name].astype(str)
     table["mass_kg"] = table.eval("boulder_length_m * boulder_width_m * boulder_height_m * boulder_density_kg_m3")
-    table["mass_kg"] *= table.solidity.fillna(1.0)  # unknown of rows that cannot be computed, and in older tables
+    table["mass_kg"] *= table.solidity.fillna(1.0)  # unknown of rows that cannot be computed
     table[RATIO] = table.embedment_depth_m / table.boulder_height_m
     for name in (*INPUT_COLUMNS, RATIO, "mass_kg"):
         table[_key(name)] = table[name].map({value: f"{value:.{DIGITS}g}" for value in table[name].unique()})

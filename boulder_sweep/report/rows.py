@@ -13,18 +13,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from boulder_kernels import Control
 from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.outputs import CAPACITY, NEED, UNCERTAINTY, AnswerFile, answered, kind_of, result_of
 from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.errors import ReportError
-from boulder_sweep.impact.explanation import one_design
-from boulder_sweep.judge.accuracy import accuracy_of, known_control
+from boulder_sweep.impact.recomputing import one_design
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.quantities import NEEDED, quantities_by
 from boulder_sweep.judge.validity import flag_counts
 from boulder_sweep.locations import Location
 from boulder_sweep.settings.fields import BY_NAME
-from boulder_sweep.settings.model import completed
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.store.reader import FinishedRows, read_row
 from boulder_sweep.text import counted
@@ -87,7 +87,7 @@ class ResultRows:
     codes : ndarray of uint8, shape (rows,)
         Index of the name of every row.
     flags : dict of str to int
-        Designs that pass, by validity flags; under ``""`` those without. Empty for a table that does not have them.
+        Designs that pass, by validity flags; under ``""`` those without.
     grades : dict of str to int
         Designs that pass, by their robustness. Empty for a table that does not have it.
     axes : dict of str to ndarray
@@ -263,8 +263,8 @@ class ResultRows:
     def grade(self, row: dict[str, Any]) -> str | None:
         """Return the robustness of a row; where the table left it open, second opinions are asked now.
 
-        None where the row does not pass, or not by today's rules, or its settings are not those of this version; and
-        where the row stands for the designs drawn, of which it is the mean.
+        None where the row does not pass, or not by today's rules; and where the row stands for the designs drawn, of
+        which it is the mean.
         """
         if "p_pass" in row:
             return None
@@ -272,9 +272,9 @@ class ResultRows:
             return row.get("robustness")
         identity = self.finished.identity
         try:
-            control = known_control(identity["control"])
-            sweep = one_design(completed(identity["settings"]), inputs_of(row), control, row["step_s"] or control.h)
-        except (LookupError, TypeError, ValueError):
+            control = Control(**identity["control"])
+            sweep = one_design(identity["settings"], inputs_of(row), control, row["step_s"] or control.h)
+        except LookupError:
             return row.get("robustness")
         evaluation, block = evaluation_of(sweep, accuracy_of(sweep)), sweep.block(0, 1)
         grade: str | None = evaluation.graded(evaluation(block), block).row(0)["robustness"]
@@ -317,10 +317,8 @@ def read_rows(folder: Location) -> ResultRows:
     grades: Counter[str] = Counter()
     asked = bool(settings["model"].get("second_opinion")) or kind_of(finished) in (NEED, CAPACITY)
     for table in finished.tables(["design_id", "verdict", "reason", "validity", "robustness", *stored]):
-        if "validity" not in finished.lacking:
-            flags.update(_of_passes(table, "validity"))
-        if "robustness" not in finished.lacking:
-            grades.update(_of_passes(table, "robustness"))
+        flags.update(_of_passes(table, "validity"))
+        grades.update(_of_passes(table, "robustness"))
         rows = table.column("design_id").to_numpy()
         codes[rows] = _codes(table, names, asked=asked)
         for name in stored:

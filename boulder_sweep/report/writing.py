@@ -16,7 +16,7 @@ from typing import Any
 from boulder_kernels import Control, Readings
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.errors import ReportError
-from boulder_sweep.judge.accuracy import accuracy_of, control_of, known_control, readings_of
+from boulder_sweep.judge.accuracy import accuracy_of, control_of, readings_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.report.answers import answer_of
@@ -24,7 +24,7 @@ from boulder_sweep.report.asked import Named, answers_table
 from boulder_sweep.report.build import kernel
 from boulder_sweep.report.rows import MOST_ELEMENTS, inputs_of, read_rows
 from boulder_sweep.settings import Sweep
-from boulder_sweep.settings.model import FOOT_WORDS, SolverSettings, completed
+from boulder_sweep.settings.model import FOOT_WORDS, SolverSettings
 from boulder_sweep.settings.shown_units import check_system, quantity_text
 from boulder_sweep.settings.sweep import NO_HEADING, SECTION, Heading, derived_words, wrong_with
 from boulder_sweep.stones.rock import ROCK_KG_M3
@@ -110,7 +110,7 @@ def write_report(
     rows = read_rows(location_of(out))
     target = checked_page(page)
     if rows.finished.rows_done == 0:
-        raise ReportError(f"{out} holds no finished designs yet; `sweep status {out}` shows its progress")
+        raise ReportError(f"{out} holds no finished designs yet")
     answer = answer_of(rows)
     named = [Named(f"Design {number}", number) for number in designs] or list(answer.named) or [Named("Design 0", 0)]
     try:
@@ -119,7 +119,7 @@ def write_report(
         raise ReportError(str(missing)) from missing
     identity = rows.finished.identity
     notes = _notes_on_rules(rows.finished.judged_by)
-    settings, control = completed(identity["settings"]), known_control(identity["control"])
+    settings, control = identity["settings"], Control(**identity["control"])
     readings = Readings(**identity["readings"])
     text = assembled(
         heading=Heading(**{**settings.get(SECTION, {}), **heading.given()}).given(),
@@ -230,8 +230,7 @@ def _notes_on_rules(judged_by: str) -> list[str]:
         return []
     return [
         f"The verdicts of the table were {judged_by}. Simulations in this page follow the rules of version "
-        f"{versions()['boulder-sweep']} and may differ from it; settings that the table does not record have the "
-        "defaults of that version."
+        f"{versions()['boulder-sweep']} and may differ from it."
     ]
 
 

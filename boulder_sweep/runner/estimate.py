@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -67,6 +67,8 @@ class Estimate:
         Rows handed to a worker at once.
     jobs
         Workers.
+    damaged
+        What is wrong with parts that would be computed again, by file name.
     """
 
     rows: int
@@ -77,6 +79,7 @@ class Estimate:
     rows_per_second: float
     rows_per_block: int
     jobs: int
+    damaged: dict[str, str] = field(default_factory=dict)
 
     @property
     def objections(self) -> list[str]:
@@ -153,6 +156,7 @@ def estimated(
     out: Location | None,
     rows_per_part: int = ROWS_PER_PART,
     cores: int | None = None,
+    damaged: dict[str, str] | None = None,
 ) -> Estimate:
     """Estimate what a run needs from a sample.
 
@@ -170,6 +174,8 @@ def estimated(
         Rows of a part.
     cores
         Cores that the workers share; None where each has its own.
+    damaged
+        As of `Estimate`.
     """
     per_block = rows_per_block(sample.seconds_per_row, rows_to_compute, jobs)
     rows_per_second = min(jobs, cores or jobs) / sample.seconds_per_row
@@ -184,6 +190,7 @@ def estimated(
         rows_per_second=rows_per_second,
         rows_per_block=per_block,
         jobs=jobs,
+        damaged=damaged or {},
     )
 
 

@@ -8,6 +8,7 @@ What the table holds depends on the settings alone, not on workers, blocks, spee
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,9 +27,11 @@ from boulder_sweep.runner.running import resume_command as default_resume_comman
 from boulder_sweep.runner.summary import Progress, Summary, summary_of
 from boulder_sweep.runner.workers import COMMIT_EVERY_S
 from boulder_sweep.store.failures import NotASweepError
-from boulder_sweep.store.manifest import Manifest, check_resumable, load
-from boulder_sweep.store.opening import ClaimedFolder, claim_output
+from boulder_sweep.store.manifest import Manifest
+from boulder_sweep.store.opening import ClaimedFolder, claim_output, refuse_other_settings
 from boulder_sweep.store.provenance import file_metadata, identity, new_session
+from boulder_sweep.store.storage import storage_of
+from boulder_sweep.store.verify import load_checked
 from boulder_sweep.store.writer import ROWS_PER_PART
 
 if TYPE_CHECKING:
@@ -184,7 +187,7 @@ def estimate(
     sweep, out, jobs, simulate
         As of `run`.
     resume
-        Count only the rows missing in `out`.
+        Count only the rows that are missing in `out` or damaged there.
 
     Returns
     -------
@@ -195,34 +198,32 @@ def estimate(
     ------
     TypeError, ValueError
         The number of jobs is not a whole number, or out of range.
+    StoreError
+        A run cannot be resumed in `out`.
     """
     check_jobs(jobs)
     sweep = at_values(sweep)
     accuracy = accuracy_of(sweep)
     evaluation = evaluation_of(sweep, accuracy, simulate)
     folder = None if out is None else location_of(out)
-    rows_there, rows_per_part = 0, ROWS_PER_PART
+    described = identity(sweep.resolved(), *evaluation.settings(), accuracy.to_dict())
+    there = Manifest(described, sweep.n_designs, ROWS_PER_PART, "")
+    damaged: dict[str, str] = {}
     if resume and folder is not None:
-        try:
-            there = load(folder)
-            check_resumable(there, folder)
-            rows_there, rows_per_part = there.rows_done, there.rows_per_part
-        except NotASweepError:
-            pass
+        with suppress(NotASweepError):
+            there, damaged = load_checked(folder, read_parts=not storage_of(folder).checks_content)
+            refuse_other_settings(there, described, sweep.n_designs, folder)
     evaluation.warm_up()
-    metadata = file_metadata(
-        identity(sweep.resolved(), *evaluation.settings(), accuracy.to_dict()),
-        repeat_command(sweep),
-        firmness_of(sweep).to_dict(),
-    )
+    metadata = file_metadata(described, repeat_command(sweep), firmness_of(sweep).to_dict())
     return estimated(
         take_sample(evaluation, sweep, metadata),
         rows=sweep.n_designs,
-        rows_to_compute=sweep.n_designs - rows_there,
+        rows_to_compute=sweep.n_designs - there.rows_done,
         jobs=jobs or available_cores(),
         out=folder,
-        rows_per_part=rows_per_part,
+        rows_per_part=there.rows_per_part,
         cores=available_cores(),
+        damaged=damaged,
     )
 
 

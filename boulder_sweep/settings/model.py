@@ -405,17 +405,6 @@ class Model:
         return self.readings.preset
 
 
-def completed(settings: dict[str, Any]) -> dict[str, Any]:
-    """Return the resolved settings of a table with today's defaults for entries that are newer than it."""
-    model = Model()
-    more = {name: getattr(model, name) for name in ("calibrated_crush_m", "resistance", "foot")}
-    return settings | {
-        "criterion": asdict(Criterion()) | settings["criterion"],
-        "model": more | settings["model"],
-        "solver": {"accuracy_deg": None} | settings["solver"],
-    }
-
-
 @dataclass(frozen=True, slots=True)
 class SolverSettings:
     """How finely and how long a design is simulated: by an accuracy, or by a step where that is None."""

@@ -25,14 +25,12 @@ from boulder_sweep.settings.model import (
     Bound,
     Criterion,
     Ground,
-    Model,
     ReadingChoice,
 )
 from boulder_sweep.settings.problems import shorten
 from boulder_sweep.settings.shape import ProfilePoint, Scan
 from boulder_sweep.settings.sweep import IMPACT_HEIGHT_RULE, Heading, derived_words, wrong_with
 
-_USUAL = Model()
 _NAMES = {entry.name for entry in INPUTS}
 _ALWAYS = (EMBEDMENT, *((entry.name,) for entry in INPUTS if not (entry.optional or entry.name in EMBEDMENT)))
 """Inputs of which all settings have one."""
@@ -81,9 +79,9 @@ class _Model:
     readings: ReadingChoice
     preset: str
     soil: int | Literal["closed_form"]
-    calibrated_crush_m: float = _USUAL.calibrated_crush_m
-    resistance: str = _USUAL.resistance
-    foot: str = _USUAL.foot
+    calibrated_crush_m: float
+    resistance: str
+    foot: str
     rock_assumed: bool = False
     profile: tuple[ProfilePoint, ...] = ()
     scan: Scan | None = None
@@ -96,7 +94,7 @@ class _Solver:
     accuracy: str | None
     step_s: float | None
     horizon_s: float
-    accuracy_deg: float | None = None
+    accuracy_deg: float | None
 
 
 _Case = dict[str, float | tuple[float, ...] | _Long | dict[str, str]]
@@ -161,20 +159,23 @@ def check_control(control: dict[str, Any], readings: dict[str, Any]) -> None:
     Parameters
     ----------
     control
-        See `boulder_kernels.control.Control`; entries that it does not have are passed over.
+        See `boulder_kernels.control.Control`.
     readings
         See `boulder_kernels.design.Readings`.
 
     Raises
     ------
     ValueError
-        An entry is missing, or no value that a settings file leads to.
+        An entry is missing, unknown, or no value that a settings file leads to.
     """
     from boulder_kernels.control import Control
     from boulder_kernels.design import Readings
 
-    for name, kind in get_type_hints(Control).items():
-        value: Any = control.get(name, Control._field_defaults.get(name))
+    kinds = get_type_hints(Control)
+    if control.keys() != kinds.keys():
+        raise ValueError(f"control has other entries than {', '.join(kinds)}")
+    for name, kind in kinds.items():
+        value = control[name]
         low, high = _CONTROL_BOUNDS.get(name, (-math.inf, math.inf))
         if not _is_of(value, kind) or not low <= value <= high:
             raise ValueError(f"control.{name} is {str(value)[:60]!r}, which no settings give")

@@ -14,6 +14,5 @@ A folder contains
 
 from boulder_sweep.store.failures import StoreError
 from boulder_sweep.store.reader import read
-from boulder_sweep.store.verify import RunStatus, status
 
-__all__ = ["RunStatus", "StoreError", "read", "status"]
+__all__ = ["StoreError", "read"]

@@ -88,28 +88,21 @@ class NotASweepError(StoreError):
 
 
 class OtherVersionError(StoreError):
-    """A result is in a format that this version does not know, or one with which its runs cannot go on.
+    """A result is in the format of another version.
 
     Parameters
     ----------
-    path
-        The file, or the folder where no single file is meant.
-    why
-        What differs from what this version writes.
-    version
-        Version that wrote it, if the file says so.
+    out
+        The folder.
+    said
+        Which version wrote it, and what to do, see `provenance.other_version`.
     """
 
     exit_code = EXIT_CONFLICT
 
-    def __init__(self, path: Location, why: str, version: str | None = None):
-        self.path, self.why, self.version = path, why, version
-        noted = f", {version}" if version else ""
-        super().__init__(
-            f"{path} was written by another version of boulder-sweep{noted} ({why}). Use that version to "
-            f"go on with it; pandas, Polars and DuckDB can read the parts as a table in any case. "
-            f"`sweep run` with --overwrite starts again"
-        )
+    def __init__(self, out: Location, said: str):
+        self.out = out
+        super().__init__(f"{out} {said}. Into the same folder, `sweep run` needs --overwrite")
 
 
 class DamagedError(StoreError):

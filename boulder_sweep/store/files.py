@@ -31,8 +31,7 @@ WRITING_SUFFIX = ".writing"
 """Suffix of a file that does not have its final name yet; such names begin with ``_``, and readers skip them."""
 PART_SUFFIX = ".parquet"
 _DIGITS = 12
-_PART_NAME = re.compile(rf"rows-[0-9]{{{_DIGITS},}}(-[0-9]{{{_DIGITS},}})?{re.escape(PART_SUFFIX)}")
-"""The first tables named a part by its first row only."""
+_PART_NAME = re.compile(rf"rows-[0-9]{{{_DIGITS},}}-[0-9]{{{_DIGITS},}}{re.escape(PART_SUFFIX)}")
 _VERSION_NAME = re.compile(rf"_manifest-([0-9]{{{_DIGITS}}})\.parquet")
 _TOKENS = re.compile(r"(\.[0-9a-f]{16})+$")
 _PIECE = 8 << 20

@@ -32,7 +32,6 @@ HEARTBEAT_S = 10.0
 """How often the holder renews the lock [s]."""
 DEAD_AFTER_S = 6 * HEARTBEAT_S
 """Time without a heartbeat after which a run on another machine counts as dead [s]."""
-_ATTEMPTS = 4
 _NOT_SUPPORTED = (errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS)
 _RECORD_BYTES = 1000
 
@@ -219,27 +218,6 @@ class ObjectLock:
         return json.dumps(record).encode()
 
 
-def is_locked(folder: Location) -> bool:
-    """Whether a run seems to be writing into a folder; on a disk, one on a machine that shares its locks with this."""
-    if isinstance(folder, RemotePath):
-        there = _record(folder / LOCK_NAME)
-        return there is not None and _is_alive(there)
-    try:
-        descriptor = os.open(folder / LOCK_NAME, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
-    except OSError:
-        return False
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    except OSError:
-        return False
-    else:
-        return False
-    finally:
-        os.close(descriptor)
-
-
 def _in_use_text(folder: Location, holder: str, age_s: float) -> str:
     """Say who holds the lock."""
     return (
@@ -250,19 +228,14 @@ def _in_use_text(folder: Location, holder: str, age_s: float) -> str:
 
 def _lock(descriptor: int) -> bool:
     """Lock an open file; False where the file system has no locks."""
-    for attempt in range(_ATTEMPTS):
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            if attempt == _ATTEMPTS - 1:
-                raise
-            time.sleep(0.05)  # it may only be a call of `is_locked`
-        except OSError as problem:
-            if problem.errno in _NOT_SUPPORTED:
-                return False
-            raise
-        else:
-            break
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise
+    except OSError as problem:
+        if problem.errno in _NOT_SUPPORTED:
+            return False
+        raise
     return True
 
 

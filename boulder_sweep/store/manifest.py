@@ -4,9 +4,7 @@ It is the file ``_manifest.parquet``: the columns of the table, no rows, and the
 metadata. A reader that takes every file of the folder for a part (DuckDB, Polars) then finds no rows in it,
 where any other kind of file would make it fail.
 
-Records have the form that this version knows. An entry that another version has more is left out, and one that was
-added since may be missing; both are noted, and no run goes on there. Anything else is refused, never guessed at.
-docs/formats.md says what may change between versions.
+Records have exactly the form that `save` writes. Anything else is refused, never guessed at.
 """
 
 from __future__ import annotations
@@ -15,24 +13,20 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import MISSING, asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from itertools import pairwise
 from typing import Any, get_args, get_origin, get_type_hints
 
-from boulder_sweep.columns import COLUMNS, DESIGN_ID, INPUT_COLUMNS, OPTIONAL_COLUMNS
+from boulder_sweep.columns import COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.locations import Location
 from boulder_sweep.settings.problems import shorten
 from boulder_sweep.store import failures
-from boulder_sweep.store.files import MANIFEST_NAME, PART_SUFFIX, hidden_name, part_name
-from boulder_sweep.store.provenance import IDENTITY_KINDS, Session
+from boulder_sweep.store.files import MANIFEST_NAME, hidden_name, part_name
+from boulder_sweep.store.provenance import IDENTITY_KINDS, Session, other_version
 from boulder_sweep.store.storage import Storage, storage_of
 
 _KEY = b"boulder_sweep.manifest"
-_FORMAT = 1
-"""Of tables, apart from the version of the package: docs/formats.md says when it must grow."""
-_IN_EVERY_TABLE = frozenset({DESIGN_ID.name, *INPUT_COLUMNS, "verdict", "reason"})
 _MOST_ROWS = 2**63 - 1
-_LONGEST_REASON = 200
 _DEEPEST = 32
 """Most levels of nested records; a settings file has fewer than ten."""
 
@@ -100,10 +94,6 @@ class Manifest:
         Runs into this folder, oldest first.
     merge
         The merge under way, if any.
-    columns
-        Names of the columns that are stored; of a manifest that was read.
-    differing
-        What another version wrote otherwise: such a table can be read, but no run goes on there.
     """
 
     identity: dict[str, Any]
@@ -113,8 +103,6 @@ class Manifest:
     parts: dict[str, Part] = field(default_factory=dict)
     sessions: list[Session] = field(default_factory=list)
     merge: Merge | None = None
-    columns: tuple[str, ...] = field(default=(), compare=False)
-    differing: list[str] = field(default_factory=list, compare=False)
 
     @property
     def rows_done(self) -> int:
@@ -159,6 +147,11 @@ class Manifest:
         inputs = settings.get("inputs", {})
         return (*(name for name in OPTIONAL_COLUMNS if name in inputs), *settings.get("labels", ()))
 
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of all columns, in order."""
+        return (*(spec.name for spec in COLUMNS), *self.more_columns)
+
 
 def total_verdicts(parts: Iterable[Part]) -> dict[str, int]:
     """Count the rows of each verdict and reason in several parts."""
@@ -196,8 +189,7 @@ def _encoded(manifest: Manifest, more: Mapping[bytes, bytes]) -> memoryview:
 
     from boulder_sweep.store.schema import table_schema
 
-    records = {name: value for name, value in asdict(manifest).items() if name not in ("columns", "differing")}
-    text = json.dumps({"format": _FORMAT, **records}, separators=(",", ":"))
+    text = json.dumps(asdict(manifest), separators=(",", ":"))
     value = hashlib.sha256(text.encode()).hexdigest() + text
     schema = table_schema({_KEY: value.encode(), **more}, manifest.more_columns)
     sink = pa.BufferOutputStream()
@@ -207,7 +199,7 @@ def _encoded(manifest: Manifest, more: Mapping[bytes, bytes]) -> memoryview:
 
 
 def load(folder: Location) -> Manifest:
-    """Read the manifest of a folder, by whichever version it was written.
+    """Read the manifest of a folder.
 
     Raises
     ------
@@ -218,7 +210,7 @@ def load(folder: Location) -> Manifest:
     ImpossibleRecordsError
         It is intact, but no sweep writes such names and numbers.
     OtherVersionError
-        It is intact, but of a format that this version does not know.
+        It is intact, but of another format.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -244,18 +236,15 @@ def load(folder: Location) -> Manifest:
         content = json.loads(text)
         if _is_deep(content):
             raise ValueError("its records are nested too deeply")
-    except (ValueError, RecursionError) as problem:
-        raise failures.ImpossibleRecordsError(path, str(problem)) from None
-    try:
+        if said := other_version(content.get("identity") if isinstance(content, dict) else None):
+            raise failures.OtherVersionError(folder, said)
         manifest = _from_json(content)
         _check_claims(path, manifest)
-        manifest.columns = tuple(footer.schema.names)
-        manifest.differing = [*_differing_columns(manifest), *manifest.differing]
+        if {*footer.schema.names} != {*manifest.columns}:
+            raise ValueError("other columns than those of its settings")
         return manifest
-    except ValueError as unfamiliar:
-        version = _version_of(content)
-        why = shorten(str(unfamiliar), _LONGEST_REASON)
-        raise failures.OtherVersionError(path, why, None if version is None else shorten(version)) from None
+    except (ValueError, RecursionError) as problem:
+        raise failures.ImpossibleRecordsError(path, str(problem)) from None
 
 
 def _check_claims(path: Location, manifest: Manifest) -> None:
@@ -271,9 +260,7 @@ def _check_claims(path: Location, manifest: Manifest) -> None:
         raise failures.ImpossibleRecordsError(path, f"a table of {rows} rows in parts of {size}")
     for name, part in (*parts.items(), *([] if merge is None else [(merge.name, merge.part)])):
         within = 0 <= part.first < part.stop <= rows and part.first // size == (part.stop - 1) // size
-        expected = part_name(part.first, part.stop, rows) if within else ""
-        # The first tables named the first row only. More zeros would sort otherwise than the rows do.
-        if not within or name not in (expected, expected.rpartition("-")[0] + PART_SUFFIX):
+        if not within or name != part_name(part.first, part.stop, rows):  # more zeros would sort otherwise
             raise failures.ImpossibleRecordsError(
                 path, f"{name:.60} with the rows {part.first} to {part.stop} of {rows}"
             )
@@ -293,21 +280,6 @@ def _check_claims(path: Location, manifest: Manifest) -> None:
     _check_kinds(path, "identity", manifest.identity, IDENTITY_KINDS)
 
 
-def check_resumable(manifest: Manifest, folder: Location) -> None:
-    """Check that a run of this version may go on with a table.
-
-    Raises
-    ------
-    OtherVersionError
-        Another version wrote it, with other columns or records.
-    """
-    if manifest.differing:
-        why = "; ".join(manifest.differing[:3]) + ("; ..." if len(manifest.differing) > 3 else "")
-        raise failures.OtherVersionError(
-            folder / MANIFEST_NAME, shorten(why, 300), _version_of({"identity": manifest.identity})
-        )
-
-
 def _no_result(folder: Location) -> str:
     """Describe why a path holds no result."""
     if not folder.exists():
@@ -325,22 +297,6 @@ def _no_result(folder: Location) -> str:
     return f"{folder} is a file; the result of a run is a folder{advice}"
 
 
-def _differing_columns(manifest: Manifest) -> list[str]:
-    """Say which columns a table has more or less than today.
-
-    Raises
-    ------
-    ValueError
-        It lacks one that every version has.
-    """
-    there, expected = set(manifest.columns), {*(spec.name for spec in COLUMNS), *manifest.more_columns}
-    lacking = expected - there
-    if lacking & _IN_EVERY_TABLE:
-        raise ValueError(f"its table lacks columns: {', '.join(sorted(lacking & _IN_EVERY_TABLE))}")
-    differing = ((lacking, "lacks"), (there - expected, "also has"))
-    return [f"its table {verb} {', '.join(sorted(names))}" for names, verb in differing if names]
-
-
 def _from_json(content: Any) -> Manifest:
     """Rebuild a manifest from its JSON.
 
@@ -349,46 +305,35 @@ def _from_json(content: Any) -> Manifest:
     ValueError
         It is not what `save` writes; the text says where.
     """
-    if not isinstance(content, dict) or "format" not in content:
-        raise ValueError("its records do not say their format")
-    if content["format"] != _FORMAT:
-        raise ValueError(f"its format is {content['format']}, and this version knows {_FORMAT} only")
-    differing: list[str] = []
-    known = {key: value for key, value in content.items() if key != "format"}
-    entries = _entries_of(Manifest, "the manifest", known, differing)
-    entries["parts"] = {name: _part(name, record, differing) for name, record in entries["parts"].items()}
-    runs = [_entries_of(Session, "the record of a run", record, differing) for record in entries["sessions"]]
-    entries["sessions"] = [Session(**run) for run in runs]
-    if entries.get("merge") is not None:
-        merge = _entries_of(Merge, "the record of a merge", entries["merge"], differing)
-        entries["merge"] = Merge(**{**merge, "part": _part(merge["name"], merge["part"], differing)})
-    return Manifest(**entries, differing=differing)
+    entries = _entries_of(Manifest, "the manifest", content)
+    entries["parts"] = {name: _part(name, record) for name, record in entries["parts"].items()}
+    entries["sessions"] = [Session(**_entries_of(Session, "the record of a run", one)) for one in entries["sessions"]]
+    if entries["merge"] is not None:
+        merge = _entries_of(Merge, "the record of a merge", entries["merge"])
+        entries["merge"] = Merge(**{**merge, "part": _part(merge["name"], merge["part"])})
+    return Manifest(**entries)
 
 
-def _part(name: str, record: Any, differing: list[str]) -> Part:
-    """Rebuild the record of a part; the first tables kept the size of a file, which could still grow, apart."""
-    if isinstance(record, dict) and isinstance(record.get("now"), dict):
-        record = {**record, **record["now"]}
-    return Part(**_entries_of(Part, f"the record of {shorten(name)}", record, differing))
+def _part(name: str, record: Any) -> Part:
+    return Part(**_entries_of(Part, f"the record of {shorten(name)}", record))
 
 
-def _entries_of(record: type, what: str, content: Any, differing: list[str]) -> dict[str, Any]:
-    """Return the known entries of a record, if all that its dataclass needs are there, with values of the right type.
+def _entries_of(record: type, what: str, content: Any) -> dict[str, Any]:
+    """Return the entries of a record, if they are those of its dataclass, with values of the right type.
 
-    `what` describes the record, for the message. Nested records are not checked. What another version wrote otherwise
-    is added to the lines `differing`: entries that are unknown, or missing though they have a default.
+    `what` describes the record, for the message. Nested records are not checked.
 
     Raises
     ------
     ValueError
-        An entry without a default is missing, or one is of another type; the text says which.
+        An entry is missing, unknown or of another type; the text says which.
     """
     if not isinstance(content, dict):
         raise ValueError(f"{what} has no named entries")
     types = get_type_hints(record)
-    expected = {entry.name for entry in fields(record) if entry.compare}
-    needed = {entry.name for entry in fields(record) if entry.default is MISSING} & expected
-    wrong = [f"{name} is missing" for name in sorted(needed - content.keys())]
+    expected = {entry.name for entry in fields(record)}
+    wrong = [f"{name} is missing" for name in sorted(expected - content.keys())]
+    wrong += [f"{shorten(name)} is unknown" for name in sorted(content.keys() - expected)]
     wrong += [
         f"{name} is {content[name]!r:.60}"
         for name in sorted(expected & content.keys())
@@ -396,9 +341,7 @@ def _entries_of(record: type, what: str, content: Any, differing: list[str]) -> 
     ]
     if wrong:
         raise ValueError(f"{what}: {', '.join(wrong)}")
-    differing += [f"{what}: {name} is unknown" for name in sorted(content.keys() - expected)]
-    differing += [f"{what}: {name} is missing" for name in sorted(expected - needed - content.keys())]
-    return {name: value for name, value in content.items() if name in expected}
+    return content
 
 
 def _is_deep(content: Any) -> bool:
@@ -425,13 +368,6 @@ def _check_kinds(path: Location, what: str, content: Any, kinds: Any) -> None:
     _check_kinds(path, what, content, dict)
     for name in kinds.keys() & content.keys():
         _check_kinds(path, f"{what}.{name}", content[name], kinds[name])
-
-
-def _version_of(content: Any) -> str | None:
-    """Return the version of boulder-sweep that wrote the records of a manifest; None if it is not recorded."""
-    for key in ("identity", "versions", "boulder-sweep"):
-        content = content.get(key) if isinstance(content, dict) else None
-    return content if isinstance(content, str) else None
 
 
 def _fits(value: Any, type_: Any) -> bool:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
 
 from boulder_sweep.locations import Location
 from boulder_sweep.store import failures
 from boulder_sweep.store.files import MANIFEST_NAME, is_kept, is_ours, is_part_name
-from boulder_sweep.store.manifest import Manifest, check_resumable, load, save
+from boulder_sweep.store.manifest import Manifest, load, save
 from boulder_sweep.store.provenance import PREFIX, Session, differences
 from boulder_sweep.store.storage import Lock, Storage, storage_of
 from boulder_sweep.store.verify import damaged_parts
@@ -70,11 +71,7 @@ class ClaimedFolder:
     def _resumed(self, manifest: Manifest, there: Manifest) -> OutputFolder:
         """Resume the run in the folder, if it is the same."""
         storage = self._storage
-        different = differences(there.identity, manifest.identity)
-        if there.rows != manifest.rows:
-            different.append(f"rows: {there.rows:,} -> {manifest.rows:,}")
-        if different:
-            raise failures.SettingsDifferError(storage.path, different)
+        refuse_other_settings(there, manifest.identity, manifest.rows, storage.path)
         there.identity = manifest.identity  # the heading of reports may be another
         recover_merge(there, storage)
         # Where the storage checks content itself, reading all of it again may take hours.
@@ -121,6 +118,21 @@ def claim_output(out: Location, *, resume: bool = False, overwrite: bool = False
         raise
 
 
+def refuse_other_settings(there: Manifest, identity: Mapping[str, Any], rows: int, out: Location) -> None:
+    """Refuse to go on in a folder whose rows are of other settings, kernels or versions.
+
+    Raises
+    ------
+    SettingsDifferError
+        Says what differs.
+    """
+    different = differences(there.identity, identity)
+    if there.rows != rows:
+        different.append(f"rows: {there.rows:,} -> {rows:,}")
+    if different:
+        raise failures.SettingsDifferError(out, different)
+
+
 def _locked(storage: Storage) -> Lock:
     """Lock the folder; an error names who else may hold it."""
     holder, host = "another run", None
@@ -153,8 +165,6 @@ def _allowed(storage: Storage, names: list[str], resume: bool, overwrite: bool) 
         foreign += [name for name in unknown if not _is_written_by_us(out / name)]
         if foreign:
             raise failures.ForeignFilesError(out, foreign)
-    if there is not None and not overwrite:
-        check_resumable(there, out)
     if there is not None and not (resume or overwrite):
         raise failures.OutputExistsError(out, there.rows_done, there.rows)
     return there

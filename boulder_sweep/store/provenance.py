@@ -29,6 +29,8 @@ from boulder_sweep.settings.sweep import SECTION
 
 PREFIX = "boulder_sweep."
 """Prefix of this package's entries in the metadata of a file."""
+FORMAT = 2
+"""Of tables and of files of answers: grows by one whenever a column or an entry comes, goes or means something else."""
 _PACKAGES = ("boulder-sweep", "numpy", "numba", "llvmlite", "pyarrow")
 _PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
 _DECIDING_SOURCES = (
@@ -43,6 +45,7 @@ _DECIDING_SOURCES = (
 )
 """Modules, in addition to the kernels, whose code determines the rows: of settings and stones what others import."""
 IDENTITY_KINDS = {
+    "format": int,
     "settings": {"name": str, "inputs": dict, "model": dict, "criterion": dict, "solver": dict, "labels": dict},
     "readings": dict,
     "control": dict,
@@ -108,10 +111,11 @@ def identity(
     Returns
     -------
     dict
-        Plain data with the keys ``settings``, ``readings``, ``control``, ``accuracy``, ``versions``,
+        Plain data with the keys ``format``, ``settings``, ``readings``, ``control``, ``accuracy``, ``versions``,
         ``settings_sha256``, ``kernels_sha256``, ``rules_sha256``.
     """
     content = {
+        "format": FORMAT,
         "settings": settings,
         "readings": readings,
         "control": control,
@@ -139,8 +143,29 @@ def identity_in(metadata: Mapping[bytes, bytes] | None) -> dict[str, Any]:
     """Return the identity in the metadata of a file, and what else `file_metadata` wrote; empty of another file."""
     texts = {key.decode(errors="replace"): value for key, value in (metadata or {}).items()}
     entries = {key.removeprefix(PREFIX): value for key, value in texts.items() if key.startswith(PREFIX)}
-    parsed = ("settings", "readings", "control", "accuracy", "versions")
+    parsed = ("format", "settings", "readings", "control", "accuracy", "versions")
     return {key: json.loads(value) if key in parsed else value.decode() for key, value in entries.items()}
+
+
+def other_version(there: Any) -> str:
+    """Say which version wrote a result that this one does not read, and what to do; empty of a result that it reads.
+
+    Parameters
+    ----------
+    there
+        The identity of the result, see `identity`; anything at all of a stranger's.
+    """
+    there = there if isinstance(there, Mapping) else {}
+    if there.get("format") == FORMAT:
+        return ""
+    recorded = there.get("versions")
+    writer = recorded.get("boulder-sweep") if isinstance(recorded, Mapping) else None
+    known = isinstance(writer, str) and writer != "unknown"
+    by = f"boulder-sweep {shorten(str(writer))}" if known else "an unknown version of boulder-sweep"
+    return (
+        f"was written by {by} in another format than this version, {versions()['boulder-sweep']}, reads: run it again"
+        f"{', or use the version that wrote it' if known else ''}"
+    )
 
 
 def check_identity(there: Mapping[str, Any]) -> None:

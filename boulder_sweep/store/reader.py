@@ -14,11 +14,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from boulder_sweep.columns import COLUMNS, OUTCOMES, column_spec
+from boulder_sweep.columns import OUTCOMES, column_spec
 from boulder_sweep.errors import OlderRulesWarning
 from boulder_sweep.locations import Location, RemotePath, location_of
 from boulder_sweep.parquet import ParquetError, ParquetLimitError, TableFile
-from boulder_sweep.settings.problems import shorten
 from boulder_sweep.store.failures import DamagedError, ImpossibleRecordsError, StoreError, refuse_to_guess
 from boulder_sweep.store.files import MANIFEST_NAME
 from boulder_sweep.store.manifest import Manifest, Part, load
@@ -55,12 +54,12 @@ def read(out: str | Path | RemotePath, columns: Sequence[str] | None = None, *, 
     pandas.DataFrame
         Rows in the order of the designs. ``.attrs`` contains ``units`` and ``meanings`` by column name,
         ``rows`` (of the whole table), ``complete`` (whether all of them are finished) and ``judged_by`` (by whose
-        rules, if not by those of this version; else empty). Columns that a table of an earlier version lacks are null.
+        rules, if not by those of this version; else empty).
 
     Warns
     -----
     OlderRulesWarning
-        Another version wrote the table; the text says what differs.
+        The rows were judged by other rules.
 
     Raises
     ------
@@ -69,7 +68,7 @@ def read(out: str | Path | RemotePath, columns: Sequence[str] | None = None, *, 
     DamagedError
         A part is missing, truncated or changed.
     OtherVersionError
-        The result was written by a version whose results this one cannot read.
+        The result was written by another version.
     LocationError
         The folder is a URL that cannot be read.
     ValueError
@@ -119,7 +118,7 @@ def read_row(folder: Location, design_id: int) -> pa.Table:
         raise IndexError(f"{folder} has {held}, numbered from 0; there is no {design_id}")
     row = finished.row(design_id)
     if row is None:
-        raise IndexError(f"design {design_id} has not been computed yet; `sweep status {folder}` shows how to resume")
+        raise IndexError(f"design {design_id} has not been computed yet; `sweep run` with --resume goes on")
     return row
 
 
@@ -127,7 +126,7 @@ def _read(folder: Location, columns: Sequence[str] | None, verify: bool) -> tupl
     """Return the finished parts, in the order of the designs, and what is known of them."""
     import pyarrow as pa  # heavy, and only readers need it
 
-    from boulder_sweep.store.schema import table_schema, with_columns
+    from boulder_sweep.store.schema import table_schema
 
     finished = FinishedRows(folder)
     known = finished.columns
@@ -135,7 +134,8 @@ def _read(folder: Location, columns: Sequence[str] | None, verify: bool) -> tupl
         raise ValueError(f"{folder} has no column {unknown[0]!r}; its columns are {', '.join(known)}")
     parts = list(finished.tables(columns, verify=verify))
     if not parts:
-        parts = [with_columns(table_schema().empty_table(), known if columns is None else columns)]
+        more = [name for name in known if name not in table_schema().names]
+        parts = [table_schema(more=more).empty_table().select(list(known if columns is None else columns))]
     return pa.concat_tables(parts), finished
 
 
@@ -154,9 +154,7 @@ class FinishedRows:
     rows_done : int
         Rows that are finished.
     columns : tuple of str
-        Names of the columns: all of today, and what else the table has.
-    lacking : frozenset of str
-        Those of them that it does not store, being of another version: they are null.
+        Names of the columns.
     identity : dict
         What all rows have in common, see `provenance`.
     judged_by : str
@@ -165,14 +163,14 @@ class FinishedRows:
     Warns
     -----
     OlderRulesWarning
-        Another version wrote the table.
+        The rows were judged by other rules.
 
     Raises
     ------
     NotASweepError
         There is no result in the folder.
     DamagedError, OtherVersionError
-        Its manifest cannot be trusted, or not be read by this version.
+        Its manifest cannot be trusted, or another version wrote it.
     """
 
     def __init__(self, folder: Location):
@@ -182,24 +180,14 @@ class FinishedRows:
         except ValueError as problem:
             raise ImpossibleRecordsError(folder / MANIFEST_NAME, str(problem)) from None
         self.rows, self.rows_done, self.identity = manifest.rows, manifest.rows_done, manifest.identity
-        today = (*(spec.name for spec in COLUMNS), *manifest.more_columns)
-        self.columns = tuple(dict.fromkeys((*today, *manifest.columns)))
-        self.lacking = frozenset(self.columns) - frozenset(manifest.columns)
+        self.columns = manifest.columns
         self.judged_by = judged_by(manifest.identity)
-        self._stored = manifest.columns
-        if said := [*([f"was {self.judged_by}"] if self.judged_by else []), *self._other_columns(today)]:
-            warnings.warn(f"{folder} {'; it '.join(said)}", OlderRulesWarning, stacklevel=2)
+        if self.judged_by:
+            warnings.warn(f"{folder} was {self.judged_by}", OlderRulesWarning, stacklevel=2)
         self._folder = folder
         self._schemas: dict[str, pa.Schema] = {}
         self._index = _Index(manifest)
         self._ranges = manifest.ranges
-
-    def _other_columns(self, today: Sequence[str]) -> Iterator[str]:
-        """Say which columns the table has more or less than one of this version."""
-        if self.lacking:
-            yield f"has no {', '.join(name for name in self.columns if name in self.lacking)} (null here)"
-        if more := [name for name in self.columns if name not in today]:
-            yield f"has more columns, kept as they are: {shorten(', '.join(more), 200)}"
 
     def tables(self, columns: Sequence[str] | None = None, *, verify: bool = True) -> Iterator[pa.Table]:
         """Yield all rows in the order of the designs, about a part at a time.
@@ -283,8 +271,6 @@ class FinishedRows:
         """Read a part from its open file."""
         import pyarrow as pa  # heavy, and only readers need it
 
-        from boulder_sweep.store.schema import with_columns
-
         source: Any = file
         try:
             if verify:
@@ -293,7 +279,7 @@ class FinishedRows:
                     raise self._damaged({name: wrong})
                 source = pa.BufferReader(content)
             opened = TableFile(source, _MOST_PART_ROWS, _MOST_PART_BYTES)
-            if set(opened.schema.names) != set(self._stored):
+            if set(opened.schema.names) != set(self.columns):
                 raise self._damaged({name: "its columns are not those of the manifest"})
             schema = self._schemas.setdefault("of all parts", opened.schema)  # one step, as of threads
             if opened.rows != part.rows or not opened.schema.equals(schema):
@@ -303,17 +289,15 @@ class FinishedRows:
             raise ImpossibleRecordsError(self._folder / name, str(problem)) from problem
         except (OSError, ParquetError) as problem:
             raise self._damaged({name: str(problem)}) from problem
-        if not self.lacking and columns is None:
-            return table
-        return with_columns(table, self.columns if columns is None else columns)
+        return table if columns is None else table.select(columns)
 
     def _damaged(self, damaged: dict[str, str]) -> DamagedError:
         """Return the error that says what is damaged and what to do."""
         first, what = next(iter(damaged.items()))
         more = f" and {len(damaged) - 1} more parts" if len(damaged) > 1 else ""
         return DamagedError(
-            f"{self._folder} is damaged ({first}: {what}{more}). `sweep status {self._folder} --verify` lists the "
-            f"damaged parts, and running again with --resume recomputes them"
+            f"{self._folder} is damaged ({first}: {what}{more}). `sweep run` of its settings file with --resume "
+            f"recomputes damaged parts, and with --resume --dry-run lists them"
         )
 
 

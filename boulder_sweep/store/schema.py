@@ -85,19 +85,6 @@ def part_table(block: DesignBlock, judged: Judged, metadata: Mapping[bytes, byte
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=_complete(metadata, specs)))
 
 
-def with_columns(table: pa.Table, names: Sequence[str]) -> pa.Table:
-    """Return the named columns of a table in this order; one that it lacks is null."""
-    arrays = [
-        table.column(name) if name in table.column_names else pa.nulls(len(table), _TYPES[column_spec(name).type])
-        for name in names
-    ]
-    fields = [
-        table.schema.field(name) if name in table.column_names else _field(column_spec(name), array.type)
-        for name, array in zip(names, arrays, strict=True)
-    ]
-    return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=table.schema.metadata))
-
-
 def encode(table: pa.Table) -> memoryview:
     """Return the bytes of a Parquet file with the whole table in one row group."""
     split = [field.name for field in table.schema if field.name != DESIGN_ID.name and pa.types.is_floating(field.type)]

@@ -32,8 +32,7 @@ _RASTER = 500
 
 Pieces = Callable[[Sequence[str]], Iterable["pd.DataFrame"]]
 """Yields the named columns of a table, `RATIO` among them, piece by piece; further columns may come along, and those
-of `boulder_sweep.columns.OPTIONAL_COLUMNS`, `VALIDITY` and `ROBUSTNESS` are left out where the table does not have
-them."""
+of `boulder_sweep.columns.OPTIONAL_COLUMNS` are left out where the table does not have them."""
 
 
 def pieces_of(table: pd.DataFrame | Pieces) -> Pieces:
@@ -74,8 +73,7 @@ def finished_pieces(finished: FinishedRows) -> Pieces:
 
     def pieces(columns: Sequence[str]) -> Iterator[pd.DataFrame]:
         nonlocal verified
-        held = set(finished.columns) - finished.lacking
-        there = [name for name in columns if name in held or name not in (*OPTIONAL_COLUMNS, VALIDITY, ROBUSTNESS)]
+        there = [name for name in columns if name in finished.columns or name not in OPTIONAL_COLUMNS]
         stored = list(
             dict.fromkeys(column for name in there for column in ((DEPTH, HEIGHT) if name == RATIO else (name,)))
         )

@@ -166,7 +166,7 @@ def _panel(axes: Axes, rows: pd.DataFrame, shown: Slice, units: str) -> set[int]
                 drawn.set_edgecolor("white")
                 drawn.set_linewidth(0.0)
     else:
-        known = codes >= 0  # of another version's words, as in the mask above
+        known = codes >= 0  # of other rules' words, as in the mask above
         axes.scatter(x[known], y[known], c=codes[known], cmap=colours, norm=norm, s=9, linewidths=0)
     return {int(code) for code in np.unique(codes) if code >= 0}
 

@@ -162,7 +162,7 @@ COMMANDS = [
     *(("list", *words) for words in LISTS.values()),
     *(("answers", *(word.format("bomb.parquet") for word in words)) for words in RESULTS.values()),
     *(("result", *(word.format("stones.sweep") for word in words)) for words in RESULTS.values()),
-    ("result", "explain", "stones.sweep", "0"),
+    ("result", "simulate", "stones.sweep"),
 ]
 OFTEN = [("list", "check"), ("answers", "export"), ("result", "report")]
 """One command of each way to read; the others wait for the night."""

@@ -35,10 +35,3 @@ def test_an_object_in_us_units_is_refused(sweep, grid):
     code, out, err = sweep("capacity", grid, "--json", "--units", "us")
     assert (code, out) == (2, "")
     assert "leave out --units us or --json" in err
-
-
-def test_its_name_before_is_understood_and_not_listed(sweep):
-    assert sweep("which", CONFIG, "-q") == sweep("capacity", CONFIG, "-q")
-    listed = [line.split()[0] for line in sweep("--help")[1].splitlines() if line.startswith("  ")]
-    assert "capacity" in listed
-    assert "which" not in listed

@@ -7,9 +7,9 @@ import shlex
 import pytest
 from distributed import LocalCluster
 
-from boulder_sweep.store import status
 from boulder_sweep.store.reader import finished_table
 from tests.runner.grids import same_bits
+from tests.store.states import status
 
 
 @pytest.fixture(scope="module")

@@ -51,8 +51,8 @@ def test_from_the_file_to_every_place_that_shows_it(sweep, hostile):
     for words in (
         ["check", f"{folder}/grid.yaml"],
         ["run", f"{folder}/grid.yaml", "-o", f"{folder}/out.sweep"],
-        ["status", f"{folder}/out.sweep", "--verify"],
-        ["explain", f"{folder}/out.sweep", "0"],
+        ["run", f"{folder}/grid.yaml", "-o", f"{folder}/out.sweep", "--resume", "--dry-run"],
+        ["simulate", f"{folder}/out.sweep", "--all"],
         ["capacity", f"{folder}/grid.yaml"],
         ["need", f"{folder}/grid.yaml"],
         ["plot", f"{folder}/out.sweep", "-o", f"{folder}/map.svg"],

@@ -71,9 +71,8 @@ def test_hostile_names_of_files_and_options(sweep, grid, text):
         ("run", grid, "--set", f"{text}=1"),
         ("run", grid, "--set", f"vehicle.speed={text}"),
         ("run", grid, "-o", f"no/{text}"),
-        ("status", f"out{text}"),
         ("plot", f"out{text}"),
-        ("explain", f"out{text}", "0"),
+        ("simulate", f"out{text}.sweep"),
         (text,),
     ):
         code, out, err = sweep(*words)
@@ -98,8 +97,7 @@ def test_a_folder_and_a_file_whose_names_are_no_unicode(sweep, possible_grid):
     code, shown, err = sweep("run", file, "-o", out, "--resume")
     assert (code, err) == (0, "small grid: 18 designs into out\\udcff\n")
     assert "out\\udcff" in shown
-    assert sweep("status", out, "--verify")[0] == 0
-    assert sweep("explain", out, "3")[0] == 0
+    assert sweep("simulate", out, "--design", "3")[0] == 0
 
 
 def test_a_folder_with_a_hostile_name_is_shown_escaped(sweep, possible_grid):
@@ -109,9 +107,9 @@ def test_a_folder_with_a_hostile_name_is_shown_escaped(sweep, possible_grid):
     assert Path(name).is_dir()
     assert "out\\x1b[31m\\nnext" in out
     assert ALLOWED.fullmatch((out + err).replace("\n", ""))
-    code, out, _ = sweep("status", name)
+    code, out, _ = sweep("run", possible_grid, "-o", name, "--resume", "--dry-run")
     assert code == 0
-    assert out.startswith("out\\x1b[31m\\nnext: finished")
+    assert "would simulate 0 of 18 designs into out\\x1b[31m\\nnext" in out
 
 
 @pytest.mark.parametrize("text", HOSTILE)
@@ -126,16 +124,16 @@ def test_what_a_stranger_has_written_into_a_manifest_is_shown_escaped(sweep, pos
 
     rewrite_records(Path("out"), change)
     for words in (
-        ("status", "out"),
+        ("simulate", "out"),
         ("run", possible_grid, "-o", "out", "--resume"),
         ("run", possible_grid, "-o", "out"),
     ):
         code, out, err = sweep(*words)
-        assert code in (0, 4)
+        assert code in (2, 4)
         assert ALLOWED.fullmatch((out + err).replace("\n", ""))
     rewrite_records(Path("out"), lambda records: records["parts"].update({text: 1}))
-    code, out, err = sweep("status", "out")
-    assert (code, out) == (4, "")
+    code, out, err = sweep("plot", "out")
+    assert (code, out) == (2, "")
     assert ALLOWED.fullmatch(err.replace("\n", ""))
 
 
@@ -189,9 +187,9 @@ SHOWING = (
     ("uncertainty", "grid.yaml", "-q", *("--set", "soil.friction_angle={mean: 40 deg, cov: 5 %}")),
     ("capacity", "grid.yaml", "-q"),
     ("simulate", "grid.yaml", "-q"),
-    ("status", "out.sweep", "--verify"),
+    ("run", "grid.yaml", "-o", "out.sweep", "--resume", "--dry-run"),
     ("compare", "out.sweep", "out.sweep"),
-    ("explain", "out.sweep", "1"),
+    ("simulate", "out.sweep", "--design", "1", "--all", "-q"),
     ("export", "out.sweep", "-o", "rows.csv"),
     ("fit-vehicle", "pulse.csv", "--mass", "6800 kg"),
     ("--help",),

@@ -18,7 +18,7 @@ OUTPUTS = [
     for option in command.params
     if isinstance(option, click.Option) and {f"--{name}" for name in NAMES} & set(option.opts)
 ]
-REST = {"explain": ("0",), "compare": ("x",), "fit-vehicle": ("--mass", "6800 kg")}
+REST = {"compare": ("x",), "fit-vehicle": ("--mass", "6800 kg")}
 
 
 @pytest.mark.parametrize(("command", "option"), OUTPUTS)
@@ -41,7 +41,7 @@ def test_an_empty_name_of_a_new_file_is_refused(sweep):
 @pytest.fixture
 def nothing_computed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for place in ("simulation.simulate", "explanation.explain"):
+    for place in ("simulation.simulate", "recomputing.recompute"):
         monkeypatch.setattr(f"boulder_sweep.impact.{place}", lambda *_, **__: pytest.fail("computed"))
 
 
@@ -63,8 +63,8 @@ def test_outputs_are_checked_before_simulating(sweep, nothing_computed, words, m
     assert not list(Path.cwd().iterdir())
 
 
-def test_outputs_are_checked_before_explaining(sweep, nothing_computed):
+def test_outputs_are_checked_before_a_row_is_computed_again(sweep, nothing_computed):
     for words in (("--plot", "x.bmp"), ("--trajectory", "t.csv")):
-        code, out, err = sweep("explain", "out.sweep", "0", *words)
+        code, out, err = sweep("simulate", "out.sweep", *words)
         assert (code, out) == (2, "")
         assert "must end in" in err

@@ -127,7 +127,8 @@ def test_one_design_is_no_plural(sweep, possible_grid):
     assert sweep("export", "small-grid.sweep", "-o", "one.csv") == (0, "one.csv: 1 row\n", "")
     code, _, err = sweep("report", "small-grid.sweep", "--design", 1)
     assert (code, err) == (2, "error: small-grid.sweep has 1 design, numbered from 0; there is no 1\n")
-    assert ": finished, 1 of 1 design (100.0%), " in sweep("status", "small-grid.sweep")[1]
+    resumed = sweep("run", possible_grid, "-q", "--resume", "--dry-run")[1]
+    assert "would simulate 0 of 1 design into small-grid.sweep" in resumed
 
 
 def test_a_result_is_exported_and_compared(sweep, possible_grid):

@@ -143,6 +143,27 @@ def test_a_dry_run_writes_nothing(sweep, grid):
     assert found["estimate"]["rows"] == 18
 
 
+def test_a_dry_run_says_what_resuming_would_compute(sweep, possible_grid):
+    resume = ("run", possible_grid, "-q", "--resume", "--dry-run")
+    assert sweep("run", possible_grid, "-q")[0] == 0
+    assert "\nwould simulate 0 of 18 designs into small-grid.sweep\n" in sweep(*resume)[1]
+    (part,) = Path("small-grid.sweep").glob("rows-*")
+    data = bytearray(part.read_bytes())
+    data[len(data) // 2] ^= 1
+    part.write_bytes(data)
+    code, out, _ = sweep(*resume)
+    assert code == 0
+    assert "\nwould simulate 18 of 18 designs into small-grid.sweep\n" in out
+    assert f"\ndamaged: {part.name}: changed: its checksum differs\n" in out
+    assert json.loads(sweep(*resume, "--json")[1])["estimate"]["damaged"] == {
+        part.name: "changed: its checksum differs"
+    }
+    code, out, err = sweep(*resume, "--set", "vehicle.speed=31 mph")
+    assert (code, out) == (4, "")
+    assert "was started with other settings" in err
+    assert part.read_bytes() == data
+
+
 def test_a_dry_run_of_a_grid_of_ten_to_the_twelve(sweep, grid):
     words = [f"--set={key}={{from: 1, to: 2, count: 1000000}}" for key in ("boulder.length", "boulder.width")]
     code, out, _ = sweep("run", grid, "--dry-run", "--json", *words)

@@ -18,13 +18,13 @@ def out(sweep, possible_grid):
     return url
 
 
-def test_status_plot_report_explain_and_export_take_the_url_of_a_result(sweep, out, tmp_path):
-    code, told, _ = sweep("status", out, "--verify", "--json")
+def test_commands_take_the_url_of_a_result(sweep, possible_grid, out, tmp_path):
+    code, told, _ = sweep("run", possible_grid, "-q", "-o", out, "--resume", "--dry-run", "--json")
     found = json.loads(told)
-    assert (code, found["out"], found["complete"], found["damaged"]) == (0, out, True, {})
+    assert (code, found["out"], found["estimate"]["rows_to_compute"], found["estimate"]["damaged"]) == (0, out, 0, {})
     assert sweep("plot", out)[0] == 0
     assert sweep("report", out)[0] == 0
-    assert sweep("explain", out, "3")[0] == 0
+    assert sweep("simulate", out, "--design", "3")[0] == 0
     assert sweep("export", out, "-o", "table.csv")[0] == 0
     assert {path.name for path in tmp_path.iterdir()} >= {"possible.png", "possible.html", "table.csv"}
 

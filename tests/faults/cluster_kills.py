@@ -16,11 +16,11 @@ from pathlib import Path
 from boulder_sweep.errors import ClusterLostError
 from boulder_sweep.runner import cluster as backend
 from boulder_sweep.runner.sweeper import Progress, run
-from boulder_sweep.store import status
 from boulder_sweep.store.reader import finished_table
 from tests.faults.clusters import Cluster
 from tests.faults.faulty import slowly
 from tests.runner.grids import grid_of, same_bits
+from tests.store.states import status
 from tests.waiting import HANG_GUARD_S
 
 ROWS, ROWS_PER_PART = 40_000, 6_000

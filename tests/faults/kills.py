@@ -28,10 +28,10 @@ import pyarrow as pa
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.runner.sweeper import run
-from boulder_sweep.store import status
 from boulder_sweep.store.manifest import load
 from boulder_sweep.store.reader import finished_table
 from tests.runner.grids import grid_of, same_bits
+from tests.store.states import status
 from tests.waiting import HANG_GUARD_S
 
 ROWS, ROWS_PER_PART = 20_000, 4_000

@@ -8,11 +8,11 @@ import pytest
 from boulder_sweep.errors import ComputationError
 from boulder_sweep.runner import workers
 from boulder_sweep.runner.sweeper import run
-from boulder_sweep.store import status
 from boulder_sweep.store.reader import finished_table
 from tests.faults import faulty
 from tests.faults.processes import run_driver
 from tests.runner.grids import grid_of, plausible, same_bits
+from tests.store.states import status
 
 pytestmark = pytest.mark.faults
 

@@ -21,7 +21,6 @@ from boulder_sweep.runner import cluster as backend
 from boulder_sweep.runner import dispatch, remote
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.runner.workers import Computation
-from boulder_sweep.store import status
 from boulder_sweep.store.files import LOCK_NAME
 from boulder_sweep.store.reader import finished_table
 from boulder_sweep.store.writer import EncodedPart
@@ -30,6 +29,7 @@ from tests.faults.clusters import Cluster
 from tests.faults.faulty import Bar, held, slowly
 from tests.faults.processes import ROOT
 from tests.runner.grids import grid_of, plausible, same_bits
+from tests.store.states import status
 from tests.waiting import HANG_GUARD_S, wait_until
 
 pytestmark = pytest.mark.faults

@@ -13,11 +13,12 @@ import pytest
 
 from boulder_sweep.runner import estimate as limits
 from boulder_sweep.runner.sweeper import run
-from boulder_sweep.store import files, status
+from boulder_sweep.store import files
 from boulder_sweep.store.failures import DoesNotFitError, StoreError, WriteError
 from boulder_sweep.store.reader import finished_table
 from tests.faults.processes import ROOT
 from tests.runner.grids import grid, grid_of, plausible, same_bits
+from tests.store.states import status
 
 pytestmark = pytest.mark.faults
 

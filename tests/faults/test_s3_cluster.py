@@ -9,13 +9,13 @@ from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.runner import cluster as backend
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.settings import load
-from boulder_sweep.store import status
 from boulder_sweep.store.files import is_part_name
 from boulder_sweep.store.reader import finished_table
 from tests.faults.clusters import Cluster
 from tests.faults.processes import ROOT
 from tests.faults.s3_server import BUCKET, SECRET, S3Server
 from tests.runner.grids import same_bits
+from tests.store.states import status
 from tests.waiting import HANG_GUARD_S
 
 pytestmark = [pytest.mark.faults, pytest.mark.nightly]

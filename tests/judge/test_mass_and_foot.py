@@ -9,7 +9,7 @@ import boulder_sweep
 from boulder_sweep.answers.need import need
 from boulder_sweep.designs import block_of
 from boulder_sweep.errors import QuestionError
-from boulder_sweep.impact.explanation import explain
+from boulder_sweep.impact.recomputing import recompute
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
@@ -129,4 +129,4 @@ def test_a_list_of_designs_is_refused_row_by_row():
 def test_explaining_a_row_gives_its_bits(tmp_path):
     boulder_sweep.run(sweep_of("mass: [18 t, 24 t]"), tmp_path / "mass.sweep", jobs=1)
     for number in range(2):
-        assert not explain(tmp_path / "mass.sweep", number).unequal
+        assert not recompute(tmp_path / "mass.sweep", number).unequal

@@ -13,7 +13,7 @@ from scipy import stats
 import boulder_sweep
 from boulder_sweep import at_values, load
 from boulder_sweep.errors import QuestionError
-from boulder_sweep.impact.explanation import explain
+from boulder_sweep.impact.recomputing import recompute
 from boulder_sweep.judge.quantiles import words_of
 from boulder_sweep.store.failures import StoreError
 
@@ -235,4 +235,4 @@ def test_a_row_of_a_table_is_judged_again_in_all_its_cases(site: str, tmp_path: 
     text = WIDE.replace("{embedment_depth: 0.84 m}", site)
     assert len({row["verdict"] for row in rows(text, tmp_path)}) >= 2
     for number in range(load(tmp_path / "site.yaml").n_designs):
-        assert explain(tmp_path / "table", number).unequal == ()
+        assert recompute(tmp_path / "table", number).unequal == ()

@@ -11,7 +11,7 @@ import pytest
 import boulder_sweep
 from boulder_kernels import Control, corrected, simulate_table
 from boulder_sweep.errors import QuestionError
-from boulder_sweep.impact.explanation import explain
+from boulder_sweep.impact.recomputing import recompute
 from boulder_sweep.judge.accuracy import OUTLINES_IN_LANES, accuracy_of, control_of
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.model import Ground
@@ -81,7 +81,7 @@ def test_a_row_is_what_one_impact_gives(tmp_path, entry, more):
     assert row.solidity == pytest.approx(sweep.model.shape.filled)
     assert row.max_rotation_deg == pytest.approx(one["max_rotation_deg"], abs=row.rotation_error_deg + 1e-9)
     assert row.robustness == "open"
-    assert explain(tmp_path / "table", 0).unequal == ()
+    assert recompute(tmp_path / "table", 0).unequal == ()
 
 
 def test_a_wider_foot_holds_better_than_a_wider_top(tmp_path):

@@ -167,25 +167,21 @@ def test_a_file_with_rows_removed_or_moved_is_refused(
     assert not list(tmp_path.glob("*.html"))
 
 
-def test_settings_of_another_version_are_said(chances: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("entry", ["calibrated_crush_m", "preset"])
+def test_settings_that_lack_an_entry_are_refused(chances: Path, tmp_path: Path, entry: str) -> None:
     table = pq.read_table(chances)
     metadata = dict(table.schema.metadata)
     settings = json.loads(metadata[b"boulder_sweep.settings"])
-    del settings["model"]["calibrated_crush_m"]
+    del settings["model"][entry]
     metadata[b"boulder_sweep.settings"] = json.dumps(settings).encode()
     metadata[b"boulder_sweep.settings_sha256"] = sha256_of(settings).encode()
-    pq.write_table(table.replace_schema_metadata(metadata), tmp_path / "old.parquet")
-    write_report(tmp_path / "old.parquet", tmp_path / "page.html")  # with the default of this version
-    del settings["model"]["preset"]
-    metadata[b"boulder_sweep.settings"] = json.dumps(settings).encode()
-    metadata[b"boulder_sweep.settings_sha256"] = sha256_of(settings).encode()
-    pq.write_table(table.replace_schema_metadata(metadata), tmp_path / "old.parquet")
-    with pytest.raises(ReportError, match=r"is damaged \(settings.model.preset is missing\); write it again"):
-        write_report(tmp_path / "old.parquet", tmp_path / "page.html")
+    pq.write_table(table.replace_schema_metadata(metadata), tmp_path / "other.parquet")
+    with pytest.raises(ReportError, match=rf"is damaged \(settings.model.{entry} is missing\); write it again"):
+        write_report(tmp_path / "other.parquet", tmp_path / "page.html")
 
 
 def test_chances_by_other_rules_say_so(chances: Path, tmp_path: Path, sweep: Command) -> None:
-    table = pq.read_table(chances).drop_columns(["time_to_limit_error_s"])  # as before this column existed
+    table = pq.read_table(chances)
     metadata = {**table.schema.metadata, b"boulder_sweep.rules_sha256": b"abcdef0123456789"}
     old = tmp_path / "old.parquet"
     pq.write_table(table.replace_schema_metadata(metadata), old)

@@ -10,9 +10,9 @@ import pytest
 
 from boulder_sweep.errors import BackendError
 from boulder_sweep.runner.sweeper import run
-from boulder_sweep.store import status
 from tests.conftest import Command
 from tests.runner.grids import grid_of, plausible
+from tests.store.states import status
 
 ONE_LINE = "the system cannot start 64 threads; give a smaller number of --jobs"
 CASE = Path(__file__).parents[2] / "configs" / "rwg.yaml"

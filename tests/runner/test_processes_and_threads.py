@@ -12,11 +12,11 @@ import pytest
 from boulder_sweep.errors import Interrupted
 from boulder_sweep.runner.interruption import Signals, noted_signals
 from boulder_sweep.runner.sweeper import run
-from boulder_sweep.store import status
 from boulder_sweep.store.failures import FolderInUseError
 from boulder_sweep.store.reader import finished_table
 from tests.faults.faulty import Bar, held, slowly
 from tests.runner.grids import grid_of, plausible, same_bits
+from tests.store.states import status
 from tests.waiting import HANG_GUARD_S
 
 

@@ -18,11 +18,12 @@ import pytest
 
 from boulder_sweep.columns import COLUMNS
 from boulder_sweep.runner.sweeper import run
-from boulder_sweep.store import read, status
+from boulder_sweep.store import read
 from boulder_sweep.store.failures import OutputExistsError, SettingsDifferError, StoreError
 from boulder_sweep.store.provenance import canonical, sha256_of
 from boulder_sweep.store.reader import finished_table
 from tests.runner.grids import grid, grid_of, partly_impossible, plausible, same_bits
+from tests.store.states import status
 
 ROOT = Path(__file__).parents[2]
 

@@ -5,15 +5,16 @@ from __future__ import annotations
 import pytest
 
 from boulder_sweep.errors import Interrupted
-from boulder_sweep.impact.explanation import explain
+from boulder_sweep.impact.recomputing import recompute
 from boulder_sweep.locations import location_of
 from boulder_sweep.runner import sweeper
-from boulder_sweep.store import read, status
+from boulder_sweep.store import read
 from boulder_sweep.store.failures import OutputExistsError
 from boulder_sweep.store.files import is_part_name
 from boulder_sweep.store.reader import finished_table
 from tests.runner.grids import grid, plausible, same_bits
 from tests.store.object_stores import store
+from tests.store.states import status
 
 OUT = "faulty://bucket/m30.sweep"
 HOW = {"rows_per_part": 100, "jobs": 2, "simulate": plausible}
@@ -64,6 +65,6 @@ def test_a_run_into_a_store_is_interrupted_and_resumed(local, monkeypatch):
 
 def test_a_row_in_a_store_is_explained():
     sweeper.run(grid(), OUT, rows_per_part=100, jobs=2)
-    found = explain(OUT, 7)
+    found = recompute(OUT, 7)
     assert found.unequal == ()
     assert found.changed == ()

@@ -5,7 +5,7 @@ import pytest
 
 import boulder_sweep
 from boulder_sweep.cli.main import execute
-from boulder_sweep.impact.explanation import explain
+from boulder_sweep.impact.recomputing import recompute
 from boulder_sweep.settings.fields import ALLOW_UNUSUAL, BY_PATH, EVERYTHING, FAR, HELD
 
 LIST = """\
@@ -143,7 +143,7 @@ def test_a_row_of_a_list_is_an_error_and_the_others_are_computed(trucks, capsys)
     assert table.reason.tolist() == ["overturns", "unusual", "overturns"]
     assert np.isnan(table.max_rotation_deg[1])
     assert boulder_sweep.load(trucks).block(1, 3).reasons[0] == "unusual"
-    again = explain("listed.sweep", 1)
+    again = recompute("listed.sweep", 1)
     assert not again.unequal
     (note,) = (one for one in boulder_sweep.load(trucks).notes if one.key == "vehicle.mass")
     assert "1 design not computed (error, unusual), the first is design 1" in note.message
@@ -154,7 +154,7 @@ def test_a_file_may_allow_the_rows_of_its_list(trucks, allowed):
     assert execute(["run", trucks, "-q", "--set", f"{ALLOW_UNUSUAL}={allowed}"]) == 0
     table = boulder_sweep.read("listed.sweep")
     assert "error" not in table.verdict.tolist()
-    assert not explain("listed.sweep", 1).unequal
+    assert not recompute("listed.sweep", 1).unequal
     assert boulder_sweep.load(trucks).resolved() != boulder_sweep.load(trucks, [f"{ALLOW_UNUSUAL}=all"]).resolved()
 
 

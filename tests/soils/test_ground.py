@@ -12,8 +12,8 @@ from boulder_kernels import DesignTable
 from boulder_kernels.ground import put_soil, slope_factor
 from boulder_kernels.layered import LayeredTable
 from boulder_sweep.cli.simulate import why_lines
-from boulder_sweep.impact.explanation import explain
 from boulder_sweep.impact.history import soil_profile
+from boulder_sweep.impact.recomputing import recompute
 from boulder_sweep.judge.accuracy import accuracy_of, simulated
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.inputs import Designs, sampled_designs
@@ -128,10 +128,10 @@ def test_settings_become_layers() -> None:
 
 
 def check_layers(folder: Path, name: str, *more: str) -> None:
-    """Run, simulate and explain a layered soil."""
+    """Run and simulate a layered soil, and compute the row again."""
     sweep = boulder_sweep.load("configs/rwg.yaml", (*IN_FILE, *more))
     boulder_sweep.run(sweep, folder / name)
-    found = explain(folder / name, 0)
+    found = recompute(folder / name, 0)
     assert found.unequal == ()
     assert any(line.startswith("  soil: 3 layers of soil, cohesion 4 / 2 / 0 kPa") for line in why_lines(found))
     history = boulder_sweep.simulate(sweep)
@@ -141,13 +141,13 @@ def check_layers(folder: Path, name: str, *more: str) -> None:
     assert profile.force_N.sum() == pytest.approx(history.soil_force_N[100], rel=2e-2)
 
 
-def test_run_simulate_and_explain_agree(tmp_path: Path) -> None:
+def test_a_run_and_its_row_computed_again_agree(tmp_path: Path) -> None:
     """To the last bit; and the energy of the truck is all accounted for."""
     check_layers(tmp_path, "layers")
 
 
 @pytest.mark.nightly  # compiles kernels of its own
-def test_run_simulate_and_explain_agree_by_elements(tmp_path: Path) -> None:
+def test_a_run_and_its_row_computed_again_agree_by_elements(tmp_path: Path) -> None:
     check_layers(tmp_path, "elements", "model.soil={elements: 60}")
     weaker = boulder_sweep.simulate(boulder_sweep.load("configs/rwg.yaml", IN_FILE)).summary()["max_rotation_deg"]
     assert weaker > boulder_sweep.simulate("configs/rwg.yaml").summary()["max_rotation_deg"]

@@ -75,7 +75,7 @@ def finished_folder(out: Path) -> Path:
 
 
 def rewrite_records(out: Path, change: Callable[[dict[str, Any]], object]) -> None:
-    """Write the manifest of a folder anew with other records, whole and with their checksum, as another version may."""
+    """Write the manifest of a folder anew with other records, whole and with their checksum."""
     path = out / MANIFEST_NAME
     schema = pq.read_schema(path)
     key = b"boulder_sweep.manifest"
@@ -91,36 +91,31 @@ def part_record(records: dict[str, Any]) -> dict[str, Any]:
     return next(iter(records["parts"].values()))
 
 
-OTHER_FORMS: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
-    "format": (lambda records: records.update(format=2), r"its format is 2, and this version knows 1"),
-    "no format": (lambda records: records.pop("format"), r"do not say their format"),
-    "part knows less": (lambda records: part_record(records).pop("verdicts"), r"parquet: verdicts is missing"),
-    "part by other words": (
-        lambda records: part_record(records).update(rows="all of them"),
-        r"parquet: rows is 'all of them'",
+OTHER_VERSIONS: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
+    "earlier": (
+        lambda identity: (identity.pop("format"), identity["versions"].update({"boulder-sweep": "0.2.0"})),
+        "was written by boulder-sweep 0.2.0 in another format than this version, {}, reads: run it again, or use the "
+        "version that wrote it",
     ),
-    "session without a host": (
-        lambda records: records["sessions"][0].pop("host"),
-        r"the record of a run: host is missing",
+    "later": (
+        lambda identity: identity.update(format=99, versions={"boulder-sweep": "7.8.9"}),
+        "was written by boulder-sweep 7.8.9 in another format than this version, {}, reads: run it again, or use the "
+        "version that wrote it",
     ),
-    "sessions by name": (lambda records: records.update(sessions={}), r"the manifest: sessions is \{\}"),
-    "no parts": (lambda records: records.pop("parts"), r"the manifest: parts is missing"),
-    "other merge": (
-        lambda records: records.update(merge={"name": "x", "part": 1, "replaced": []}),
-        r"the record of a merge: part is 1",
+    **{
+        f"unknown, {name}": (
+            change,
+            "was written by an unknown version of boulder-sweep in another format than this version, {}, reads: run "
+            "it again",
+        )
+        for name, change in {
+            "from a source tree": lambda identity: identity.update(format=1, versions={"boulder-sweep": "unknown"}),
+            "not recorded": lambda identity: identity.update(format=1, versions={}),
+        }.items()
+    },
+    "of a long name": (
+        lambda identity: identity.update(format=1, versions={"boulder-sweep": "9\n" * 10**5}),
+        "was written by boulder-sweep 9 9 9 9 9 ",
     ),
 }
-"""What is not read: a change of the records, and how it is told."""
-READABLE_FORMS: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
-    "part knows more": (
-        lambda records: part_record(records).update(colour="red"),
-        r"the record of rows-\d+-\d+\.parquet: colour is unknown",
-    ),
-    "session knows more": (
-        lambda records: records["sessions"][0].update(mood="good"),
-        r"the record of a run: mood is unknown",
-    ),
-    "session knows less": (lambda records: records["sessions"][0].pop("how"), r"the record of a run: how is missing"),
-    "no merge": (lambda records: records.pop("merge"), r"the manifest: merge is missing"),
-}
-"""What other versions may write and is read all the same, and how it is told where a run is to go on."""
+"""Changes of an identity, and how the result is refused; a place for this version."""

@@ -12,7 +12,7 @@ import pytest
 
 import boulder_sweep
 from boulder_sweep.errors import PictureError
-from boulder_sweep.store import files, status
+from boulder_sweep.store import files
 from boulder_sweep.store.failures import DamagedError, LinkError
 from boulder_sweep.store.files import (
     MANIFEST_NAME,
@@ -24,8 +24,8 @@ from boulder_sweep.store.files import (
     replacing,
     staged_name,
 )
-from boulder_sweep.store.lock import is_locked
 from tests.store.folders import ROWS, SIZE, encoded_part, finished_folder, open_folder, part_bytes
+from tests.store.states import is_locked, status
 
 TOKEN = "0123456789abcdef"
 FIRST = part_name(0, SIZE, ROWS)

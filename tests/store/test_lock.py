@@ -15,7 +15,8 @@ import pytest
 from boulder_sweep.store import lock as locks
 from boulder_sweep.store.failures import FolderInUseError, WriteError
 from boulder_sweep.store.files import LOCK_NAME
-from boulder_sweep.store.lock import DEAD_AFTER_S, HEARTBEAT_S, FolderLock, is_locked
+from boulder_sweep.store.lock import DEAD_AFTER_S, HEARTBEAT_S, FolderLock
+from tests.store.states import is_locked
 
 _HOLD = """
 import signal, sys

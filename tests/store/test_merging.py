@@ -7,13 +7,15 @@ import errno
 import pyarrow as pa
 import pytest
 
-from boulder_sweep.store import status, storage, verify, writer
+from boulder_sweep.store import storage, verify, writer
 from boulder_sweep.store.failures import DamagedError, StoreError, WriteError
 from boulder_sweep.store.files import MANIFEST_NAME
 from boulder_sweep.store.manifest import load
+from boulder_sweep.store.provenance import FORMAT
 from boulder_sweep.store.reader import FinishedRows, finished_table
 from tests.runner.grids import same_bits
 from tests.store.folders import ROWS, commit, open_folder, part_bytes
+from tests.store.states import status
 
 SMALL = [(0, 30), (30, 30), (60, 40)]
 
@@ -178,7 +180,7 @@ def test_a_merge_between_a_look_at_the_manifest_and_one_at_the_parts_is_no_damag
 
 def test_a_result_that_is_replaced_while_it_is_read_is_not_mixed_with_the_other(out):
     finished = FinishedRows(out)
-    folder = open_folder(out, overwrite=True, identity={"settings": {"soil": 2}})
+    folder = open_folder(out, overwrite=True, identity={"format": FORMAT, "settings": {"soil": 2}})
     commit(folder, 0)
     folder.close("interrupted")
     with pytest.raises(StoreError, match="replaced by the result of another sweep"):

@@ -15,7 +15,7 @@ import pytest
 from boulder_sweep.errors import BoulderSweepError
 from boulder_sweep.locations import location_of
 from boulder_sweep.store import lock as locks
-from boulder_sweep.store import read, status
+from boulder_sweep.store import read
 from boulder_sweep.store.failures import DamagedError, FolderRemovedError, ImpossibleRecordsError, WriteError
 from boulder_sweep.store.files import MANIFEST_NAME, hidden_name, is_ours, part_name, staged_name
 from boulder_sweep.store.manifest import load
@@ -35,6 +35,7 @@ from tests.store.folders import (
     rewrite_records,
 )
 from tests.store.object_stores import store
+from tests.store.states import status
 
 OTHER = {"settings": {"soil": 2}}
 FIRST, SECOND = (part_name(first, first + SIZE, ROWS) for first in (0, SIZE))
@@ -357,14 +358,6 @@ def test_a_table_said_to_be_huge_is_looked_at_in_no_time(out):
     found = status(out)
     assert found.missing == [(0, 2**62)]  # neither file is there
     assert found.rows == 2**62
-
-
-@pytest.mark.parametrize(
-    "command", ["sweep run 'x.yaml -o out --resume", "sweep run \0 -o out x", "sweep run a -o s3://u@h/x y"]
-)
-def test_a_command_that_no_run_writes_is_only_shown(out, command):
-    rewrite_records(out, lambda records: [records.update(resume_command=command), records["parts"].pop(FIRST)])
-    assert status(out).rows_done == ROWS - SIZE
 
 
 @pytest.mark.parametrize("content", [

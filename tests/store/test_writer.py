@@ -10,7 +10,7 @@ from contextlib import suppress
 import pandas as pd
 import pytest
 
-from boulder_sweep.store import status, storage, writer
+from boulder_sweep.store import storage, writer
 from boulder_sweep.store.failures import (
     DamagedError,
     FolderInUseError,
@@ -24,6 +24,7 @@ from boulder_sweep.store.files import MANIFEST_NAME
 from boulder_sweep.store.manifest import load
 from boulder_sweep.store.reader import finished_table
 from tests.store.folders import IDENTITY, ROWS, commit, finished_folder, open_folder, rewrite_records
+from tests.store.states import status
 
 
 def names(folder):

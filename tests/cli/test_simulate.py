@@ -1,9 +1,8 @@
-"""``sweep simulate`` and ``sweep status`` from the command line."""
+"""``sweep simulate`` from the command line."""
 
 import json
 import os
 import re
-import shlex
 from pathlib import Path
 
 import pytest
@@ -68,7 +67,7 @@ def test_a_pass_has_its_second_opinion_before_any_caution(sweep, tmp_path):
     out = sweep("simulate", CONFIGS / "rwg.yaml", "--set", "soil.friction_angle=41 deg")[1]
     assert out.index("\nsensitive: a second opinion overturns it") < out.index("\ncaution: ")
     wet = sweep("simulate", CONFIGS / "rwg.yaml", "--set", "soil.water_table=1 m")[1]
-    assert "\nopen: second opinions know boxes of rock of given density, elastic, dry" in wet
+    assert "\nopen: second opinions know boxes of rock of given density, dry" in wet
     assert "robust" not in sweep("simulate", CONFIGS / "abg.yaml")[1]
 
 
@@ -197,100 +196,88 @@ def test_a_time_history_that_may_not_be_written_is_refused_before_simulating(
     assert history.exists() == there
 
 
-def test_status_of_a_finished_run(sweep, possible_grid):
+@pytest.fixture
+def finished(sweep, possible_grid):
     assert sweep("run", possible_grid, "-q")[0] == 0
-    code, out, err = sweep("status", "small-grid.sweep", "--verify")
-    assert (code, err) == (0, "")
-    assert "finished, 18 of 18 designs (100.0%)" in out
-    assert "every part was read and is intact" in out
-    code, out, _ = sweep("status", "small-grid.sweep", "--json")
+    return Path("small-grid.sweep")
+
+
+def test_a_row_of_a_result_is_told_like_a_design_and_compared_to_the_last_bit(sweep, possible_grid, finished):
+    table = boulder_sweep.read(finished)
+    number = int(table.design_id[table.verdict == "fail"].iloc[0])
+    of_file = sweep("simulate", possible_grid, "--design", number)[1].splitlines()
+    code, out, err = sweep("simulate", finished, "--design", number, "--energy", "energy.png")
+    assert (code, err) == (0, "written  energy.png\n")
+    assert out.splitlines() == [*of_file, "computed again: the same to the last bit"]
+    assert Path("energy.png").exists()
+    row = json.loads(sweep("simulate", finished, "--design", number, "--json")[1])
+    assert {name: row[name] for name in ("verdict", "max_rotation_deg", "boulder_height_m")} == dict(
+        table.loc[number, ["verdict", "max_rotation_deg", "boulder_height_m"]]
+    )
+    assert (row["same_bits"], row["unequal"], row["changed_since"], row["judged_by"]) == (True, {}, [], "")
+    every = sweep("simulate", finished, "--design", number, "--all")[1].splitlines()
+    assert every[: len(out.splitlines())] == out.splitlines()
+    assert [line.split()[0] for line in every[len(out.splitlines()) + 1 :]] == list(row)[:-4]
+
+
+def test_a_row_that_passes_says_whether_it_was_asked(sweep, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for more, words in (
+        ((), "open: not asked (`sweep run --second-opinion` asks)"),
+        (("--second-opinion",), "robust: "),
+    ):
+        assert sweep("run", CONFIGS / "rwg.yaml", "-q", "--overwrite", "-o", "rwg.sweep", *more)[0] == 0
+        out = sweep("simulate", "rwg.sweep")[1]
+        assert f"\n{words}" in out
+        assert out.endswith("\ncomputed again: the same to the last bit\n")
+
+
+def test_a_row_that_cannot_be_computed(sweep, grid):
+    sweep("run", grid, "-q")
+    code, out, err = sweep("simulate", "small-grid.sweep", "--design", "4", "--plot", "x.png")
+    assert (code, out) == (3, "computed again: the same to the last bit\n")
+    assert err == "design 4 cannot be computed: embedment depth is not less than the boulder's height\n"
+    assert not Path("x.png").exists()
+    row = json.loads(sweep("simulate", "small-grid.sweep", "--design", "4", "--json")[1])
+    assert (row["verdict"], row["same_bits"]) == ("error", True)
+
+
+def test_a_row_that_came_out_otherwise(sweep, finished, monkeypatch):
+    monkeypatch.setattr("boulder_sweep.impact.recomputing._same", lambda a, b: isinstance(a, str))
+    monkeypatch.setattr("boulder_sweep.store.provenance.kernels_sha256", lambda: "0" * 64)
+    code, out, err = sweep("simulate", finished, "-q")
     assert code == 0
-    assert json.loads(out)["complete"] is True
+    assert err.startswith("note: small-grid.sweep was judged by the rules of version ")
+    assert "differs now: max_rotation_deg was " in out
+    assert "\nchanged since: kernels_sha256: " in out
+    assert "\nas stored, the row was judged by the rules of version " in out
+    assert "the same to the last bit" not in out
 
 
-def test_status_finds_damage(sweep, possible_grid):
-    sweep("run", possible_grid, "-q")
-    (part,) = [
-        path for path in (possible_grid.parent / "small-grid.sweep").glob("*.parquet") if not path.name.startswith("_")
-    ]
-    data = bytearray(part.read_bytes())
-    data[len(data) // 2] ^= 1
-    part.write_bytes(data)
-    code, out, _ = sweep("status", "small-grid.sweep", "--verify")
-    assert code == 1
-    assert f"damaged  {part.name}" in out
-    assert "resume   sweep run grid.yaml -o small-grid.sweep --resume" in out
-
-
-def unfinished(folder):
-    """Let a finished run lack its rows."""
-    (part,) = [path for path in folder.glob("*.parquet") if not path.name.startswith("_")]
-    part.unlink()
-
-
-def resumed_by(sweep, *words):
-    """Return the command that `sweep status` gives, and what it says of it."""
-    code, out, _ = sweep("status", *words)
-    assert code == 1
-    (at, command) = next((at, line) for at, line in enumerate(out.splitlines()) if line.startswith("resume   "))
-    return command.removeprefix("resume   "), out.splitlines()[at + 1 :]
-
-
-@pytest.mark.parametrize("out", ["small-grid.sweep", "runs/first/my out.sweep"])
-def test_status_of_a_folder_moved_with_its_settings_file(sweep, possible_grid, monkeypatch, out):
-    Path("project/runs/first").mkdir(parents=True)
-    possible_grid.rename("project/grid.yaml")
-    top = Path.cwd()
-    monkeypatch.chdir("project")
-    assert sweep("run", "grid.yaml", "-q", "-o", out)[0] == 0
-    unfinished(Path(out))
-    expected = ["sweep", "run", "grid.yaml", "-o", out, "--resume"]
-    assert resumed_by(sweep, out) == (shlex.join(expected), [])
-    monkeypatch.chdir(top)
-    (top / "project").rename("elsewhere")
-    (top / "grid.yaml").write_text("of another sweep")
-    command, more = resumed_by(sweep, f"elsewhere/{out}")
-    assert shlex.split(command) == ["sweep", "run", "elsewhere/grid.yaml", "-o", f"elsewhere/{out}", "--resume"]
-    assert more == []
-    assert sweep(*shlex.split(command)[1:], "-q")[0] == 0
-    assert sweep("status", f"elsewhere/{out}")[0] == 0
-    monkeypatch.chdir(top / "elsewhere" / out)
-    unfinished(Path())
-    command, more = resumed_by(sweep, ".")
-    assert shlex.split(command)[2:5] == [str(top / "elsewhere" / "grid.yaml"), "-o", "."]
-    assert more == []
-
-
-def test_status_of_a_folder_moved_from_its_settings_file(sweep, possible_grid, monkeypatch):
-    sweep("run", possible_grid, "-q")
-    unfinished(Path("small-grid.sweep"))
-    Path("archive").mkdir()
-    Path("small-grid.sweep").rename("archive/old.sweep")
-    assert resumed_by(sweep, "archive/old.sweep") == ("sweep run grid.yaml -o archive/old.sweep --resume", [])
-    monkeypatch.chdir("archive")
-    missing = ["note     there is no grid.yaml; give its present path instead"]
-    assert resumed_by(sweep, "old.sweep") == ("sweep run grid.yaml -o old.sweep --resume", missing)
-    found = json.loads(sweep("status", "old.sweep", "--json")[1])
-    assert found["settings_missing"] == "grid.yaml"
-    Path("../grid.yaml").replace("grid.yaml")
-    assert resumed_by(sweep, "old.sweep") == ("sweep run grid.yaml -o old.sweep --resume", [])
-
-
-def test_status_of_a_moved_folder_whose_settings_file_was_named_by_its_whole_path(sweep, possible_grid):
-    whole = possible_grid.resolve()
-    sweep("run", whole, "-q", "-o", whole.parent / "old.sweep")
-    unfinished(Path("old.sweep"))
-    Path("old.sweep").rename("new.sweep")
-    command = f"sweep run {whole} -o new.sweep --resume"
-    assert resumed_by(sweep, "new.sweep") == (command, [])
-    whole.rename("other.yaml")
-    missing = [f"note     there is no {whole}; give its present path instead"]
-    assert resumed_by(sweep, "new.sweep") == (command, missing)
-
-
-@pytest.mark.parametrize("name", ["no.sweep", "."])
-def test_status_of_what_is_no_result(sweep, grid, name):
-    code, out, err = sweep("status", name)
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--design", "18"), "small-grid.sweep has 18 designs, numbered from 0; there is no 18"),
+        (("--set", "vehicle.speed=30 mph"), "--set and --at change the settings of a file; small-grid.sweep is the"),
+        (("--at", "mean"), "--set and --at change the settings of a file; small-grid.sweep is the result of a run"),
+    ],
+)
+def test_what_a_result_does_not_take(sweep, finished, words, message):
+    code, out, err = sweep("simulate", finished, *words)
     assert (code, out) == (2, "")
-    assert err
-    assert "internal" not in err
+    assert message in err
+
+
+@pytest.mark.parametrize(
+    ("place", "words"),
+    [
+        ("no.sweep", "there is no no.sweep; the result of a run is a folder"),
+        (".", ". is not the result of a sweep (no _manifest.parquet)"),
+        ("depths.parquet", "there is no depths.parquet; the result of a run is a folder"),
+        ("no.yaml", "no.yaml: there is no such file"),
+    ],
+)
+def test_what_is_neither_a_file_nor_a_result(sweep, grid, place, words):
+    code, out, err = sweep("simulate", place)
+    assert (code, out) == (2, "")
+    assert words in err

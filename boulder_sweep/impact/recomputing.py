@@ -16,7 +16,6 @@ from boulder_kernels import Control, Readings
 from boulder_sweep.columns import BY_NAME, INPUT_COLUMNS, OPTIONAL_COLUMNS, OUTCOMES, OutcomeColumn
 from boulder_sweep.designs import embedment_of_ratio
 from boulder_sweep.impact.simulation import history_of
-from boulder_sweep.judge.accuracy import known_control
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.judged import worst_of
 from boulder_sweep.judge.refinement import reported_step_s
@@ -24,7 +23,7 @@ from boulder_sweep.judge.robustness import can_be_asked
 from boulder_sweep.judge.verdict import limits_of
 from boulder_sweep.locations import RemotePath, location_of
 from boulder_sweep.settings import Sweep
-from boulder_sweep.settings.model import Criterion, Ground, Model, ReadingChoice, SolverSettings, completed
+from boulder_sweep.settings.model import Criterion, Ground, Model, ReadingChoice, SolverSettings
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import shown_values
 from boulder_sweep.settings.sweep import DesignList, allowed_in
@@ -36,19 +35,19 @@ from boulder_sweep.store.schema import part_table
 if TYPE_CHECKING:
     from boulder_sweep.impact.trajectory import Trajectory
 
-__all__ = ["Explanation", "explain"]
+__all__ = ["Recomputed", "recompute"]
 
 
 @dataclass(frozen=True, eq=False)
-class Explanation:
-    """What `explain` found.
+class Recomputed:
+    """A row of a result, and what it is now.
 
     Attributes
     ----------
-    name : str
-        Name of the sweep.
-    design_id : int
-        Number of the row.
+    design_id, designs : int
+        Number of the row, and how many the result has.
+    sweep : Sweep
+        The one design, with the model and the step that its row was computed with.
     inputs : dict
         Its inputs by the names of the table's columns.
     stored, recomputed : dict
@@ -61,31 +60,33 @@ class Explanation:
         By whose rules the row was judged; empty where by those of this version.
     """
 
-    name: str
     design_id: int
+    designs: int
+    sweep: Sweep
     inputs: dict[str, float | None]
     stored: dict[str, Any]
     recomputed: dict[str, Any]
     changed: tuple[str, ...]
     trajectory: Trajectory | None
-    judged_by: str = ""
+    judged_by: str
 
     @property
     def unequal(self) -> tuple[str, ...]:
-        """Outcomes that are not the same to the last bit; those that the table does not have are not compared."""
+        """Outcomes that are not the same to the last bit."""
         return tuple(name for name, value in self.recomputed.items() if not _same(value, self.stored[name]))
 
-    def as_dict(self, units: str = "si") -> dict[str, Any]:
-        """Return everything but the trajectory as plain data, in ``si`` or ``us`` units."""
+    @property
+    def is_asked(self) -> bool:
+        """Whether second opinions were asked of the row, as far as they can be."""
+        return bool(self.sweep.model.second_opinion) or not can_be_asked(self.sweep)
+
+    def compared(self, units: str = "si") -> dict[str, Any]:
+        """Return how the row comes out now as plain data, in ``si`` or ``us`` units."""
         were, are = (
             shown_values({name: outcomes[name] for name in self.unequal}, units)
             for outcomes in (self.stored, self.recomputed)
         )
         return {
-            "name": self.name,
-            "design_id": self.design_id,
-            "inputs": shown_values(self.inputs, units),
-            "outcomes": shown_values(self.stored, units),
             "same_bits": not self.unequal,
             "unequal": {name: [were[name], are[name]] for name in were},
             "changed_since": list(self.changed),
@@ -93,7 +94,7 @@ class Explanation:
         }
 
 
-def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
+def recompute(out: str | Path | RemotePath, design_id: int) -> Recomputed:
     """Compute one row of a result again, from the result alone.
 
     Parameters
@@ -105,9 +106,8 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
 
     Returns
     -------
-    Explanation
-        The row as stored and as recomputed, and its time history; of another version's table, as far as its settings
-        are understood.
+    Recomputed
+        The row as stored and as recomputed, and its time history.
 
     Raises
     ------
@@ -122,15 +122,12 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
     row = read_row(folder, design_id)
     values = row.to_pylist()[0]
     inputs = {name: values[name] for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS) if name in values}
-    common: dict[str, Any] = {
-        "design_id": design_id,
-        "inputs": inputs,
-        "stored": {name: value for name, value in values.items() if isinstance(BY_NAME.get(name), OutcomeColumn)},
-        "judged_by": judged_by(there),
-    }
-    control, readings = known_control(there["control"]), Readings(**there["readings"])
-    settings = completed(there["settings"])
-    sweep = one_design(settings, inputs, control, values["step_s"] or reported_step_s(control))
+    control, readings = Control(**there["control"]), Readings(**there["readings"])
+    name = there["settings"]["name"]
+    called = name if manifest.rows == 1 else f"{name} #{design_id}"
+    sweep = one_design(
+        there["settings"] | {"name": called}, inputs, control, values["step_s"] or reported_step_s(control)
+    )
     stated = (there["settings"], there["readings"], there["control"], there.get("accuracy"))
     limits = limits_of(sweep)._replace(rotation=control.theta_limit)
     block = sweep.block(0, 1)
@@ -138,13 +135,16 @@ def explain(out: str | Path | RemotePath, design_id: int) -> Explanation:
     evaluation = Evaluation(readings, control, limits, model=sweep.model, second_opinion=laws)
     cases = evaluation.by_case(block)
     again = part_table(block, worst_of(cases), {}).to_pylist()[0]
-    computable = not block.reasons[0]
-    return Explanation(
-        name=sweep.name,
-        recomputed={spec.name: again[spec.name] for spec in OUTCOMES if spec.name in manifest.columns},
+    return Recomputed(
+        design_id=design_id,
+        designs=manifest.rows,
+        sweep=sweep,
+        inputs=inputs,
+        stored={name: value for name, value in values.items() if isinstance(BY_NAME.get(name), OutcomeColumn)},
+        recomputed={spec.name: again[spec.name] for spec in OUTCOMES},
         changed=tuple(differences(there, identity(*stated))),
-        trajectory=history_of(sweep, 0, evaluation, cases) if computable else None,
-        **common,
+        trajectory=None if block.reasons[0] else history_of(sweep, 0, evaluation, cases),
+        judged_by=judged_by(there),
     )
 
 

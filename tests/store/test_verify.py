@@ -1,14 +1,12 @@
-"""How far a run got, what is damaged, how to go on."""
+"""Which parts of a result are damaged, and what is missing."""
 
 from __future__ import annotations
 
-import json
-
 import pytest
 
-from boulder_sweep.store import status
 from boulder_sweep.store.failures import NotASweepError
 from tests.store.folders import IDENTITY, ROWS, commit, finished_folder, open_folder
+from tests.store.states import status
 
 
 def test_a_finished_run(tmp_path):
@@ -18,11 +16,9 @@ def test_a_finished_run(tmp_path):
     assert found.parts == 5
     assert found.missing == []
     assert found.damaged == {}
-    assert found.resume_command is None
     assert not found.running
     assert sum(found.verdicts.values()) == ROWS
     assert found.identity == IDENTITY
-    json.dumps(found.to_dict())
 
 
 def test_a_run_under_way(tmp_path):
@@ -35,7 +31,6 @@ def test_a_run_under_way(tmp_path):
     assert found.rows_done == 130
     assert found.parts == 2
     assert found.missing == [(100, 200), (230, ROWS)]
-    assert found.resume_command == "sweep run x.yaml --resume"
     assert found.sessions[-1].ended is None
     folder.close("interrupted by signal 2")
     after = status(tmp_path / "out")
@@ -54,7 +49,6 @@ def test_truncated_and_lost_parts_are_found(tmp_path, verify):
     assert found.damaged["rows-000000000300-000000000400.parquet"] == "missing"
     assert found.missing == [(100, 200), (300, 400)]
     assert found.rows_done == ROWS - 200
-    assert found.resume_command
 
 
 def test_every_flipped_bit_is_found_by_verifying(tmp_path):
@@ -82,20 +76,3 @@ def test_nothing_is_changed_by_looking(tmp_path):
 def test_no_result(tmp_path):
     with pytest.raises(NotASweepError):
         status(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("command", "expected"),
-    [
-        ("sweep run 'my grid.yaml' -o out --jobs 2 --resume", "sweep run 'my grid.yaml' -o '{}' --jobs 2 --resume"),
-        ("sweep run x.yaml --resume", "sweep run x.yaml --resume"),
-        ("boulder_sweep.run(sweep, 'out', resume=True)", "boulder_sweep.run(sweep, '{}', resume=True)"),
-    ],
-)
-def test_a_moved_folder_is_resumed_where_it_is_now(tmp_path, command, expected):
-    folder = open_folder(tmp_path / "out", resume_command=command)
-    commit(folder, 0)
-    folder.close("interrupted by signal 2")
-    moved = (tmp_path / "out").rename(tmp_path / "now here")
-    assert status(moved).resume_command == expected.format(moved)
-    assert status(str(moved) + "/").resume_command == expected.format(f"{moved}/")
