@@ -157,7 +157,7 @@ def run(
             safe = f"{done:,} of {sweep.n_designs:,} rows are safe"
             raise type(problem)(f"{problem}. {safe}. Resume with: {again}") from problem
         except BaseException as problem:
-            ended(f"stopped by {type(problem).__name__}: {problem}")
+            ended(f"stopped by {one_line(problem)}")
             raise
         whole.end(FINISHED)
     return summary_of(
