@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import textwrap
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,18 +18,15 @@ import click
 from boulder_sweep.cli.options import (
     OUTPUT,
     at_option,
-    cluster_options,
     grid_argument,
     json_option,
+    quiet_option,
     set_option,
     take_values,
 )
-from boulder_sweep.cli.output import say, show, working
+from boulder_sweep.cli.output import show, working
 
 if TYPE_CHECKING:
-    from rich.table import Table as RichTable
-
-    from boulder_sweep.tradeoff.points import Method
     from boulder_sweep.tradeoff.study import Tradeoff
 
 TRADEOFF_EXAMPLES = """\b
@@ -57,30 +55,30 @@ Examples:
     metavar="S",
     help="Start no new measurement after this many seconds.",
 )
-@click.option("-q", "--quiet", is_flag=True, help="No progress.")
-@cluster_options
+@quiet_option
 @at_option
 @set_option
 @json_option
 def tradeoff(
     grid: str,
     out: str | None,
+    designs: int,
+    seconds: float,
     quiet: bool,
     at: str | None,
     overrides: tuple[str, ...],
     as_json: bool,
-    **options: Any,
 ) -> int:
     """Simulate a sample of GRID by many methods and compare each with a far finer solution.
 
     The sample holds the corners of the grid and rows spread over all of its axes. Steps, soil in closed form and by
     sums over elements, both readings of the paper: errors, changed verdicts, and CPU time per design. With -o the table
-    is written as Parquet and CSV, and a picture.
+    is written as Parquet, and a picture.
     """
     from boulder_sweep.settings import load
     from boulder_sweep.tradeoff.study import measure
 
-    if math.isnan(options["seconds"]):
+    if math.isnan(seconds):
         raise click.UsageError("--seconds nan: give a number of seconds")
     sweep = take_values(load(grid, overrides), at, quiet)
     if out is not None:
@@ -89,88 +87,44 @@ def tradeoff(
         require_matplotlib()
         make_folder(Path(out))
     with working(quiet, doing="measuring"):
-        result = measure(sweep, **options, progress=None if quiet else say)
-    files = [] if out is None else result.write(out)
+        result = measure(sweep, designs=designs, seconds=seconds)
+    files = [] if out is None else result.write(Path(out))
     if as_json:
-        show(json.dumps({**result.to_dict(), "files": [str(file) for file in files]}))
+        rows = [point.to_dict() for point in result.points]
+        record = {"name": sweep.name, "designs": sweep.n_designs, "reference_error_deg": result.reference_deg}
+        show(json.dumps({**record, "points": rows, "left_out": result.left_out, "files": [*map(str, files)]}))
         return 0
-    if result.points:
-        _show(result)
-    for sentence in result.recommendation():
-        show(*textwrap.wrap(sentence, 80))
+    lines = [*_rows(result), *(f"written  {file}" for file in files)]
     if result.left_out:
-        ways = len(result.points) + len(result.left_out)
-        show(f"left out for time: {len(result.left_out)} of {ways} methods (--json lists them)")
-    for file in files:
-        show(f"written  {file}")
+        lines.append(f"left out for time: {result.left_out} of {len(result.points) + result.left_out} methods")
+    show(*lines)
     return 0
 
 
-def _show(result: Tradeoff) -> None:
-    """Print the table: all of it where the terminal is wide enough, else the columns that matter most."""
-    from rich.console import Console
+def _rows(result: Tradeoff) -> Iterator[str]:
+    """Yield a line for every method, under a heading for each way of simulating."""
+    from boulder_sweep.tradeoff.study import REFERENCE_STEP_MS
 
-    wide = Console(width=1000)
-    width = Console().width
-    table = _table(result, whole=True)
-    whole = wide.measure(table).maximum <= width
-    if not whole:
-        table = _table(result, whole=False)
-    Console(width=max(width, wide.measure(table).maximum)).print(table)
-    show("* none with these readings is both cheaper and more accurate (rotation, 99 %)")
-    if not whole:
-        show("y: yield located; a wider terminal shows more columns, and -o writes all of them")
-    for readings, error in result.reference_deg.items():
-        show(f"{readings}: against steps of {result.reference_step_ms:g} ms, known to {error:.0e} deg")
-    show("")
-
-
-def _table(result: Tradeoff, *, whole: bool) -> RichTable:
-    """Return the methods as a table; not whole, it fits a terminal of 80 columns."""
-    from rich.box import SIMPLE
-    from rich.table import Table as RichTable
-
-    table = RichTable(box=SIMPLE if whole else None, title=None, pad_edge=False, padding=(0, 2 if whole else 1, 0, 0))
-    for name in ("readings", "soil", "step") if whole else ("readings\nand soil", "step\n[ms]"):
-        table.add_column(name, no_wrap=True)
-    heads = ["us per\ndesign", "rotation\nrms [deg]", "\n99 %", "\nmax", "movement\nrms [mm]", "\n99 %", "\nmax"]
-    heads += ["error\ncovered", "verdicts\nflipped", "un-\ndecided", "of\ndesigns"]
-    shown = range(len(heads)) if whole else (0, 2, 3, 5, 7, 8)
-    if not whole:
-        heads[2], heads[5], heads[8] = "rotation\n99 % [deg]", "movement\n99 % [mm]", "\nflips"
-    for k in shown:
-        table.add_column(heads[k], justify="right", no_wrap=True)
-    table.add_column("", no_wrap=True)
-    before = ("", 0, False, False)
+    if result.points:
+        yield "steps [ms]     us per  rotation [deg]    movement  flips  un-"
+        yield "               design  99 %     max      99 % [m]         decided"
+    before = None
     for point in result.points:
         method = point.method
-        group = (method.readings, method.soil_elements, method.error_estimate, method.locate_yield)
-        if group != before and before[0]:
-            table.add_section()
-        words = (method.readings, method.soil) if whole else (method.readings if group != before else "",)
-        if not whole and group != before and method.soil_elements:
-            words = (method.soil,)
+        group = (method.readings, method.soil_elements, method.error_estimate)
+        if group != before:
+            soil = f"sums over {method.soil_elements} elements" if method.soil_elements else "closed form"
+            yield f"{method.readings}, {soil}{', error of every design' if method.error_estimate else ''}"
         before = group
-        metres = (point.displacement_rms_m, point.displacement_p99_m, point.displacement_max_m)
-        cells = [
-            f"{point.cpu_us:.3g}" if point.cpu_us < 1000 else f"{point.cpu_us:,.0f}",
-            *(f"{v:.1e}" for v in (point.rotation_rms_deg, point.rotation_p99_deg, point.rotation_max_deg)),
-            *(f"{1e3 * v:.1e}" for v in metres),
-            f"{point.covered:.2%}" if method.error_estimate else "",
-            str(point.flips),
-            str(point.undecided),
-            f"{point.designs:,}",
-        ]
-        last = point.accuracy + (" *" if point.pareto else "")
-        steps = method.steps if whole else _short(method)
-        table.add_row(*words, steps, *(cells[k] for k in shown), last)
-    return table
-
-
-def _short(method: Method) -> str:
-    """Steps of a method in a narrow column [ms]."""
-    steps = "+".join(f"{step:g}" for step in method.steps_ms)
-    return f"{steps} y" if method.locate_yield else steps
+        cost = f"{point.cpu_us:.3g}" if point.cpu_us < 1000 else f"{point.cpu_us:,.0f}"
+        errors = (point.rotation_p99_deg, point.rotation_max_deg, point.displacement_p99_m)
+        numbers = "  ".join(f"{error:.1e}" for error in errors)
+        last = f"{point.flips:<7}{point.undecided:<9}{'* ' if point.pareto else '  '}{point.accuracy}"
+        yield f"  {method.steps:<13}{cost:<8}{numbers}   {last}".rstrip()
+    if result.points:
+        yield "y: yield located; *: none with these readings is cheaper and more accurate"
+    for readings, error in result.reference_deg.items():
+        yield f"{readings}: against steps of {REFERENCE_STEP_MS:g} ms, known to {error:.0e} deg"
 
 
 VALIDATE_EXAMPLES = """\b
