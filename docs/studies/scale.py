@@ -8,8 +8,8 @@ from pathlib import Path
 
 from boulder_sweep.answers.need import need
 from boulder_sweep.crash_tests.tables import Table
-from boulder_sweep.runner.estimate import TASK_S
 from boulder_sweep.runner.running import COMMIT_SHARE
+from boulder_sweep.runner.workers import TASK_S
 from boulder_sweep.settings import load
 from boulder_sweep.store.writer import ROWS_PER_PART
 from boulder_sweep.text import duration_text, size_text

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from distributed.scheduler import heartbeat_interval
 
-from boulder_sweep.runner.estimate import Estimate, rows_per_task
+from boulder_sweep.runner.workers import rows_per_task
 from boulder_sweep.store.writer import ROWS_PER_PART
 from docs.studies.scale import MOST_LOAD, VALUE, Plan, most_workers
 
@@ -13,9 +13,8 @@ from docs.studies.scale import MOST_LOAD, VALUE, Plan, most_workers
 @pytest.mark.parametrize("rows", [10**5, 10**7, 10**9, 10**12])
 @pytest.mark.parametrize("workers", [1, 2, 64])
 def test_tasks_are_those_of_a_run(rows, workers):
-    rate = workers / VALUE["row_cpu_s"]
-    estimate = Estimate(rows, rows, rows / rate, 0, None, rate, 1000, workers)
-    assert Plan(rows, workers).rows_per_task == pytest.approx(rows_per_task(estimate, ROWS_PER_PART), rel=1e-3)
+    expected = rows_per_task(VALUE["row_cpu_s"], rows, workers, ROWS_PER_PART)
+    assert Plan(rows, workers).rows_per_task == pytest.approx(expected, rel=1e-3)
 
 
 @pytest.mark.parametrize("workers", [1, 10, 11, 49, 50, 199, 200, 5000])
