@@ -28,11 +28,10 @@ from boulder_sweep.runner.summary import Progress, Summary, summary_of
 from boulder_sweep.runner.workers import COMMIT_EVERY_S
 from boulder_sweep.store.failures import DoesNotFitError, NotASweepError
 from boulder_sweep.store.manifest import Manifest
-from boulder_sweep.store.opening import ClaimedFolder, claim_output, refuse_other_settings
 from boulder_sweep.store.provenance import file_metadata, identity, new_session
 from boulder_sweep.store.storage import storage_of
 from boulder_sweep.store.verify import load_checked
-from boulder_sweep.store.writer import ROWS_PER_PART
+from boulder_sweep.store.writer import ROWS_PER_PART, ClaimedFolder, claim_output, refuse_other_settings
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
