@@ -10,12 +10,12 @@ import sys
 import time
 from collections.abc import Callable
 
-from . import accuracy, answers, intervals, kernel, named, rates, single_precision, sweep
+from . import accuracy, intervals, kernel, named, rates, sweep
 from .designs import DESIGNS
 from .peers.__main__ import measure_with
 from .report import Table, write_between_markers
 
-NAMES = ("kernel", "rates", "accuracy", "named", "single-precision", "sweep", "answers", "intervals", "peers")
+NAMES = ("kernel", "rates", "accuracy", "named", "sweep", "intervals", "peers")
 
 
 def _accuracy() -> list[Table]:
@@ -35,9 +35,7 @@ def main() -> None:
         "rates": lambda: [rates.measure()],
         "accuracy": _accuracy,
         "named": lambda: [named.measure()],
-        "single-precision": lambda: [single_precision.measure()],
         "sweep": lambda: sweep.measure(large=arguments.large),
-        "answers": lambda: [answers.measure()],
         "intervals": lambda: [intervals.measure()[0]],
         "peers": lambda: [measure_with(arguments.peers_python, write=True)],
     }

@@ -1,4 +1,4 @@
-"""Work and precision for each time step, with and without located events: the basis of the named accuracies.
+"""Work and precision for each time step: the basis of the named accuracies.
 
 Run as ``python -m benchmarks.accuracy``. Every step simulates the same random designs; errors are relative to a
 much finer step that also locates the yield of the soil. Rotations and displacements are compared where neither
@@ -17,8 +17,7 @@ import numpy as np
 import boulder_kernels as bk
 from boulder_kernels.control import STEP_RATIO
 
-from .designs import DESIGNS, HORIZON, ROTATION_LIMIT, first, sample
-from .literal import literal_table
+from .designs import DESIGNS, HORIZON, ROTATION_LIMIT, sample
 from .points import LIMIT, Peaks, Point, observed_order, point_of
 from .report import FIGURES, Table, significant
 from .timing import machine, timed, versions
@@ -26,9 +25,6 @@ from .timing import machine, timed, versions
 STEPS_MS = (16.0, 14.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.5)
 STEPS_WITH_ERROR_MS = (18.0, 12.0, 9.0, 6.0, 3.0, 1.5)
 """Longer steps of the two solutions."""
-LITERAL_STEPS_MS = (16.0, 8.0, 4.0, 2.0, 1.0, 0.5, 0.25)
-LITERAL_DESIGNS = 1024
-"""They cost a hundred times as much."""
 SHOWN_MS = (16.0, 14.0, 12.0, 8.0, 4.0, 2.0, 1.0, 0.5, 0.25)
 """Steps in the tables; the data file has all."""
 REFERENCE_STEP_S = 5e-5
@@ -68,21 +64,6 @@ def kernel_points(table: bk.DesignTable, preset: str, known: bk.OutcomeTable, re
     return points
 
 
-def literal_points(table: bk.DesignTable, preset: str, known: bk.OutcomeTable) -> list[Point]:
-    """Points of the same method with the switches inside the right-hand side."""
-    readings, points = PRESETS[preset], []
-    literal_table(first(table, 1), readings, 1e-3, known.t_end, ROTATION_LIMIT)  # compiles
-    for step_ms in LITERAL_STEPS_MS:
-        work = partial(literal_table, table, readings, 1e-3 * step_ms, known.t_end, ROTATION_LIMIT)
-        (theta, x_b, x_v), seconds = timed(work, 1)
-        # Near the limit, one of the two solutions may stop at it and the other just below.
-        overturned = (known.status == LIMIT) & (theta > 0.99 * ROTATION_LIMIT) | (theta >= ROTATION_LIMIT)
-        found = Peaks(theta, x_b, x_v, overturned)
-        cpu_us = 1e6 * seconds / table.L.size
-        points.append(point_of(preset, "switches inside", 1e-3 * step_ms, cpu_us, found, Peaks.of(known)))
-    return points
-
-
 def measure(count: int = DESIGNS, repeats: int = 2) -> list[Point]:
     """Measure all points of both presets."""
     designs = sample(count)
@@ -90,8 +71,6 @@ def measure(count: int = DESIGNS, repeats: int = 2) -> list[Point]:
     for preset, readings in PRESETS.items():
         known = reference_of(designs, readings)
         points += kernel_points(designs, preset, known, repeats)
-        fewer = min(LITERAL_DESIGNS, count)
-        points += literal_points(first(designs, fewer), preset, bk.OutcomeTable(*(column[:fewer] for column in known)))
     return points
 
 
@@ -99,8 +78,7 @@ def tables(points: list[Point], count: int) -> list[Table]:
     """Return one table for each preset."""
     conditions = (
         f"{machine()}; {versions('numba', 'llvmlite', 'numpy')}; {count} random designs, {HORIZON:g} s, limit 20 deg; "
-        f"errors against a step of {1e3 * REFERENCE_STEP_S:g} ms; CPU time of one thread; switches inside: "
-        f"{min(LITERAL_DESIGNS, count)} designs, stopped at the end time of the reference"
+        f"errors against a step of {1e3 * REFERENCE_STEP_S:g} ms; CPU time of one thread"
     )
     found = []
     for preset in PRESETS:
@@ -132,7 +110,7 @@ def tables(points: list[Point], count: int) -> list[Table]:
                     str(p.flips),
                 ]
             )
-        for way in ("events located", "yield located, too", "switches inside"):
+        for way in ("events located", "yield located, too"):
             these = [p for p in points if p.preset == preset and p.way == way]
             order = observed_order(these, 8.0, 1.0)
             table.notes.append(f"Observed order of the rms error from 8 to 1 ms, {way}: {order:.1f}.")

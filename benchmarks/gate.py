@@ -1,38 +1,86 @@
 """The gate: it fails if a change makes the project do more, or its kernels take half as long again.
 
-Run as ``python -m benchmarks.gate``; exit code 1 and a sentence for what fails. Whatever depends on no clock is counted
-and compared with the record in ``counts.toml``, which ``--record`` renews. One thing is timed: designs in lanes, in
-turn with a loop that shares no code with the project. Other programs make either only slower, so the least times of up
-to nine rounds count, and a machine that is busy for a while is no reason to fail. ``--timed`` times everything finer,
-on a machine that does nothing else, see ``timed.py``.
+Run as ``python -m benchmarks.gate``; exit code 1 and a sentence for what fails. What depends on no clock is counted and
+compared with ``gate.toml``: calls of kernels while a few designs are simulated with the compiler off, and the designs
+that a small run simulates. One thing is timed: designs in lanes, in turn with a loop that shares no code with the
+project. Other programs make either only slower, so the least times of up to nine rounds count, and a machine that is
+busy for a while is no reason to fail. ``--record`` prints what to write into ``gate.toml``.
 """
 
 from __future__ import annotations
 
 import argparse
 import functools
+import json
+import os
+import subprocess
 import sys
-from collections.abc import Callable, Mapping
+import tempfile
+import threading
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import llvmlite.binding
+import numba
+import numpy as np
 
 import boulder_kernels as bk
 from boulder_sweep.judge.accuracy import STEPS
 
-from . import counts, timed
 from .designs import HORIZON, ROTATION_LIMIT, sample
-from .findings import Finding, complaint, limits_of
+from .report import FOLDER
+from .sweep import settings_of
 from .timing import cpu_seconds, machine
 
+LIMITS = FOLDER / "gate.toml"
 ROUNDS = 9
 ROWS = 4096
+COUNTED_ROWS = 64
+"""Designs that are simulated with the compiler off."""
+RUN_ROWS = 1000
+"""Designs of the small run."""
+COUNTED = ("closed_form", "step", "work_out")
+"""Kernels whose calls are counted one by one, beside those of all."""
+PREPARING = "interruptible work"
+"""Name of the threads that prepare a run; how many designs they try depends on the clock."""
 ANY_PROCESSOR = "any"
 """Whose record holds for processors without one of their own."""
 
 Work = Callable[[], object]
 
 
-def compared(found: counts.Counts, recorded: counts.Recorded, change: float) -> list[Finding]:
+class Finding(NamedTuple):
+    """One figure over the recorded one."""
+
+    name: str
+    ratio: float
+    most: float
+    """Largest ratio that passes."""
+    least: float = 0.0
+    """Smallest ratio that passes."""
+
+    @property
+    def passes(self) -> bool:
+        """Whether the ratio is within its bounds; NaN is not."""
+        return self.least <= self.ratio <= self.most
+
+    def __str__(self) -> str:
+        """One line: the figure, its ratio to the record, its bounds, and whether it passes."""
+        least = f"at least {self.least:.3f} and " if self.least else ""
+        verdict = "ok" if self.passes else "FAILS"
+        return f"{self.name:<36} {self.ratio:8.3f} of the record, {least}at most {self.most:.3f}   {verdict}"
+
+
+def limits() -> dict[str, Any]:
+    """Read the committed bounds and records."""
+    with LIMITS.open("rb") as stream:
+        return tomllib.load(stream)
+
+
+def compared(found: Mapping[str, int], recorded: Mapping[str, int], change: float) -> list[Finding]:
     """Compare counts with the record; one that is missing in the record, or only there, has changed.
 
     Parameters
@@ -44,12 +92,9 @@ def compared(found: counts.Counts, recorded: counts.Recorded, change: float) -> 
     change
         Largest change that passes, as a share, more or less.
     """
-    of = "the record" if recorded.compiler == counts.compiler() else f"the record with {recorded.compiler}"
-    ratios = {
-        name: found.get(name, 0) / recorded.counts[name] if name in recorded.counts else float("nan")
-        for name in dict.fromkeys([*recorded.counts, *found])
-    }
-    return [Finding(name, ratio, 1.0 + change, 1.0 - change, of) for name, ratio in ratios.items()]
+    names = dict.fromkeys([*recorded, *found])
+    ratios = {name: found.get(name, 0) / recorded[name] if name in recorded else float("nan") for name in names}
+    return [Finding(name, ratio, 1.0 + change, 1.0 - change) for name, ratio in ratios.items()]
 
 
 def within(
@@ -84,9 +129,28 @@ def within(
     return findings
 
 
+@numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
+def reference_work(x: np.ndarray, times: int) -> None:
+    """Iterate a polynomial map in the first-level cache: vector arithmetic that shares no code with the project."""
+    for _ in range(times):
+        for i in range(x.size):
+            z = x[i]
+            p = 0.3
+            for _ in range(12):
+                p = p * z + 0.1
+            x[i] = p
+
+
+def reference_loop() -> Work:
+    """Return the reference, some 10 ms of work, compiled."""
+    x = np.linspace(0.0, 0.5, 512)
+    reference_work(x, 1)
+    return lambda: reference_work(x, 100_000)
+
+
 @functools.cache
 def lanes() -> dict[str, Work]:
-    """The timed designs in lanes, by the accuracy that they are computed with."""
+    """Return the timed work: designs in lanes, by the accuracy that they are computed with."""
     designs, readings = sample(ROWS), bk.corrected()
 
     def work(name: str) -> Work:
@@ -96,44 +160,93 @@ def lanes() -> dict[str, Work]:
     return {name: work(name) for name in ("fast", "balanced")}
 
 
-def _counts() -> list[Finding]:
-    return compared(counts.measured(), counts.read(), limits_of("counts")["largest_change"])
+def calls() -> dict[str, int]:
+    """Count the calls of kernels while a few designs are simulated; the compiler must be off."""
+    tally = dict.fromkeys((*COUNTED, "all kernels"), 0)
+
+    def note(frame: Any, event: str, _: Any) -> None:
+        if event == "call" and "boulder_kernels" in frame.f_code.co_filename:
+            tally["all kernels"] += 1
+            with suppress(KeyError):
+                tally[frame.f_code.co_name] += 1
+
+    designs = sample(COUNTED_ROWS)
+    control = bk.Control(STEPS["fast"].step_s, HORIZON, ROTATION_LIMIT, 0, False)
+    with np.errstate(all="ignore"):
+        sys.setprofile(note)
+        try:
+            bk.simulate_table(designs, bk.corrected(), control)
+        finally:
+            sys.setprofile(None)
+    return {f"calls of {name}": count for name, count in tally.items()}
 
 
-def _time() -> list[Finding]:
-    limits = limits_of("time")
-    record = limits["record"]
-    own = record.get(llvmlite.binding.get_host_cpu_name(), record[ANY_PROCESSOR])
-    return within(lanes(), timed.reference_loop(), own, limits["most"])
+def designs_of_run() -> int:
+    """Count the designs that a small run hands to the kernels."""
+    import boulder_sweep
+    from boulder_sweep.judge.evaluation import by_kernels
+    from boulder_sweep.runner.sweeper import run
+
+    simulated: list[int] = []  # appending from several threads at once loses nothing
+
+    def simulate(table: Any, *others: Any) -> Any:
+        if threading.current_thread().name != PREPARING:
+            simulated.append(len(table.L))
+        return by_kernels(table, *others)
+
+    with tempfile.TemporaryDirectory(prefix="sweep-gate-") as name:
+        file = Path(name, "gate.yaml")
+        file.write_text(settings_of(RUN_ROWS))
+        run(boulder_sweep.load(file), Path(name, "table"), jobs=2, simulate=simulate)
+    return sum(simulated)
 
 
-PARTS = {"counts": _counts, "time": _time}
+def counts() -> dict[str, int]:
+    """Count everything; calls in a process of its own, with the compiler off.
+
+    Raises
+    ------
+    RuntimeError
+        That process fails.
+    """
+    program = "import json; from benchmarks.gate import calls; print(json.dumps(calls()))"
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=FOLDER.parent, env=environment, capture_output=True, text=True, check=False
+    )
+    if done.returncode != 0:
+        raise RuntimeError(f"counting the calls failed:\n{done.stderr[-2000:]}")
+    return {**json.loads(done.stdout), "designs simulated by a run": designs_of_run()}
+
+
+def complaint(findings: Sequence[Finding]) -> str:
+    """Return a message about what does not pass and what to do; empty if everything does."""
+    bad = [str(each).removesuffix("FAILS").strip() for each in findings if not each.passes]
+    if not bad:
+        return ""
+    return (
+        f"benchmark gate: {'; '.join(bad)}. Counts that are meant to change are written into benchmarks/{LIMITS.name} "
+        "from python -m benchmarks.gate --record; where time is lost, python -m benchmarks.kernel shows. Say in the "
+        "commit why."
+    )
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.gate", description=__doc__)
-    parser.add_argument("--timed", action="store_true", help="instead, time what only a quiet machine can tell")
-    parser.add_argument("--only", nargs="+", choices=[*PARTS, *timed.PARTS], help="only these parts")
-    parser.add_argument("--times", type=int, default=1, help="how often; each must pass (default %(default)s)")
-    parser.add_argument("--record", action="store_true", help="write the counts of now into the record, and no more")
-    arguments = parser.parse_args()
-    if arguments.record:
-        counts.write(counts.measured())
+    parser.add_argument("--record", action="store_true", help="print the counts of now, and no more")
+    if parser.parse_args().record:
+        print("[counts]", *(f'"{name}" = {count}' for name, count in counts().items()), sep="\n")
         return 0
     print(machine())
-    parts = PARTS | timed.PARTS
-    passed = 0
-    for _ in range(arguments.times):
-        findings: list[Finding] = []
-        for part in arguments.only or (timed.PARTS if arguments.timed else PARTS):
-            found = parts[part]()
-            print(*found, sep="\n", flush=True)
-            findings += found
-        problem = complaint(findings)
-        print(problem, end="\n" if problem else "", file=sys.stderr, flush=True)
-        passed += not problem
-    print(f"passed {passed} of {arguments.times}")
-    return 0 if passed == arguments.times else 1
+    known = limits()
+    record = known["time"]["record"]
+    own = record.get(llvmlite.binding.get_host_cpu_name(), record[ANY_PROCESSOR])
+    findings = compared(counts(), known["counts"], known["largest_change"])
+    findings += within(lanes(), reference_loop(), own, known["time"]["most"])
+    print(*findings, sep="\n")
+    problem = complaint(findings)
+    print(problem, end="\n" if problem else "", file=sys.stderr)
+    return 1 if problem else 0
 
 
 if __name__ == "__main__":

@@ -18,7 +18,6 @@ STYLES: Mapping[str, dict[str, Any]] = {
     "events located": {"color": "#0b5fa5", "marker": "o"},
     "with error estimate": {"color": "#2a9d6f", "marker": "s"},
     "yield located, too": {"color": "#8a5fbf", "marker": "^", "linestyle": "--"},
-    "switches inside": {"color": "#c0392b", "marker": "x"},
 }
 GUIDES = (1, 3, 5)
 """Orders that thin lines show."""
@@ -44,11 +43,11 @@ def plot_steps(points: Sequence[Point], path: Path) -> None:
 
 
 def plot_order(points: Sequence[Point], path: Path) -> None:
-    """Rms error of the rotation over the step, with the events located and with the switches inside."""
+    """Rms error of the rotation over the step, with the events located and with the yield of the soil located, too."""
     presets = list(dict.fromkeys(p.preset for p in points))
     figure, panels = plt.subplots(1, len(presets), figsize=(6.0 * len(presets), 4.6), sharey=True, squeeze=False)
     for panel, preset in zip(panels[0], presets, strict=True):
-        for way in ("events located", "yield located, too", "switches inside"):
+        for way in ("events located", "yield located, too"):
             these = sorted((p for p in points if p.preset == preset and p.way == way), key=lambda p: p.step_ms)
             panel.loglog(
                 [p.step_ms for p in these],

@@ -18,7 +18,6 @@ from .accuracy import control, reference_of
 from .designs import DESIGNS, sample
 from .points import Peaks, point_of
 from .report import Table, significant
-from .sweep import peak_scaling
 from .timing import machine, versions
 
 REPEATS = 12
@@ -75,7 +74,6 @@ def measure(rounds: int = ROUNDS) -> Table:
                 *(f"{one:,.0f}", f"{two:,.0f}", f"{two / one:.2f}"),
             ]
         )
-    table.notes.append(f"Two threads of multiply-adds only: {peak_scaling(2):.2f} times the rate of one.")
     return table
 
 

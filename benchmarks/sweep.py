@@ -12,7 +12,6 @@ import os
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,7 +19,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .designs import API, API_ANGLES
-from .peak import PeakLoop
 from .report import Table
 from .timing import machine, versions
 
@@ -149,23 +147,6 @@ def on_core(core: int | None) -> Iterator[None]:
         os.sched_setaffinity(0, before)
 
 
-def peak_scaling(threads: int) -> float:
-    """Rate of several threads of multiply-adds only, over that of one: the limit of the machine."""
-    peak = PeakLoop()
-
-    def rate(count: int) -> float:
-        workers = [threading.Thread(target=lambda: [peak() for _ in range(30)]) for _ in range(count)]
-        begun = time.monotonic()
-        for worker in workers:
-            worker.start()
-        for worker in workers:
-            worker.join()
-        return count / (time.monotonic() - begun)
-
-    peak()
-    return rate(threads) / rate(1)
-
-
 def throughput(sizes: tuple[int, ...], folder: Path) -> Table:
     """Sweeps of several sizes at two accuracies."""
     table = Table(
@@ -243,7 +224,6 @@ def scaling(folder: Path, rows: int = SCALING_ROWS) -> Table:
             f"{2 * one.computing_s / slower:.2f}",
             f"{2 * one.wall_s / max(run.wall_s for run in apart):.2f}",
         ],
-        ["loop of multiply-adds in two threads: the machine's own limit", "", "", f"{peak_scaling(2):.2f}", ""],
     ]
     return table
 

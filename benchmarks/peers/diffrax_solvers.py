@@ -50,7 +50,7 @@ def _soil(x_b: Any, v_b: Any, omega: Any, sin: Any, versin: Any, c: Constants) -
 
 
 def _rates(t: Any, state: Any, c: Constants) -> Any:
-    """Rate of the six states, switches inside (see `benchmarks.literal`)."""
+    """Rate of the six states, switches inside (see `literal_acceleration`)."""
     x_b, v_b, theta, omega, x_v, v_v = state
     sin = jnp.sin(theta)
     versin = 2.0 * jnp.sin(0.5 * theta) ** 2

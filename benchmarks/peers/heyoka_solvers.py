@@ -52,7 +52,7 @@ def soil_sums(
 
 
 def _motion(c: Constants) -> list[tuple[Any, Any]]:
-    """Equations of motion, switches inside (see `benchmarks.literal`); c holds parameters."""
+    """Equations of motion, switches inside (see `literal_acceleration`); c holds parameters."""
     x_b, v_b, theta, omega, x_v, v_v = names = hy.make_vars("x_b", "v_b", "theta", "omega", "x_v", "v_v")
     zero, one = hy.expression(0.0), hy.expression(1.0)
     sin, cos = hy.sin(theta), hy.cos(theta)

@@ -12,8 +12,7 @@ import numpy as np
 from boulder_kernels import Constants
 from boulder_kernels.dynamics import State
 
-from ..literal import literal_acceleration
-from .problem import READINGS, Problem, Solver
+from .problem import READINGS, Problem, Solver, literal_acceleration
 
 TOLERANCES = tuple(10.0 ** (-0.5 * k) for k in range(4, 19))
 ABSOLUTE = 0.1

@@ -1,11 +1,15 @@
 """The problem that all solvers get, and how their answers are compared.
 
-They get an advantage over the kernels: each design ends at the time at which the kernels stopped, so that no
-solver simulates more than it needs to, and the peak is taken from the states at some output times afterwards, untimed.
+The other solvers get the model as a plain reading of the equations suggests, with its switches inside the right-hand
+side: contact, seat and the direction of the weight's couple are decided in every evaluation. The kernels do not do
+this (see `boulder_kernels.modes`). The others get an advantage over the kernels: each design ends at the time at which
+the kernels stopped, so that no solver simulates more than it needs to, and the peak is taken from the states at some
+output times afterwards, untimed.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -13,12 +17,21 @@ import numba
 import numpy as np
 
 import boulder_kernels as bk
-from boulder_kernels import Constants, DesignTable
+from boulder_kernels import Constants, DesignTable, Readings
 from boulder_kernels.design import constants_of, design_at
-from boulder_kernels.dynamics import State
+from boulder_kernels.dynamics import (
+    Acceleration,
+    State,
+    contact_displacement,
+    contact_lever,
+    holding_moment,
+    spring_compression,
+)
+from boulder_kernels.numerics import sine_versine
+from boulder_kernels.soil import soil_kinematics
+from boulder_kernels.soil_laws import soil_reaction
 
 from ..designs import HORIZON, ROTATION_LIMIT, first
-from ..literal import literal_acceleration
 
 READINGS = bk.corrected()
 OUTPUTS = 65
@@ -26,6 +39,56 @@ OUTPUTS = 65
 REFERENCE_STEP_S = 5e-5
 
 _compiled = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+
+
+@_compiled
+def printed_restoring_moment(
+    M: float, theta_b: float, omega_b: float, sin: float, versin: float, c: Constants
+) -> float:
+    """Restoring moment M_R exactly as printed [N m] (Eqs 37-39), with its switches inside.
+
+    Parameters
+    ----------
+    M
+        Net moment of soil and truck [N m].
+    theta_b, omega_b
+        Rotation [rad] and angular velocity [rad/s].
+    sin, versin
+        sin(theta_b) and 1 - cos(theta_b).
+    c
+        Constants of a design whose restoring moment is read as printed.
+    """
+    if omega_b <= 0.0:
+        return 0.0
+    limit = holding_moment(sin, versin, c)
+    corner = math.copysign(1.0, c.theta_corner - theta_b)
+    return -corner * min(max(M, -limit), limit)
+
+
+@_compiled
+def literal_net_moment(
+    M: float, theta_b: float, omega_b: float, sin: float, versin: float, readings: Readings, c: Constants
+) -> float:
+    """Moment of soil, truck and weight [N m] (Eqs 37-39, or the couple of the weight)."""
+    if not readings.restoring_gravity:
+        return M + printed_restoring_moment(M, theta_b, omega_b, sin, versin, c)
+    if theta_b == 0.0 and omega_b == 0.0:
+        return M - min(max(M, -c.C_cos), c.C_cos)
+    direction = math.copysign(1.0, theta_b if theta_b != 0.0 else omega_b)
+    return M - direction * (c.C_cos - c.C_cos * versin + c.C_sin * abs(sin))
+
+
+@_compiled
+def literal_acceleration(y: State, readings: Readings, c: Constants) -> Acceleration:
+    """Right-hand side of Eq 52 with every switch inside."""
+    sin, versin = sine_versine(y.theta_b)
+    soil = soil_reaction(soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c), c)
+    u = spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c)
+    F_v = c.k_v * max(u, 0.0)
+    M = soil.M + F_v * contact_lever(sin, versin, c)
+    net = literal_net_moment(M, y.theta_b, y.omega_b, sin, versin, readings, c)
+    pressed = max(u, 0.0) if readings.separation_released else u
+    return Acceleration((soil.F + F_v) * c.inverse_m_eff, net * c.inverse_J_eff, -c.k_m * pressed, M)
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,7 @@ from boulder_kernels.design import design_at, element_depth
 from boulder_kernels.dynamics import State, contact_displacement, contact_lever, spring_compression
 
 from ..designs import HORIZON, ROTATION_LIMIT
-from ..literal import literal_acceleration, literal_net_moment
-from .problem import READINGS, Problem, Solver
+from .problem import READINGS, Problem, Solver, literal_acceleration, literal_net_moment
 
 ELEMENTS = 5000
 TOLERANCES = tuple(10.0 ** (-0.5 * k) for k in range(4, 19))

@@ -249,7 +249,7 @@ def _inconsistencies(settings: dict[str, Any]) -> Iterator[str]:
         if len({*order}) < len(order) or not along.keys() >= {*order}:
             yield "order names what has no values, or one input twice"
         elif math.prod(along[name] for name in order) != count:
-            yield f"n_designs is {count:,}, and the values are those of {math.prod(along[name] for name in order):,}"
+            yield f"n_designs is {count:,}, but the values make {math.prod(along[name] for name in order):,} designs"
         expected = {name: sets.get(BY_NAME[name].section) for name in lengths if name not in order}
     for name, length in expected.items():
         if (lengths | sets)[name] != length:

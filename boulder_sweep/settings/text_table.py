@@ -85,8 +85,9 @@ class TextTable:
         if len(names) > MAX_COLUMNS:
             raise refuse(label, f"has {len(names):,} columns; at most {MAX_COLUMNS:,} are read")
         if all(_is_number(name) for name in names if name):
-            sample = (delimiter or ", ").join(known[: max(2, len(names))])
-            words = f"such as {sample}; known names are {', '.join(known)}"
+            sample = (", " if delimiter in ("", "\t") else delimiter).join(known[: max(2, len(names))])
+            tabs = " (with tabs between them)" if delimiter == "\t" else ""
+            words = f"such as {sample}{tabs}; known names are {', '.join(known)}"
             raise refuse(label, f"the first line holds numbers; write a line of names above it, {words}", header[1], 1)
         self._first = int(names[0] in INDEX_NAMES)
         self.names = names[self._first :]
@@ -275,8 +276,8 @@ def open_text(path: Location, most_lines: int, known: Sequence[str], problems: P
             lines = _Lines(stream, label, most_lines)
             try:
                 yield _table_of(lines, known, problems)
-            except csv.Error as error:
-                message = f"cannot be read as CSV ({error}); is a quotation mark not closed?"
+            except csv.Error:
+                message = "cannot be read as CSV; is a quotation mark not closed, or does text follow a closed one?"
                 raise refuse(label, message, lines.begun, 1) from None
     except UnicodeDecodeError:
         raise refuse(label, "is not UTF-8 text; save it as CSV in UTF-8") from None

@@ -280,8 +280,8 @@ class FinishedRows:
                 source = pa.BufferReader(content)
             opened = TableFile(source, _MOST_PART_ROWS, _MOST_PART_BYTES)
             if set(opened.schema.names) != set(self.columns):
-                raise self._damaged({name: "its columns are not those of the manifest"})
-            schema = self._schemas.setdefault("of all parts", opened.schema)  # one step, as of threads
+                raise self._damaged({name: "the manifest lists other columns"})
+            schema = self._schemas.setdefault("of all parts", opened.schema)  # one step: several threads read
             if opened.rows != part.rows or not opened.schema.equals(schema):
                 raise self._damaged({name: "other rows or columns than recorded"})
             table = opened.read(columns)

@@ -17,7 +17,6 @@ from docs.studies import (
     free_region,
     gallery,
     moves,
-    scale,
     shapes,
     site_data,
     soil,
@@ -231,12 +230,6 @@ def _wild_families(root: Path) -> str:
 
 
 CONTENTS: dict[str, Callable[[Path], str]] = {
-    "scale-constants": lambda _: scale.constants_table(),
-    "scale-plan": lambda _: scale.plan_table(),
-    "scale-workers": lambda _: scale.workers_table(),
-    "scale-prices": lambda _: scale.price_table(),
-    "scale-limits": lambda _: scale.limits_words(),
-    "scale-questions": scale.questions_table,
     "validation-table": _validation_table,
     "statements": _statements,
     "rigid-wall": _rigid_wall,

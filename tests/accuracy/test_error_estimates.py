@@ -22,7 +22,7 @@ GRID = Path(__file__).parents[2] / "configs" / "m30_sizing.yaml"
 
 
 def test_estimates_cover_99_per_cent_and_no_verdict_is_wrong() -> None:
-    """A small edition of ``python -m benchmarks.coverage``."""
+    """A small edition of the table in the documentation."""
     for found in coverages({"random": random_table(1500, 21), "grid": grid_table(GRID, 1000)}):
         assert found.is_enough, found
         assert found.flips == 0, found

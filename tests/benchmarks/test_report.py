@@ -8,8 +8,7 @@ from benchmarks.report import README, Table, as_json, from_json, significant, wr
 
 TABLE = Table("speed", "Speed", "on a machine", ["what", "figure"], [["lanes", "1 us"]], ["a note"])
 TABLES = (
-    *("kernel", "rates", "accuracy-corrected", "accuracy-as_printed", "named", "single-precision"),
-    *("sweep", "start", "scaling", "answers", "peers"),
+    *("kernel", "rates", "accuracy-corrected", "accuracy-as_printed", "named", "sweep", "start", "scaling", "peers"),
 )
 
 

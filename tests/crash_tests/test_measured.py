@@ -117,7 +117,7 @@ def test_empty_cells_are_gaps(tmp_path: Path) -> None:
         ("time [ms],x [m]\n0,1\n1,2,3\n", ["3:1: has 3 cells; the first line has 2"]),
         ("time [ms],x [m]\n", ["at least two rows"]),
         ("", ["is empty; the first line must hold the column names"]),
-        ('time [ms],x [m]\n0,1\n1,"2\n3,4\n', ["3:1: cannot be read as CSV", "is a quotation mark not closed?"]),
+        ('time [ms],x [m]\n0,1\n1,"2\n3,4\n', ["3:1: cannot be read as CSV", "is a quotation mark not closed"]),
         (
             "0,0\n0.1,1\n",
             [

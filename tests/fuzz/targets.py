@@ -334,7 +334,8 @@ def scrap(tree: Any, chance: random.Random) -> Any:
     for step in chance.choice(paths(tree)):
         value = value[step] if not isinstance(value, dict) else value.get(step, step)
     if isinstance(value, float | int) and chance.random() < 0.5:
-        return value * chance.choice((-1, 2, 1000, 1e-3, 1e30))
+        with suppress(OverflowError):  # an integer of 400 digits times 1e30
+            return value * chance.choice((-1, 2, 1000, 1e-3, 1e30))
     return [value] * chance.randrange(4) if chance.random() < 0.2 else value
 
 

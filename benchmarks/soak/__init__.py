@@ -1,1 +1,0 @@
-"""Kills, lost and stopped workers by the hundred, and what became of the tables: ``python -m benchmarks.soak``."""
