@@ -151,7 +151,7 @@ def accuracy_lines(accuracy: Mapping[str, Any]) -> list[str]:
     return [line, f"       estimated error {reached}{'' if accuracy['met'] else ': no step does better'}"]
 
 
-def dry_run_lines(sweep: Sweep, out: Location, effort: Estimate) -> list[str]:
+def dry_run_lines(sweep: Sweep, out: Location, effort: Estimate, objection: str) -> list[str]:
     """Return what a run would do, and the time and space it needs."""
     return [
         *grid_lines(sweep),
@@ -162,7 +162,7 @@ def dry_run_lines(sweep: Sweep, out: Location, effort: Estimate) -> list[str]:
         f"about {duration_text(effort.seconds)} with {counted(effort.jobs, 'worker')}, "
         f"{size_text(effort.disk_bytes)} on disk",
         *(f"damaged: {name}: {what}" for name, what in effort.damaged.items()),
-        *(f"does not fit: {objection}" for objection in effort.objections),
+        *([f"does not fit: {objection}"] if objection else []),
     ]
 
 

@@ -21,13 +21,12 @@ import click
 from boulder_sweep.cli.ask import capacity, need, uncertainty
 from boulder_sweep.cli.compare import compare
 from boulder_sweep.cli.output import ready_streams, say
-from boulder_sweep.cli.quality import tradeoff, validate
+from boulder_sweep.cli.quality import fit_vehicle, tradeoff, validate
 from boulder_sweep.cli.run import run
 from boulder_sweep.cli.settings_files import check, new
 from boulder_sweep.cli.share import explore, export, plot, report
 from boulder_sweep.cli.simulate import simulate
 from boulder_sweep.cli.stone import stone
-from boulder_sweep.cli.vehicle_commands import fit_vehicle
 from boulder_sweep.errors import (
     EXIT_INTERNAL,
     EXIT_INTERRUPTED,

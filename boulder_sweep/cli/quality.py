@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import textwrap
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,19 +17,20 @@ import click
 
 from boulder_sweep.cli.options import (
     OUTPUT,
+    Quantity,
     at_option,
-    cluster_options,
     grid_argument,
     json_option,
+    quantity_of,
+    quiet_option,
+    refuse_unwritable,
     set_option,
     take_values,
 )
 from boulder_sweep.cli.output import say, show, working
 
 if TYPE_CHECKING:
-    from rich.table import Table as RichTable
-
-    from boulder_sweep.tradeoff.points import Method
+    from boulder_sweep.crash_tests.fitting import VehicleFit
     from boulder_sweep.tradeoff.study import Tradeoff
 
 TRADEOFF_EXAMPLES = """\b
@@ -57,30 +59,30 @@ Examples:
     metavar="S",
     help="Start no new measurement after this many seconds.",
 )
-@click.option("-q", "--quiet", is_flag=True, help="No progress.")
-@cluster_options
+@quiet_option
 @at_option
 @set_option
 @json_option
 def tradeoff(
     grid: str,
     out: str | None,
+    designs: int,
+    seconds: float,
     quiet: bool,
     at: str | None,
     overrides: tuple[str, ...],
     as_json: bool,
-    **options: Any,
 ) -> int:
     """Simulate a sample of GRID by many methods and compare each with a far finer solution.
 
     The sample holds the corners of the grid and rows spread over all of its axes. Steps, soil in closed form and by
     sums over elements, both readings of the paper: errors, changed verdicts, and CPU time per design. With -o the table
-    is written as Parquet and CSV, and a picture.
+    is written as Parquet, and a picture.
     """
     from boulder_sweep.settings import load
     from boulder_sweep.tradeoff.study import measure
 
-    if math.isnan(options["seconds"]):
+    if math.isnan(seconds):
         raise click.UsageError("--seconds nan: give a number of seconds")
     sweep = take_values(load(grid, overrides), at, quiet)
     if out is not None:
@@ -89,88 +91,44 @@ def tradeoff(
         require_matplotlib()
         make_folder(Path(out))
     with working(quiet, doing="measuring"):
-        result = measure(sweep, **options, progress=None if quiet else say)
-    files = [] if out is None else result.write(out)
+        result = measure(sweep, designs=designs, seconds=seconds)
+    files = [] if out is None else result.write(Path(out))
     if as_json:
-        show(json.dumps({**result.to_dict(), "files": [str(file) for file in files]}))
+        rows = [point.to_dict() for point in result.points]
+        record = {"name": sweep.name, "designs": sweep.n_designs, "reference_error_deg": result.reference_deg}
+        show(json.dumps({**record, "points": rows, "left_out": result.left_out, "files": [*map(str, files)]}))
         return 0
-    if result.points:
-        _show(result)
-    for sentence in result.recommendation():
-        show(*textwrap.wrap(sentence, 80))
+    lines = [*_rows(result), *(f"written  {file}" for file in files)]
     if result.left_out:
-        ways = len(result.points) + len(result.left_out)
-        show(f"left out for time: {len(result.left_out)} of {ways} methods (--json lists them)")
-    for file in files:
-        show(f"written  {file}")
+        lines.append(f"left out for time: {result.left_out} of {len(result.points) + result.left_out} methods")
+    show(*lines)
     return 0
 
 
-def _show(result: Tradeoff) -> None:
-    """Print the table: all of it where the terminal is wide enough, else the columns that matter most."""
-    from rich.console import Console
+def _rows(result: Tradeoff) -> Iterator[str]:
+    """Yield a line for every method, under a heading for each way of simulating."""
+    from boulder_sweep.tradeoff.study import REFERENCE_STEP_MS
 
-    wide = Console(width=1000)
-    width = Console().width
-    table = _table(result, whole=True)
-    whole = wide.measure(table).maximum <= width
-    if not whole:
-        table = _table(result, whole=False)
-    Console(width=max(width, wide.measure(table).maximum)).print(table)
-    show("* none with these readings is both cheaper and more accurate (rotation, 99 %)")
-    if not whole:
-        show("y: yield located; a wider terminal shows more columns, and -o writes all of them")
-    for readings, error in result.reference_deg.items():
-        show(f"{readings}: against steps of {result.reference_step_ms:g} ms, known to {error:.0e} deg")
-    show("")
-
-
-def _table(result: Tradeoff, *, whole: bool) -> RichTable:
-    """Return the methods as a table; not whole, it fits a terminal of 80 columns."""
-    from rich.box import SIMPLE
-    from rich.table import Table as RichTable
-
-    table = RichTable(box=SIMPLE if whole else None, title=None, pad_edge=False, padding=(0, 2 if whole else 1, 0, 0))
-    for name in ("readings", "soil", "step") if whole else ("readings\nand soil", "step\n[ms]"):
-        table.add_column(name, no_wrap=True)
-    heads = ["us per\ndesign", "rotation\nrms [deg]", "\n99 %", "\nmax", "movement\nrms [mm]", "\n99 %", "\nmax"]
-    heads += ["error\ncovered", "verdicts\nflipped", "un-\ndecided", "of\ndesigns"]
-    shown = range(len(heads)) if whole else (0, 2, 3, 5, 7, 8)
-    if not whole:
-        heads[2], heads[5], heads[8] = "rotation\n99 % [deg]", "movement\n99 % [mm]", "\nflips"
-    for k in shown:
-        table.add_column(heads[k], justify="right", no_wrap=True)
-    table.add_column("", no_wrap=True)
-    before = ("", 0, False, False)
+    if result.points:
+        yield "steps [ms]     us per  rotation [deg]    movement  flips  un-"
+        yield "               design  99 %     max      99 % [m]         decided"
+    before = None
     for point in result.points:
         method = point.method
-        group = (method.readings, method.soil_elements, method.error_estimate, method.locate_yield)
-        if group != before and before[0]:
-            table.add_section()
-        words = (method.readings, method.soil) if whole else (method.readings if group != before else "",)
-        if not whole and group != before and method.soil_elements:
-            words = (method.soil,)
+        group = (method.readings, method.soil_elements, method.error_estimate)
+        if group != before:
+            soil = f"sums over {method.soil_elements} elements" if method.soil_elements else "closed form"
+            yield f"{method.readings}, {soil}{', error of every design' if method.error_estimate else ''}"
         before = group
-        metres = (point.displacement_rms_m, point.displacement_p99_m, point.displacement_max_m)
-        cells = [
-            f"{point.cpu_us:.3g}" if point.cpu_us < 1000 else f"{point.cpu_us:,.0f}",
-            *(f"{v:.1e}" for v in (point.rotation_rms_deg, point.rotation_p99_deg, point.rotation_max_deg)),
-            *(f"{1e3 * v:.1e}" for v in metres),
-            f"{point.covered:.2%}" if method.error_estimate else "",
-            str(point.flips),
-            str(point.undecided),
-            f"{point.designs:,}",
-        ]
-        last = point.accuracy + (" *" if point.pareto else "")
-        steps = method.steps if whole else _short(method)
-        table.add_row(*words, steps, *(cells[k] for k in shown), last)
-    return table
-
-
-def _short(method: Method) -> str:
-    """Steps of a method in a narrow column [ms]."""
-    steps = "+".join(f"{step:g}" for step in method.steps_ms)
-    return f"{steps} y" if method.locate_yield else steps
+        cost = f"{point.cpu_us:.3g}" if point.cpu_us < 1000 else f"{point.cpu_us:,.0f}"
+        errors = (point.rotation_p99_deg, point.rotation_max_deg, point.displacement_p99_m)
+        numbers = "  ".join(f"{error:.1e}" for error in errors)
+        last = f"{point.flips:<7}{point.undecided:<9}{'* ' if point.pareto else '  '}{point.accuracy}"
+        yield f"  {method.steps:<13}{cost:<8}{numbers}   {last}".rstrip()
+    if result.points:
+        yield "y: yield located; *: none with these readings is cheaper and more accurate"
+    for readings, error in result.reference_deg.items():
+        yield f"{readings}: against steps of {REFERENCE_STEP_MS:g} ms, known to {error:.0e} deg"
 
 
 VALIDATE_EXAMPLES = """\b
@@ -233,3 +191,80 @@ def validate(out: str | None, measured: str | None, case: str | None, as_json: b
         words = (line for part in text for line in part.split("\n"))
         show(*(part for line in words for part in (textwrap.wrap(line, 80) if line.startswith("note:") else [line])))
     return 0 if validation.holds else 1
+
+
+FIT_EXAMPLES = """\b
+Examples:
+  sweep fit-vehicle docs/examples/rigid_wall_pulse.csv --mass "6800 kg"
+  sweep fit-vehicle pulse.csv --mass "15000 lb" --plot fit.png
+  sweep fit-vehicle pulse.csv --mass "6800 kg" --speed "30 mph"
+
+\b
+The first line of PULSE names what its columns hold, with units:
+  time [ms], displacement [mm], velocity [m/s], acceleration [g]
+One of the three beside time is enough. First touch is fitted; rows before it
+give the zero of an acceleration, which is negative while the vehicle slows
+down: where it is not, name the column deceleration. Empty cells are gaps.
+"""
+
+
+@click.command("fit-vehicle", short_help="Fit spring and damper of a vehicle to a crash pulse.", epilog=FIT_EXAMPLES)
+@click.argument("pulse", type=click.Path())
+@click.option(
+    "--mass", required=True, type=Quantity("kg"), metavar="'6800 kg'", help="Mass of the vehicle, with its unit."
+)
+@click.option(
+    "--speed", type=Quantity("m/s"), metavar="'30 mph'", help="Speed of impact, with its unit [default: fitted too]."
+)
+@click.option("--plot", type=OUTPUT, metavar="F.png", help="Draw pulse, fit and residuals.")
+@json_option
+def fit_vehicle(pulse: str, mass: str, speed: str | None, plot: str | None, as_json: bool) -> int:
+    """Fit spring and damper of a Maxwell element to PULSE, a vehicle's crash against a rigid wall.
+
+    Refused where the record does not determine them, where no vehicle has them, or where the record's own change of
+    speed contradicts --speed.
+    """
+    mass_kg = quantity_of("--mass", mass, "kg")
+    speed_m_s = None if speed is None else quantity_of("--speed", speed, "m/s")
+    from boulder_sweep.crash_tests.fitting import fit_pulse
+    from boulder_sweep.crash_tests.measured import read_pulse
+
+    refuse_unwritable(None, plot)
+    fit = fit_pulse(read_pulse(pulse), mass_kg, speed_m_s=speed_m_s)
+    if plot is not None:
+        fit.plot(plot)
+    for warning in fit.warnings:
+        say(f"caution: {warning}")
+    show(*([json.dumps(fit.to_dict())] if as_json else fit_lines(fit)))
+    return 0
+
+
+def fit_lines(fit: VehicleFit) -> list[str]:
+    """Return the result for people, and the line for a settings file."""
+    wall, offset = fit.wall, fit.offset_m_s2
+    speed = f"{wall.speed_m_s:.3f} m/s"
+    speed += " (given)" if fit.speed_error_m_s is None else f" ± {fit.speed_error_m_s:.3f}"
+    damping = (
+        "over-damped: creeps to a stop" if wall.over_damped else f"under-damped: a = {wall.a:.3f}, b = {wall.b:.3f} 1/s"
+    )
+    rows = [
+        ("spring", f"{wall.spring_N_m / 1e3:.1f} ± {fit.spring_error_N_m / 1e3:.1f} kN/m (95 %)"),
+        ("damper", f"{wall.damper_N_s_m / 1e3:.2f} ± {fit.damper_error_N_s_m / 1e3:.2f} kN*s/m (95 %)"),
+        ("impact speed", speed),
+        ("first touch", f"{round(1e3 * fit.touch_s, 1) + 0.0:.1f} ± {1e3 * fit.touch_error_s:.1f} ms"),
+        ("damping", damping),
+        ("largest crush", f"{wall.max_displacement_m:.3f} m"),
+        ("peak force", f"{wall.peak_force / 1e3:.0f} kN, {wall.peak_force_time_s:.4f} s after first touch"),
+        ("rebound", f"{abs(wall.rebound_speed_m_s):.2f} m/s"),
+    ]
+    if "acceleration" in fit.misfits:
+        known = "not known: no rows before first touch"
+        words = known if offset is None else f"{round(offset, 2) + 0.0:.2f} m/s^2, taken off"
+        rows.append(("zero offset", words))
+    for name, misfit in fit.misfits.items():
+        rows.append((f"misfit of {name}", f"{misfit.share:.1%} of its range (root mean square)"))
+    settings = (
+        f"vehicle: {{mass: {wall.mass_kg:.6g} kg, speed: ...,",
+        f"          spring: {wall.spring_N_m / 1e3:.6g} kN/m, damper: {wall.damper_N_s_m / 1e3:.6g} kN*s/m}}",
+    )
+    return [*(f"{name:<24}{text}" for name, text in rows), "", *settings]

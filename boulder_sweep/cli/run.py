@@ -6,6 +6,7 @@ import json
 import shlex
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -114,14 +115,16 @@ def run(
 def _dry_run(sweep: Sweep, out: Location, options: dict[str, Any], as_json: bool) -> int:
     """Show what a run would do."""
     from boulder_sweep.cli import console
+    from boulder_sweep.runner.estimate import too_large
     from boulder_sweep.runner.sweeper import estimate
 
     effort = estimate(sweep, out, jobs=options["jobs"], resume=options["resume"])
+    objection = too_large(effort.rows, "about", effort.disk_bytes, out)
     if as_json:
-        record = {"settings": sweep.resolved(), "out": str(out), "estimate": effort.to_dict()}
-        show(json.dumps(record | {"objections": effort.objections}))
+        record = {"settings": sweep.resolved(), "out": str(out), "estimate": asdict(effort)}
+        show(json.dumps(record | {"objection": objection}))
     else:
-        show(*console.dry_run_lines(sweep, out, effort))
+        show(*console.dry_run_lines(sweep, out, effort, objection))
     return 0
 
 

@@ -27,9 +27,6 @@ Exportable = FinishedRows | AnswerFile
 KINDS = (".xlsx", ".csv", ".parquet")
 MOST_SHEET_ROWS = 1_048_575
 """Most rows of a spreadsheet, without the header."""
-JUDGED_BY = Shown(
-    "judged_by", "judged_by", "", 1.0, "by whose rules the verdict was found; a column of tables of other versions only"
-)
 PIECE = 10_000
 """Rows that become cells at once."""
 LEAST_WIDTH, ABOUT_WIDTHS = 14, {"A": 44, "B": 12, "C": 90}
@@ -128,9 +125,14 @@ def _tables(finished: Exportable, units: str) -> Iterator[tuple[list[Shown], pa.
 
     for table in finished.tables():
         if finished.judged_by:
-            table = table.append_column(JUDGED_BY.stored, pa.array([finished.judged_by] * len(table)))
+            told = {
+                "unit": "",
+                "meaning": "by whose rules the verdict was found; a column of tables of other rules only",
+            }
+            whole = pa.array([finished.judged_by] * len(table))
+            table = table.append_column(pa.field("judged_by", pa.string(), metadata=told), whole)
         table = _with_quantities(table, finished.identity["settings"])
-        columns = [JUDGED_BY if field.name == JUDGED_BY.stored else _shown(field, units) for field in table.schema]
+        columns = [_shown(field, units) for field in table.schema]
         for index, column in enumerate(columns):
             if column.size != 1.0:
                 values = pc.divide(table.column(index), column.size)

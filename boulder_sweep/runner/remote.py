@@ -16,8 +16,7 @@ from boulder_sweep.errors import BackendError, BoulderSweepError
 from boulder_sweep.locations import location_of
 from boulder_sweep.runner.cluster import Cluster, Fingerprint, fingerprint, other_versions_text
 from boulder_sweep.runner.dispatch import Dispatcher, Task
-from boulder_sweep.runner.estimate import blocks
-from boulder_sweep.runner.workers import Computation, Computed, Note, Workers, failed_rows
+from boulder_sweep.runner.workers import Computation, Computed, Note, Workers, blocks, failed_rows
 from boulder_sweep.store.files import LOCK_NAME
 from boulder_sweep.store.manifest import parts_of
 from boulder_sweep.store.storage import storage_of

@@ -21,19 +21,25 @@ from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.firmness import firmness_of
 from boulder_sweep.locations import Location
 from boulder_sweep.parquet import ParquetError, TableFile
-from boulder_sweep.runner.estimate import (
-    Estimate,
-    blocks,
-    estimated,
-    rows_in_progress,
-    rows_per_task,
-    take_sample,
-    tasks,
-)
+from boulder_sweep.runner.estimate import RowCost, take_sample, time_and_disk, too_large
 from boulder_sweep.runner.interruption import Signals
 from boulder_sweep.runner.pool import DASK, telling_start_failure
 from boulder_sweep.runner.summary import Progress, progress_of
-from boulder_sweep.runner.workers import Computation, Computed, Ended, InOrder, Message, Note, ThreadWorkers, Workers
+from boulder_sweep.runner.workers import (
+    Computation,
+    Computed,
+    Ended,
+    InOrder,
+    Message,
+    Note,
+    ThreadWorkers,
+    Workers,
+    blocks,
+    rows_in_progress,
+    rows_per_block,
+    rows_per_task,
+    tasks,
+)
 from boulder_sweep.store.failures import DamagedError, DoesNotFitError
 from boulder_sweep.store.manifest import Manifest
 from boulder_sweep.store.provenance import cpu_name, file_metadata
@@ -187,7 +193,7 @@ class Run:
         self._rows_before = folder.manifest.rows_done
         self.jobs = 1
         self._cluster: Cluster | None = None
-        self._estimate: Estimate | None = None
+        self._cost: RowCost | None = None
         others = {session.cpu for session in folder.manifest.sessions} - {cpu_name()}
         if self._rows_before and others:
             self.notes.append(f"earlier rows were computed on another processor ({', '.join(sorted(others))})")
@@ -211,9 +217,11 @@ class Run:
             identity, command = self._folder.manifest.identity, repeat_command(self._sweep)
             self._metadata = file_metadata(identity, command, self.firmness)
             if self._rows_before < self._sweep.n_designs:
-                self._estimate = self._signals.call(self._estimated)
-                if self._estimate.objections:
-                    raise DoesNotFitError("; ".join(self._estimate.objections))
+                self._cost = self._signals.call(self._sampled)
+                rows, out = self._sweep.n_designs, self._folder.path
+                needed = time_and_disk(self._cost, self._missing, self.jobs, self.manifest.rows_per_part)
+                if said := too_large(rows, "about", needed[1], out):
+                    raise DoesNotFitError(said)
         except BaseException:
             self._discard()
             raise
@@ -272,26 +280,24 @@ class Run:
         else:
             self._signals.attempt(self._folder.discard, hurry=True)
 
-    def _estimated(self) -> Estimate:
-        """Estimate what the missing rows need, from a sample."""
+    @property
+    def _missing(self) -> int:
+        """Rows to compute."""
+        return self._sweep.n_designs - self._rows_before
+
+    def _sampled(self) -> RowCost:
+        """Measure what a row costs."""
         self._evaluation.warm_up()
-        rows = self._sweep.n_designs
-        return estimated(
-            take_sample(self._evaluation, self._sweep, self._metadata),
-            rows=rows,
-            rows_to_compute=rows - self._rows_before,
-            jobs=self.jobs,
-            out=self._folder.path,
-            rows_per_part=self._folder.manifest.rows_per_part,
-        )
+        return take_sample(self._evaluation, self._sweep, self._metadata)
 
     def _workers(self, computation: Computation, commit_every_s: float) -> Workers:
         """Return the workers for the missing rows."""
-        if self._estimate is None:  # no row is missing
+        if self._cost is None:  # no row is missing
             return Workers()
-        manifest, size = self._folder.manifest, self._estimate.rows_per_block
+        manifest, each = self._folder.manifest, (self._cost.seconds_per_row, self._missing, self.jobs)
+        size = rows_per_block(*each)
         if self._cluster is not None:
-            rows = rows_per_task(self._estimate, manifest.rows_per_part)
+            rows = rows_per_task(*each, manifest.rows_per_part)
             from boulder_sweep.runner.remote import ClusterWorkers
 
             return ClusterWorkers(self._cluster, computation, tasks(manifest.missing(), rows), size, self._folder)

@@ -19,20 +19,19 @@ from boulder_sweep.judge.evaluation import Simulate, by_kernels, evaluation_of
 from boulder_sweep.judge.firmness import firmness_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import RemotePath, location_of
-from boulder_sweep.runner.estimate import Estimate, estimated, refuse_hopeless, take_sample
+from boulder_sweep.runner.estimate import Estimate, take_sample, time_and_disk, too_large
 from boulder_sweep.runner.interruption import noted_signals
 from boulder_sweep.runner.pool import available_cores, check_backend, check_count, check_jobs, telling_start_failure
 from boulder_sweep.runner.running import FINISHED, Report, Run, repeat_command
 from boulder_sweep.runner.running import resume_command as default_resume_command
 from boulder_sweep.runner.summary import Progress, Summary, summary_of
 from boulder_sweep.runner.workers import COMMIT_EVERY_S
-from boulder_sweep.store.failures import NotASweepError
+from boulder_sweep.store.failures import DoesNotFitError, NotASweepError
 from boulder_sweep.store.manifest import Manifest
-from boulder_sweep.store.opening import ClaimedFolder, claim_output, refuse_other_settings
 from boulder_sweep.store.provenance import file_metadata, identity, new_session
 from boulder_sweep.store.storage import storage_of
 from boulder_sweep.store.verify import load_checked
-from boulder_sweep.store.writer import ROWS_PER_PART
+from boulder_sweep.store.writer import ROWS_PER_PART, ClaimedFolder, claim_output, refuse_other_settings
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
@@ -134,7 +133,8 @@ def run(
 
         try:
             with telling_start_failure(jobs):
-                refuse_hopeless(sweep, sweep.n_designs - claimed.rows_done, out)
+                if said := too_large(sweep.n_designs, "at least", sweep.n_designs - claimed.rows_done, out):
+                    raise DoesNotFitError(said)  # a row takes a byte or more; nothing is compiled or computed yet
                 accuracy = signals.call(lambda: accuracy_of(sweep))
                 evaluation = evaluation_of(sweep, accuracy, simulate)
                 manifest = Manifest(
@@ -192,7 +192,7 @@ def estimate(
     Returns
     -------
     Estimate
-        Rows, time and disk; `Estimate.objections` lists what does not fit.
+        Rows, time and disk.
 
     Raises
     ------
@@ -215,16 +215,11 @@ def estimate(
             refuse_other_settings(there, described, sweep.n_designs, folder)
     evaluation.warm_up()
     metadata = file_metadata(described, repeat_command(sweep), firmness_of(sweep).to_dict())
-    return estimated(
-        take_sample(evaluation, sweep, metadata),
-        rows=sweep.n_designs,
-        rows_to_compute=sweep.n_designs - there.rows_done,
-        jobs=jobs or available_cores(),
-        out=folder,
-        rows_per_part=there.rows_per_part,
-        cores=available_cores(),
-        damaged=damaged,
-    )
+    missing, cores = sweep.n_designs - there.rows_done, available_cores()
+    jobs = jobs or cores
+    cost = take_sample(evaluation, sweep, metadata)
+    needed = time_and_disk(cost, missing, min(jobs, cores), there.rows_per_part)
+    return Estimate(sweep.n_designs, missing, *needed, jobs, damaged)
 
 
 def _check_arguments(

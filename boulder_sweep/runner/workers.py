@@ -32,9 +32,56 @@ Evaluate = Callable[["DesignBlock"], Judged]
 Item = TypeVar("Item")
 COMMIT_EVERY_S = 5.0
 """How often a part is written before it is complete, so that a slow run shows progress and loses little [s]."""
+LARGEST_BLOCK = 32_768
+"""Rows; larger blocks gain nothing and use more memory."""
+BLOCK_S = 0.2
+"""Work of one block [s]: so long that its few rows that need finer steps fill lanes, and short enough for Ctrl-C to act
+at once."""
+TASK_S = 2.0
+"""Work of one task of a cluster [s]: long compared with scheduling it, short enough to lose little with a worker."""
 _TRIES = 2
 _FAILURES_BUDGET = 5_000
 """Failed tries after which a run stops: something is then wrong with more than single designs."""
+
+
+def rows_per_block(seconds_per_row: float, rows: int, jobs: int) -> int:
+    """Return the rows per block: enough work each, and enough blocks for every worker."""
+    by_time = int(BLOCK_S / max(seconds_per_row, 1e-9))
+    by_share = -(-rows // (4 * jobs))
+    return max(1, min(by_time, by_share, LARGEST_BLOCK))
+
+
+def rows_per_task(seconds_per_row: float, rows: int, jobs: int, rows_per_part: int) -> int:
+    """Return the rows of a task of a cluster: some whole parts, or less than a part where rows take long."""
+    by_time = int(TASK_S / max(seconds_per_row, 1e-9))
+    by_share = -(-rows // (4 * jobs))
+    rows = max(1, min(by_time, by_share))
+    return rows - rows % rows_per_part if rows > rows_per_part else rows
+
+
+def rows_in_progress(block: int, jobs: int, rows_per_part: int) -> int:
+    """Return the limit of rows in progress: two parts being filled, and blocks to keep workers busy."""
+    return 2 * rows_per_part + 4 * jobs * block
+
+
+def blocks(ranges: Iterator[tuple[int, int]], size: int) -> Iterator[tuple[int, int]]:
+    """Cut ranges of rows [start, stop) into blocks of a size or less, lazily."""
+    for start, stop in ranges:
+        for first in range(start, stop, size):
+            yield first, min(first + size, stop)
+
+
+def tasks(ranges: Iterator[tuple[int, int]], size: int) -> Iterator[tuple[int, int]]:
+    """Join neighbouring ranges of rows [start, stop) up to a size, and cut those that are longer, lazily."""
+    first = last = -1
+    for start, stop in blocks(ranges, size):
+        if start != last or stop - first > size:
+            if last > first:
+                yield first, last
+            first = start
+        last = stop
+    if last > first:
+        yield first, last
 
 
 class Computation:

@@ -9,189 +9,125 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from boulder_kernels import OutcomeTable, Readings, as_printed, corrected
+from boulder_kernels import OutcomeTable, Readings, Status, as_printed, corrected
 from boulder_kernels._jit import plain
+from boulder_kernels.control import STEP_RATIO
 from boulder_kernels.settling import proof_is_possible
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import NothingToMeasureError
-from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED, Accuracy, Steps, readings_of
+from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST, STEPS, STEPS_PRINTED, Accuracy, Steps, readings_of, simulated
 from boulder_sweep.judge.evaluation import evaluation_of
-from boulder_sweep.judge.inputs import sampled_designs
+from boulder_sweep.judge.inputs import Designs, sampled_designs
+from boulder_sweep.judge.judged import FAIL, PASS, UNDECIDED
 from boulder_sweep.judge.quantiles import at_values
-from boulder_sweep.runner.pool import THREADING, pool
+from boulder_sweep.judge.verdict import Limits, judge
 from boulder_sweep.store.files import replacing
-from boulder_sweep.tradeoff.points import Method, Point, SampledDesigns, mark_front
 
 if TYPE_CHECKING:
-    import pyarrow as pa
-
     from boulder_sweep.settings import Sweep
 
-DESIGNS = 4096
-"""Designs of the sample."""
-STEPS_MS = (16.0, 12.0, 8.0, 6.0, 4.0, 3.0, 2.0, 1.0, 0.5)
-STEPS_LOCATED_MS = (8.0, 6.0, 4.0, 3.0, 2.0, 1.0, 0.5)
-STEPS_WITH_ERROR_MS = (18.0, 12.0, 9.0, 6.0, 3.0)
-STEPS_LOCATED_WITH_ERROR_MS = (12.0, 9.0, 6.0, 4.5, 3.0, 1.5, 0.75)
-"""With an error estimate the longer steps of the two solutions [ms]."""
-STEPS_OF_SUMS_MS = (12.0, 4.0, 2.0)
-ELEMENTS = (50, 200, 1000, 5000)
-REFERENCE_STEP_S = 5e-5
-SECONDS = 60.0
-TARGETS_DEG = (0.1, 0.01, 1e-3, 1e-4, 1e-5)
+DESIGNS, SECONDS = 4096, 60.0
+"""Designs of the sample, and time after which no new measurement is started [s]."""
+STEPS_MS = (
+    (False, False, (16.0, 12.0, 8.0, 6.0, 4.0, 3.0, 2.0, 1.0, 0.5)),
+    (True, False, (8.0, 6.0, 4.0, 3.0, 2.0, 1.0, 0.5)),
+    (False, True, (18.0, 12.0, 9.0, 6.0, 3.0)),
+    (True, True, (12.0, 9.0, 6.0, 4.5, 3.0, 1.5, 0.75)),
+)
+"""Whether the yield is located, whether errors are estimated, and steps, then the longer of two solutions [ms]."""
+ELEMENTS, STEPS_OF_SUMS_MS = (50, 200, 1000, 5000), (12.0, 4.0, 2.0)
+FEWEST_DESIGNS = 64
+"""Smallest number of designs for sums over elements, which cost up to a thousand times as much."""
+REFERENCE_STEP_MS = 0.05
+_SHORTEST_TIMING_S = 0.05
+
+
+class Method(NamedTuple):
+    """How designs are simulated."""
+
+    readings: str
+    """``corrected``, ``as_printed``, or ``mixed``: the readings of the file."""
+    soil_elements: int
+    """N; 0 for the closed form."""
+    step_ms: float
+    locate_yield: bool
+    """Whether steps end where the soil yields."""
+    error_estimate: bool
+    """Whether a solution by a third of the step is reported, with an error that a second solution gives or confirms."""
+    checked: bool = False
+    """Whether only doubtful designs have a second solution, as by a named accuracy; else all have one, by the step."""
+
+    @property
+    def steps(self) -> str:
+        """Steps of the solutions that every design has [ms], and ``y`` where the yield is located."""
+        finer = self.step_ms / STEP_RATIO
+        steps = ((finer,) if self.checked else (self.step_ms, finer)) if self.error_estimate else (self.step_ms,)
+        return "+".join(f"{step:g}" for step in steps) + (" y" if self.locate_yield else "")
+
+
+@dataclass
+class Point:
+    """Cost and accuracy of one method, measured on some designs."""
+
+    method: Method
+    accuracy: str
+    """Named accuracy that uses this method; empty where none does."""
+    designs: int
+    cpu_us: float
+    """CPU time per design, one core [us]."""
+    rotation_p99_deg: float
+    rotation_max_deg: float
+    """Error of the largest rotation, over the designs that neither solution stopped at the limit [deg]."""
+    displacement_p99_m: float
+    displacement_max_m: float
+    """Error of the largest displacement of boulder or truck, over the designs that both or neither stopped [m]."""
+    flips: int
+    """Designs that pass by one solution and fail by the other."""
+    undecided: int
+    estimated_p99_9_deg: float | None
+    """99.9 % quantile of the estimated errors of the rotation, which asks for these steps [deg]; None: not known."""
+    pareto: bool = False
+    """Whether no other method with these readings is both cheaper and more accurate (rotation, 99 %)."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return one row of the table."""
+        values = asdict(self)
+        return {**values.pop("method")._asdict(), **values}
 
 
 @dataclass(frozen=True)
 class Tradeoff:
-    """What was measured.
-
-    Parameters
-    ----------
-    sweep
-        The sweep.
-    points
-        Every method, in the order they were measured.
-    reference_deg
-        Largest difference between the reference solution and one with twice its step [deg], by readings.
-    left_out
-        Ways for which the time did not suffice.
-    """
+    """What was measured."""
 
     sweep: Sweep
     points: tuple[Point, ...]
     reference_deg: dict[str, float]
-    left_out: tuple[Method, ...]
+    """Largest difference between the reference solution and one with twice its step [deg], by readings."""
+    left_out: int
+    """How many methods there was no time for."""
 
-    reference_step_ms = 1e3 * REFERENCE_STEP_S
-
-    @property
-    def own_readings(self) -> str:
-        """Readings of the sweep itself."""
-        return self.sweep.model.preset
-
-    def best(self, wanted_deg: float, *, error_estimate: bool) -> Point | None:
-        """Return the cheapest method with the readings of the sweep whose largest error keeps to an angle [deg].
-
-        Parameters
-        ----------
-        wanted_deg
-            The angle.
-        error_estimate
-            Whether to choose among methods that estimate the error of every design, or among plain steps.
-        """
-        fit = [
-            point
-            for point in self._points_of_sweep()
-            if (point.can_be_asked_for if error_estimate else point.method.is_plain)
-            and point.rotation_max_deg <= wanted_deg
-            and not point.flips
-        ]
-        return min(fit, key=lambda point: point.cpu_us, default=None)
-
-    def recommendation(self) -> list[str]:
-        """Return what to use for which accuracy on this grid, and what it costs, in sentences."""
-        if not self.points:
-            return ["Nothing was measured: the time limit was too short."]
-        asked = self.sweep.solver.accuracy
-        targets = (asked, *TARGETS_DEG) if isinstance(asked, float) else TARGETS_DEG
-        by_words: dict[str, list[str]] = {}
-        for target in dict.fromkeys(targets):
-            by_words.setdefault(self._advice(target), []).append(f"{target:g}")
-        sentences = [f"For {' or '.join(values)} deg {advice}." for advice, values in by_words.items()]
-        best = (self.best(target, error_estimate=True) for target in targets)
-        if any(point is not None and not point.accuracy for point in best):
-            sentences.append(
-                "An accuracy given as a number bounds the estimated errors, which are larger than the true ones."
-            )
-        sums = [p for p in self._points_of_sweep() if p.method.soil_elements == max(ELEMENTS)]
-        closed = {p.method.step_ms: p.cpu_us for p in self._points_of_sweep() if p.method.is_plain}
-        if sums:
-            ratio = sums[0].cpu_us / closed[sums[0].method.step_ms]
-            sentences.append(
-                f"Sums over {max(ELEMENTS)} soil elements cost {ratio:,.0f} times the closed form, which is their "
-                f"limit, and are {min(p.rotation_max_deg for p in sums):.1g} deg off it at most: for comparison only."
-            )
-        return sentences
-
-    def _points_of_sweep(self) -> Iterator[Point]:
-        """Yield the points with the readings of the sweep."""
-        return (point for point in self.points if point.method.readings == self.own_readings)
-
-    def _advice(self, wanted_deg: float) -> str:
-        """Say what to use for an accuracy [deg]."""
-        guarded, plain = (self.best(wanted_deg, error_estimate=estimate) for estimate in (True, False))
-        more = ""
-        if plain is not None:
-            more = f"; unconfirmed, solver: {{step: {plain.method.step_ms:g} ms}} takes {plain.cpu_us:.3g} us"
-        if guarded is None:
-            return f"{self._none_guarded(plain)}{more}"
-        ask = guarded.accuracy or f"{_rounded_up(guarded.estimated_p99_9_deg):g} deg"
-        return (
-            f"use solver: {{accuracy: {ask}}} (steps of {guarded.method.steps}): {guarded.cpu_us:.3g} us a design, "
-            f"{_duration(guarded, self.sweep.n_designs)} for this grid on one core, with confirmed errors{more}"
-        )
-
-    def _none_guarded(self, plain: Point | None) -> str:
-        """Say why no method with an error estimate can be named, where `plain` steps suffice or none (None)."""
-        if any(method.error_estimate and method.readings == self.own_readings for method in self.left_out):
-            measured = any(point.method.error_estimate for point in self._points_of_sweep())
-            which = "accurate enough " if measured else ""
-            return f"no method with confirmed errors {which}was measured in the time; allow more --seconds"
-        return "no measured step is short enough" if plain is None else "no step with confirmed errors is short enough"
-
-    def table(self) -> pa.Table:
-        """Return one row for every method."""
+    def write(self, folder: Path) -> list[Path]:
+        """Write table and picture into a folder, and return the files: none where nothing was measured."""
         import pyarrow as pa  # heavy, and the measuring does without it
-
-        return pa.Table.from_pylist([point.to_dict() for point in self.points])
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain data."""
-        return {
-            "name": self.sweep.name,
-            "designs": self.sweep.n_designs,
-            "reference_step_s": REFERENCE_STEP_S,
-            "reference_error_deg": self.reference_deg,
-            "points": [point.to_dict() for point in self.points],
-            "left_out": [method._asdict() for method in self.left_out],
-            "recommendation": self.recommendation(),
-        }
-
-    def write(self, folder: str | Path) -> list[Path]:
-        """Write table and picture into a folder, which is made; return the files: none where nothing was measured."""
-        import pyarrow.csv as pa_csv
         import pyarrow.parquet as pq
 
-        target = Path(folder)
-        draw("pictures", "require_matplotlib")
-        draw("pictures", "make_folder", target)
         if not self.points:
             return []
-        files = [target / f"tradeoff.{kind}" for kind in ("parquet", "csv", "png")]
+        files = [folder / "tradeoff.parquet", folder / "tradeoff.png"]
         with replacing(files[0]) as file:
-            pq.write_table(self.table(), file)
-        with replacing(files[1]) as file:
-            pa_csv.write_csv(self.table(), file)
-        draw("work_precision", "draw_tradeoff", self, files[2])
+            pq.write_table(pa.Table.from_pylist([point.to_dict() for point in self.points]), file)
+        draw("work_precision", "draw_tradeoff", self, files[1])
         return files
 
 
-def measure(
-    sweep: Sweep,
-    *,
-    designs: int = DESIGNS,
-    seconds: float = SECONDS,
-    backend: str = THREADING,
-    scheduler: str | None = None,
-    progress: Callable[[str], None] | None = None,
-) -> Tradeoff:
+def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS) -> Tradeoff:
     """Measure speed against accuracy on a sample of a sweep's designs.
 
     Parameters
@@ -202,11 +138,6 @@ def measure(
         Size of the sample. The sample depends on the sweep alone, and so do the errors; the times do not.
     seconds
         No new measurement is started after this much time [s].
-    backend, scheduler
-        Where to measure: ``threading`` for this machine, or ``dask`` for a worker of a cluster, as for
-        `boulder_sweep.run`.
-    progress
-        Told what is being measured; not by a worker.
 
     Raises
     ------
@@ -215,86 +146,109 @@ def measure(
     """
     begun = time.monotonic()
     sweep = at_values(sweep)
-    if backend != THREADING:
-        with pool(1, backend, scheduler) as workers:
-            return next(workers([(measure, (sweep,), {"designs": designs, "seconds": seconds})]))
-    sample_designs = sampled_designs(sweep, designs)
-    if not sample_designs.size:
+    sample = sampled_designs(sweep, designs)
+    if not sample.size:
         raise NothingToMeasureError(
             f"{sweep.name}: none of the designs can be computed, so there is nothing to measure; "
             "the table of a run says why"
         )
-    evaluation = evaluation_of(sweep, Accuracy("", Steps(REFERENCE_STEP_S), error_estimate=False))
-    limits, control = evaluation.limits, evaluation.control
+    evaluation = evaluation_of(sweep, Accuracy("", Steps(1e-3 * REFERENCE_STEP_MS), error_estimate=False))
     evaluation.warm_up()
-    presets = {"corrected": corrected(), "as_printed": as_printed()}
-    if sweep.model.preset not in presets:
-        presets = {sweep.model.preset: readings_of(sweep), **presets}
-    presets = dict(sorted(presets.items(), key=lambda item: item[0] != sweep.model.preset))
-
     points: list[Point] = []
-    left_out: list[Method] = []
-    references: dict[str, float] = {}
-    for name, readings in presets.items():
-        if time.monotonic() - begun > seconds:
-            left_out += _methods(name, readings)
-            continue
-        sample = SampledDesigns(sample_designs, readings, limits, control)
-        if progress is not None:
-            progress(f"{name}: reference by steps of {1e3 * REFERENCE_STEP_S:g} ms, sample of {sample_designs.size:,}")
-        known, twice = (
-            sample.solve(Method(name, 0, 1e3 * step, locate_yield=True, error_estimate=False))
-            for step in (REFERENCE_STEP_S, 2.0 * REFERENCE_STEP_S)
-        )
-        references[name] = _largest_difference_deg(known, twice)
-        for method in _methods(name, readings):
+    left_out, references = 0, {}
+    for name, readings in {
+        sweep.model.preset: readings_of(sweep),
+        "corrected": corrected(),
+        "as_printed": as_printed(),
+    }.items():
+
+        def solve(some: Designs, method: Method, readings: Readings = readings) -> OutcomeTable:
+            how = evaluation.control._replace(
+                h=1e-3 * method.step_ms,
+                elements=method.soil_elements,
+                error_estimate=method.error_estimate,
+                locate_yield=method.locate_yield,
+                paired=not method.checked,
+            )
+            return simulated(some, readings, how)
+
+        known = None
+        for method, accuracy in _methods(name, readings):
             if time.monotonic() - begun > seconds:
-                left_out.append(method)
+                left_out += 1
                 continue
-            if progress is not None:
-                progress(f"{name}: {method.soil}, {method.steps}")
-            points.append(sample.measured(method, known, _name_of(method, readings)))
+            if known is None:
+                finest = Method(name, 0, REFERENCE_STEP_MS, locate_yield=True, error_estimate=False)
+                known, twice = (solve(sample, finest._replace(step_ms=k * REFERENCE_STEP_MS)) for k in (1, 2))
+                apart = np.abs(known.theta_max - twice.theta_max)
+                references[name] = math.degrees(float(np.nanmax(apart, initial=0.0)))
+            points.append(_measured(solve, sample, evaluation.limits, method, accuracy, known))
     mark_front(points)
-    return Tradeoff(sweep, tuple(points), references, tuple(left_out))
+    return Tradeoff(sweep, tuple(points), references, left_out)
 
 
-def _methods(name: str, readings: Readings) -> Iterator[Method]:
-    """Yield the methods, cheap ones first; named accuracies as they are computed by these readings."""
-    yield from (Method(name, 0, step, False, False) for step in STEPS_MS)
-    yield from (Method(name, 0, step, True, False) for step in STEPS_LOCATED_MS)
-    for located, steps in ((False, STEPS_WITH_ERROR_MS), (True, STEPS_LOCATED_WITH_ERROR_MS)):
+def _methods(name: str, readings: Readings) -> Iterator[tuple[Method, str]]:
+    """Yield the methods, and the named accuracies as they are computed by these readings; cheap ones first."""
+    named = STEPS if readings.restoring_gravity else STEPS_PRINTED
+    for located, estimate, steps in STEPS_MS:
         for step in steps:
-            method = Method(name, 0, step, located, True)
-            checked = bool(_name_of(method, readings)) and plain(proof_is_possible)(readings)
-            yield method._replace(checked=checked)
-    yield from (Method(name, elements, step, False, False) for elements in ELEMENTS for step in STEPS_OF_SUMS_MS)
+            method_steps = Steps(1e-3 * step, located)
+            these = [key for key, of in named.items() if of == method_steps and estimate == (key != "fast")]
+            checked = estimate and bool(these) and plain(proof_is_possible)(readings)
+            yield Method(name, 0, step, located, estimate, checked), "".join(these)
+    yield from ((Method(name, elements, step, False, False), "") for elements in ELEMENTS for step in STEPS_OF_SUMS_MS)
 
 
-def _name_of(method: Method, readings: Readings) -> str:
-    """Name of the accuracy that a method stands for, or nothing."""
-    if method.soil_elements:
-        return ""
-    method_steps = Steps(1e-3 * method.step_ms, method.locate_yield)
-    for name, steps in (STEPS if readings.restoring_gravity else STEPS_PRINTED).items():
-        if steps == method_steps and method.error_estimate == (name != "fast"):
-            return name
-    return ""
+def _measured(
+    solve: Callable[[Designs, Method], OutcomeTable],
+    designs: Designs,
+    limits: Limits,
+    method: Method,
+    accuracy: str,
+    known: OutcomeTable,
+) -> Point:
+    """Simulate designs by one method, long enough to time it, and compare with a far finer solution of all."""
+    wanted = max(FEWEST_DESIGNS, designs.size * ELEMENTS_AS_FAST // max(method.soil_elements, ELEMENTS_AS_FAST))
+    rows = np.unique(np.linspace(0, designs.size - 1, min(wanted, designs.size)).astype(np.int64))
+    designs, ref = designs.rows(rows), type(known)(*(column[rows] for column in known))
+    solve(designs.rows(np.arange(1)), method)  # compiles, and fills the caches
+    spent, best = 0.0, math.inf
+    while spent < _SHORTEST_TIMING_S:
+        begun = time.thread_time()
+        out = solve(designs, method)
+        took = time.thread_time() - begun
+        spent, best = spent + took, min(best, took)
+    both = np.isfinite(out.theta_max) & np.isfinite(ref.theta_max)
+    stopped, stopped_ref = out.status == Status.LIMIT, ref.status == Status.LIMIT
+    standing, alike = both & ~stopped & ~stopped_ref, both & (stopped == stopped_ref)
+    rotation = np.degrees(np.abs(out.theta_max - ref.theta_max))[standing]
+    movement = np.maximum(np.abs(out.x_b_max - ref.x_b_max), np.abs(out.x_v_max - ref.x_v_max))[alike]
+    verdict, truth = (judge(outcome, designs, limits).verdict for outcome in (out, ref))
+    estimated = math.degrees(_quantile(out.theta_error[standing], 0.999)) if method.error_estimate else math.nan
+    return Point(
+        method,
+        accuracy,
+        len(rows),
+        1e6 * best / len(rows),
+        _quantile(rotation, 0.99),
+        _quantile(rotation, 1.0),
+        _quantile(movement, 0.99),
+        _quantile(movement, 1.0),
+        flips=int((np.isin(verdict, (PASS, FAIL)) & np.isin(truth, (PASS, FAIL)) & (verdict != truth)).sum()),
+        undecided=int((verdict == UNDECIDED).sum()),
+        estimated_p99_9_deg=estimated if math.isfinite(estimated) else None,
+    )
 
 
-def _largest_difference_deg(one: OutcomeTable, other: OutcomeTable) -> float:
-    """Largest difference of the rotations of two solutions [deg]."""
-    difference = np.abs(one.theta_max - other.theta_max)
-    return math.degrees(float(np.nanmax(difference, initial=0.0)))
+def _quantile(errors: np.ndarray, share: float) -> float:
+    """Return the quantile of some errors that is one of them; zero where there are none."""
+    return float(np.quantile(errors, share, method="higher")) if errors.size else 0.0
 
 
-def _rounded_up(value: float) -> float:
-    """Round up to one significant digit."""
-    if value <= 0.0:
-        return 1e-9
-    unit = 10.0 ** math.floor(math.log10(value))
-    return math.ceil(value / unit * (1.0 - 1e-12)) * unit
-
-
-def _duration(point: Point, rows: int) -> str:
-    seconds = 1e-6 * point.cpu_us * rows
-    return f"{seconds:.2g} s" if seconds < 100 else f"{seconds / 60:,.0f} min"
+def mark_front(points: Sequence[Point]) -> None:
+    """Mark the points that no other one with the same readings beats in both cost and accuracy."""
+    for point in points:
+        rivals = [p for p in points if p.method.readings == point.method.readings and p is not point]
+        point.pareto = not any(
+            p.cpu_us <= point.cpu_us and p.rotation_p99_deg <= point.rotation_p99_deg for p in rivals
+        )

@@ -10,8 +10,7 @@ from boulder_sweep.views.pictures import AMBER, BLUE, GREEN, GREY, LIGHT_GREY, O
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from boulder_sweep.tradeoff.points import Point
-    from boulder_sweep.tradeoff.study import Tradeoff
+    from boulder_sweep.tradeoff.study import Point, Tradeoff
 
 FIRST_STEP_MS = 16.0
 """Step whose name stands on the other side of its point, off that of the next."""
@@ -39,7 +38,7 @@ def draw_tradeoff(result: Tradeoff, path: str | Path) -> None:
         panels = fig.subplots(1, len(names), sharey=True, squeeze=False)[0]
         for axes, name in zip(panels, names, strict=True):
             _panel(axes, [point for point in result.points if point.method.readings == name])
-            this_file = " (this file)" if name == result.own_readings else ""
+            this_file = " (this file)" if name == result.sweep.model.preset else ""
             axes.set_title(f"{WORDS.get(name, name)}{this_file}")
             axes.set_xlabel("CPU time per design, one core [µs]")
         panels[0].set_ylabel("error of the largest rotation [deg]\n99 % of designs; thin line up to the largest")

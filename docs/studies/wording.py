@@ -124,7 +124,7 @@ def caution_text(root: Path) -> str:
 
 def fit_text() -> str:
     """What ``sweep fit-vehicle`` prints for the example."""
-    from boulder_sweep.cli.vehicle_commands import fit_lines
+    from boulder_sweep.cli.quality import fit_lines
     from boulder_sweep.crash_tests.fitting import fit_pulse
     from boulder_sweep.crash_tests.measured import read_pulse
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import pytest
@@ -10,7 +9,6 @@ import pytest
 from boulder_sweep.answers.need import need
 from boulder_sweep.answers.uncertainty import uncertainty
 from boulder_sweep.settings import load
-from boulder_sweep.tradeoff.study import measure
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 DASK = {"backend": "dask", "jobs": 2}
@@ -31,13 +29,3 @@ def test_uncertainty_on_a_cluster():
     sweep = load(CONFIGS / "uncertain_site.yaml")
     here, there = uncertainty(sweep, half_width=0.05), uncertainty(sweep, half_width=0.05, **DASK)
     assert there.arrow.equals(here.arrow)
-
-
-@pytest.mark.nightly
-def test_a_tradeoff_measured_by_a_worker():
-    sweep = load(CONFIGS / "m30_sizing.yaml")
-    here, there = (measure(sweep, designs=64, seconds=math.inf, backend=backend) for backend in ("threading", "dask"))
-    assert there.points
-    assert [(p.method, p.rotation_max_deg) for p in there.points] == [
-        (p.method, p.rotation_max_deg) for p in here.points
-    ]

@@ -170,7 +170,7 @@ def test_a_dry_run_of_a_grid_of_ten_to_the_twelve(sweep, grid):
     assert code == 0
     found = json.loads(out)
     assert found["settings"]["n_designs"] == 18 * 10**12
-    assert found["objections"]
+    assert found["objection"]
 
 
 @pytest.mark.parametrize(

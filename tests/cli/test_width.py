@@ -52,7 +52,7 @@ def narrow(folder, monkeypatch):
     monkeypatch.chdir(folder)
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr("webbrowser.open", lambda _: True)
-    monkeypatch.setattr("boulder_sweep.tradeoff.points._SHORTEST_TIMING_S", 1e-9)  # the width is the same
+    monkeypatch.setattr("boulder_sweep.tradeoff.study._SHORTEST_TIMING_S", 1e-9)  # the width is the same
     monkeypatch.setattr("boulder_sweep.cli.output._columns", lambda: 80)  # as if stderr were a terminal
 
 

@@ -3,6 +3,7 @@
 import csv
 import errno
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -15,8 +16,9 @@ import pytest
 
 import boulder_sweep
 from boulder_sweep.answers.reserves import reserves
+from boulder_sweep.cli.main import execute
 from boulder_sweep.columns import COLUMNS
-from boulder_sweep.errors import ReportError
+from boulder_sweep.errors import OlderRulesWarning, ReportError
 from boulder_sweep.judge.quantities import QUANTITIES
 from boulder_sweep.report import export as module
 from boulder_sweep.report import write_explorer, write_report, writing
@@ -25,6 +27,7 @@ from boulder_sweep.report.page import ASSETS, SCRIPTS
 from boulder_sweep.settings import load_text
 from boulder_sweep.settings.shown_units import shown_column, shown_settings, shown_unit
 from boulder_sweep.settings.units import factor
+from tests.store.folders import rewrite_records
 
 US = {
     "boulder_length_m": "boulder_length_ft",
@@ -129,6 +132,22 @@ def test_distributions_layers_and_long_axes_are_in_the_units_asked_for():
         "last": 2 / 0.3048,
         "sha256": "ab",
     }
+
+
+def test_a_table_judged_by_other_rules_says_so_in_every_row_and_beside_the_other(result, tmp_path, capsys):
+    out = tmp_path / "other.sweep"
+    shutil.copytree(result, out)
+    rewrite_records(out, lambda records: records["identity"].update(rules_sha256="abcdef0123456789"))
+    judged = f"judged by the rules of version {boulder_sweep.__version__} (rules abcdef01, kernels "
+    with pytest.warns(OlderRulesWarning, match="abcdef01"):
+        export(out, tmp_path / "other.parquet", units="us")
+    table = pq.read_table(tmp_path / "other.parquet")
+    (said,) = set(table["judged_by"].to_pylist())
+    assert said.startswith(judged)
+    assert f"verdicts\t{said}\t".encode() in table.schema.metadata[b"about"]
+    assert execute(["compare", str(result), str(out)]) == 0
+    shown = capsys.readouterr().out
+    assert shown.startswith(f"rules    {result}: judged by the rules of this version\nrules    {out}: {judged}")
 
 
 def test_parquet_keeps_units_and_meanings(result, tmp_path):

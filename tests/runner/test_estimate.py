@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tracemalloc
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,18 +12,9 @@ from hypothesis import strategies as st
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.runner import sweeper
-from boulder_sweep.runner.estimate import (
-    LARGEST_BLOCK,
-    Estimate,
-    RowCost,
-    blocks,
-    estimated,
-    rows_in_progress,
-    rows_per_block,
-    take_sample,
-)
+from boulder_sweep.runner.estimate import RowCost, take_sample, time_and_disk, too_large
 from boulder_sweep.runner.sweeper import estimate, run
-from boulder_sweep.runner.workers import Admission
+from boulder_sweep.runner.workers import LARGEST_BLOCK, Admission, blocks, rows_in_progress, rows_per_block
 from boulder_sweep.store.failures import DoesNotFitError
 from boulder_sweep.store.schema import encode, part_table
 from boulder_sweep.text import size_text
@@ -182,13 +172,11 @@ def test_a_sample_sees_the_bytes_of_a_whole_part(wide):
 
 
 def test_an_estimate_is_in_proportion():
-    sample = RowCost(1e-6, 50.0, 10_000.0)
-    common = {"jobs": 2, "out": None}
-    one = estimated(sample, rows=10**6, rows_to_compute=10**6, **common)
-    ten = estimated(sample, rows=10**7, rows_to_compute=10**7, **common)
-    assert ten.seconds == pytest.approx(10 * one.seconds)
-    assert ten.disk_bytes == pytest.approx(10 * one.disk_bytes, rel=0.05)
-    assert estimated(sample, rows=10**7, rows_to_compute=10**6, **common).seconds == one.seconds
+    cost = RowCost(1e-6, 50.0, 10_000.0)
+    one, ten = (time_and_disk(cost, rows, 2, 131_072) for rows in (10**6, 10**7))
+    assert one[0] == pytest.approx(0.5)
+    assert ten[0] == pytest.approx(10 * one[0])
+    assert ten[1] == pytest.approx(10 * one[1], rel=0.05)
 
 
 def test_more_workers_than_cores_are_not_faster(monkeypatch):
@@ -197,24 +185,20 @@ def test_more_workers_than_cores_are_not_faster(monkeypatch):
     one, two, eight = (estimate(grid(), jobs=jobs, simulate=plausible) for jobs in (1, 2, 8))
     assert one.seconds == pytest.approx(0.441)
     assert two.seconds == eight.seconds == pytest.approx(0.441 / 2)
-    assert two.rows_per_second == eight.rows_per_second == pytest.approx(2000)
 
 
-def test_objections_name_the_numbers():
-    fits = Estimate(
-        rows=10, rows_to_compute=10, seconds=1.0, disk_bytes=100, disk_free_bytes=200,
-        rows_per_second=10.0, rows_per_block=1, jobs=1,
-    )  # fmt: skip
-    assert fits.objections == []
-    (disk,) = replace(fits, disk_bytes=3_000_000_000, disk_free_bytes=1_000_000).objections
-    assert "3 GB" in disk
-    assert "1 MB" in disk
+def test_what_does_not_fit_is_said_with_numbers(tmp_path, monkeypatch):
+    monkeypatch.setattr("boulder_sweep.runner.estimate._disk_free", lambda out: 1_000_000)
+    assert too_large(10, "about", 1_000_000, tmp_path) == ""
+    assert "needs about 3 GB of disk, and 1 MB are free" in too_large(10, "about", 3_000_000_000, tmp_path)
+    monkeypatch.undo()
+    assert too_large(10, "about", 100, tmp_path / "not" / "there") == ""
+    assert too_large(10, "about", 10**18, tmp_path / "not" / "there")
 
 
 def test_an_estimate_writes_nothing(tmp_path):
     found = estimate(grid(), tmp_path / "out", simulate=plausible)
     assert found.rows == grid().n_designs
-    assert found.disk_free_bytes > 0
     assert list(tmp_path.iterdir()) == []
 
 

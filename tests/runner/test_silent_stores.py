@@ -15,12 +15,13 @@ from boulder_sweep.runner import interruption
 from boulder_sweep.runner.interruption import Signals
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store import lock as locks
-from boulder_sweep.store import status, storage
+from boulder_sweep.store import storage
 from boulder_sweep.store.failures import WriteError
 from boulder_sweep.store.reader import finished_table
 from boulder_sweep.store.writer import OutputFolder
 from tests.runner.grids import grid_of, plausible, same_bits
 from tests.store.silent_stores import SilentFileSystem, store
+from tests.store.states import status
 from tests.waiting import HANG_GUARD_S, wait_until
 
 OUT = "silent://bucket/out"

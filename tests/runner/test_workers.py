@@ -13,10 +13,9 @@ import pytest
 from boulder_sweep.columns import REASONS, VERDICTS
 from boulder_sweep.errors import BackendError, ComputationError
 from boulder_sweep.judge.judged import Judged, not_computed
-from boulder_sweep.runner.estimate import blocks
 from boulder_sweep.runner.pool import check_backend
 from boulder_sweep.runner.running import COMMIT_SHARE, GAP_S, Committer
-from boulder_sweep.runner.workers import Assembly, Computation, Computed, Ended, ThreadWorkers
+from boulder_sweep.runner.workers import Assembly, Computation, Computed, Ended, ThreadWorkers, blocks
 from boulder_sweep.store.files import part_name
 from boulder_sweep.store.manifest import Manifest, Part
 from boulder_sweep.store.writer import EncodedPart, StagedPart

@@ -11,7 +11,6 @@ import boulder_sweep
 from boulder_kernels import DesignTable
 from boulder_kernels.ground import put_soil, slope_factor
 from boulder_kernels.layered import LayeredTable
-from boulder_sweep.cli.simulate import why_lines
 from boulder_sweep.impact.history import soil_profile
 from boulder_sweep.impact.recomputing import recompute
 from boulder_sweep.judge.accuracy import accuracy_of, simulated
@@ -133,7 +132,7 @@ def check_layers(folder: Path, name: str, *more: str) -> None:
     boulder_sweep.run(sweep, folder / name)
     found = recompute(folder / name, 0)
     assert found.unequal == ()
-    assert any(line.startswith("  soil: 3 layers of soil, cohesion 4 / 2 / 0 kPa") for line in why_lines(found))
+    assert "3 layers of soil, cohesion 4 / 2 / 0 kPa" in found.sweep.model.ground.words
     history = boulder_sweep.simulate(sweep)
     assert history.summary()["max_rotation_deg"] >= found.stored["max_rotation_deg"]
     assert history.energy().largest_residual < 1e-6

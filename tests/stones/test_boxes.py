@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from boulder_sweep.stones.boxes import smallest_box
+from boulder_sweep.stones.standing import smallest_box
 from tests.stones.shapes import box, cylinder, rock, sphere, stone
 
 TETRAHEDRON = np.array([(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)])

@@ -14,10 +14,9 @@ from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.store.files import MANIFEST_NAME
 from boulder_sweep.store.manifest import Manifest
-from boulder_sweep.store.opening import claim_output
 from boulder_sweep.store.provenance import file_metadata, identity, new_session
 from boulder_sweep.store.schema import encode, part_table, verdict_counts
-from boulder_sweep.store.writer import EncodedPart, OutputFolder
+from boulder_sweep.store.writer import EncodedPart, OutputFolder, claim_output
 from tests.runner.grids import grid, plausible
 
 IDENTITY = identity(

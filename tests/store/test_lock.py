@@ -77,13 +77,6 @@ def test_the_lock_file_is_empty(tmp_path):
     lock.release()
 
 
-def test_who_asks_does_not_lock(tmp_path):
-    lock = FolderLock(tmp_path, None, "nobody")
-    assert all(is_locked(tmp_path) for _ in range(3))
-    lock.release()
-    assert not is_locked(tmp_path)
-
-
 @pytest.fixture
 def no_shared_locks(monkeypatch):
     """A network folder whose locks do not reach other machines."""
