@@ -32,6 +32,7 @@ from boulder_sweep.store.provenance import file_metadata, identity, new_session
 from boulder_sweep.store.storage import storage_of
 from boulder_sweep.store.verify import load_checked
 from boulder_sweep.store.writer import ROWS_PER_PART, ClaimedFolder, claim_output, refuse_other_settings
+from boulder_sweep.text import one_line
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
