@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import lru_cache, partial
 from typing import IO, TYPE_CHECKING
 
@@ -147,9 +147,13 @@ class TableFile:
         """
         import pyarrow as pa
 
-        empty = pa.PythonFile(_Unread(self._source.seek(0, 2)), mode="r")
-        with suppress(_ReachedError):
+        unread = _Unread(self._source.seek(0, 2))
+        empty = pa.PythonFile(unread, mode="r")
+        try:
             self._opened(empty, metadata=self._file.metadata, pre_buffer=True).read(use_threads=False)
+        except (pa.ArrowException, OSError):
+            if not unread.asked:
+                raise
 
     def _check_bytes(self, columns: Sequence[str] | None) -> set[str]:
         """Add up the unpacked bytes of columns before reading; return text that pyarrow cannot read as codes."""
@@ -195,15 +199,15 @@ class TableFile:
                 raise ParquetLimitError(f"has more than {most} of text, up to column {shown}")
 
 
-class _ReachedError(Exception):
-    """Bytes were asked for."""
-
-
 class _Unread(io.RawIOBase):
-    """A file of some size of which nothing can be read."""
+    """A file of some size that gives no bytes, and notes whether any were asked for.
+
+    It raises nothing: pyarrow would keep the exception, and all that it holds, for good.
+    """
 
     def __init__(self, size: int) -> None:
         self._size, self._at = size, 0
+        self.asked = False
 
     def readable(self) -> bool:
         return True
@@ -219,7 +223,8 @@ class _Unread(io.RawIOBase):
         return self._at
 
     def read(self, size: int = -1) -> bytes:
-        raise _ReachedError
+        self.asked = True
+        return b""
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import io
 import os
@@ -10,6 +11,7 @@ import shutil
 import struct
 import subprocess
 import sys
+import weakref
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -413,3 +415,16 @@ def test_a_page_cut_short_is_damaged(tmp_path):
     path.write_bytes(content[:4] + bytes(100) + content[104:])
     with path.open("rb") as file, pytest.raises(ParquetError, match="cannot be read as Parquet"):
         TableFile(file).read()
+
+
+def test_a_file_that_was_read_is_let_go(tmp_path: Path) -> None:
+    """Pyarrow keeps for good what a file of Python raises inside it, with all that hangs on it."""
+    path = tmp_path / "table.parquet"
+    pq.write_table(pa.table({"a": [1.0, 2.0]}), path)
+    with path.open("rb") as stream:
+        opened = TableFile(stream, 10, 10_000)
+        opened.read(["a"])
+        kept = weakref.ref(opened)
+        del opened
+        gc.collect()
+        assert kept() is None
