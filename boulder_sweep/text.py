@@ -6,10 +6,13 @@ import errno
 import json
 import math
 import os
+import re
 from collections.abc import Callable
 from typing import Any
 
 _LONGEST_LINE = 200
+_WORD = re.compile(r"[A-Z][A-Z0-9]*(?![a-z])|[A-Z]?[a-z0-9]+")
+"""One word of a name such as OSError or ClientError."""
 ProgressCallback = Callable[[int, int], None]
 """Called with how much is done, and of how much."""
 NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
@@ -63,9 +66,10 @@ def script_data(data: Any) -> str:
 
 
 def one_line(problem: BaseException) -> str:
-    """Describe an exception in one line of bounded length."""
+    """Describe an exception in one line of bounded length: ``OS error: ...``, ``endpoint connection error: ...``."""
+    kind = " ".join(word if word.isupper() else word.lower() for word in _WORD.findall(type(problem).__name__))
     words = " ".join(str(problem).split())
-    text = f"{type(problem).__name__}: {words}" if words else type(problem).__name__
+    text = f"{kind}: {words}" if words else kind
     return text if len(text) <= _LONGEST_LINE else f"{text[: _LONGEST_LINE - 3]}..."
 
 

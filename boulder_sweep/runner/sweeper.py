@@ -32,6 +32,7 @@ from boulder_sweep.store.provenance import file_metadata, identity, new_session
 from boulder_sweep.store.storage import storage_of
 from boulder_sweep.store.verify import load_checked
 from boulder_sweep.store.writer import ROWS_PER_PART, ClaimedFolder, claim_output, refuse_other_settings
+from boulder_sweep.text import one_line
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
@@ -157,7 +158,7 @@ def run(
             safe = f"{done:,} of {sweep.n_designs:,} rows are safe"
             raise type(problem)(f"{problem}. {safe}. Resume with: {again}") from problem
         except BaseException as problem:
-            ended(f"stopped by {type(problem).__name__}: {problem}")
+            ended(f"stopped by {one_line(problem)}")
             raise
         whole.end(FINISHED)
     return summary_of(

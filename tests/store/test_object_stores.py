@@ -275,7 +275,7 @@ def test_a_store_that_cannot_be_written_is_refused_before_anything_is_computed(m
     monkeypatch.setattr(Trouble, "of", of)
     with (
         store(Trouble(0, 1.0, True)),
-        pytest.raises(WriteError, match=f"cannot write into {OUT}: (Timeout|Connection)Error: no answer"),
+        pytest.raises(WriteError, match=f"cannot write into {OUT}: (timeout|connection) error: no answer"),
     ):
         folders.open_folder(location_of(OUT))
 
@@ -293,7 +293,7 @@ def test_a_store_that_does_not_answer_is_not_taken_for_damaged(out, monkeypatch,
 
     info = FaultyFileSystem.info
     monkeypatch.setattr(FaultyFileSystem, "info", denied)
-    with pytest.raises(StoreError, match=r"rows-0.* cannot be read: PermissionError: not yours") as refused:
+    with pytest.raises(StoreError, match=r"rows-0.* cannot be read: permission error: not yours") as refused:
         folders.open_folder(out, resume=True) if resume else status(OUT)
     assert not isinstance(refused.value, DamagedError)
     assert names(out) == before

@@ -66,5 +66,5 @@ def test_damage_is_never_read_as_data(tmp_path, damage):
         path.write_bytes(content[:3000])
     else:
         path.unlink()
-    with pytest.raises(DamagedError, match=r"--verify.*--resume"):
+    with pytest.raises(DamagedError, match=r"--resume recomputes .*--dry-run"):
         read(out)

@@ -55,7 +55,7 @@ def out(tmp_path):
     ("place", "error", "words"),
     [
         ("disk", DamagedError, r"is not what a worker wrote there \(missing"),
-        ("object store", WriteError, "cannot write into faulty://bucket/out: FileNotFoundError"),
+        ("object store", WriteError, "cannot write into faulty://bucket/out: file not found error"),
     ],
 )
 def test_what_a_worker_of_another_run_stages_is_never_published(tmp_path, place, error, words):
