@@ -19,10 +19,9 @@ import click
 # Every command imports heavy packages (numba, pandas, pyarrow, even numpy) inside its function, so that
 # `sweep --help` and `sweep check` are instant.
 from boulder_sweep.cli.ask import capacity, need, uncertainty
-from boulder_sweep.cli.compare import compare
 from boulder_sweep.cli.output import ready_streams, say
 from boulder_sweep.cli.quality import fit_vehicle, tradeoff, validate
-from boulder_sweep.cli.run import run
+from boulder_sweep.cli.run import compare, run
 from boulder_sweep.cli.settings_files import check, new
 from boulder_sweep.cli.share import explore, export, plot, report
 from boulder_sweep.cli.simulate import simulate

@@ -149,13 +149,13 @@ def _is_result(case: Location) -> bool:
 
 
 def _computed_again(folder: Location, number: int, quiet: bool) -> Recomputed:
-    """Compute a row of a result again; a row that it does not have is wrong use."""
+    """Compute a row of a result again; one that it does not have, or does not say all of, is wrong use."""
     from boulder_sweep.impact.recomputing import recompute
 
     try:
         with working(quiet):
             return recompute(folder, number)
-    except IndexError as problem:
+    except LookupError as problem:
         raise click.UsageError(str(problem)) from None
 
 

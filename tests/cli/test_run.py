@@ -11,6 +11,7 @@ import pytest
 
 from boulder_sweep.cli import output
 from boulder_sweep.runner.summary import progress_of
+from boulder_sweep.store import writer
 from boulder_sweep.text import duration_text
 
 
@@ -299,14 +300,19 @@ NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 
 
 @pytest.mark.parametrize("number", [*NO_SPACE, errno.EACCES, errno.EROFS, errno.EIO, errno.ECONNREFUSED])
-@pytest.mark.parametrize("when", ["opening", "writer"])
+@pytest.mark.parametrize("when", ["opened", "written"])
 def test_a_folder_that_the_system_refuses_to_write_is_for_the_user_to_mend(
     sweep, possible_grid, monkeypatch, number, when
 ):
-    def refused(*_):
-        raise OSError(number, os.strerror(number))
+    save, saved = writer.save, []
 
-    monkeypatch.setattr(f"boulder_sweep.store.{when}.save", refused)
+    def refused(*given):
+        saved.append(given)
+        if when == "opened" or len(saved) > 1:
+            raise OSError(number, os.strerror(number))
+        save(*given)
+
+    monkeypatch.setattr(writer, "save", refused)
     code, out, err = sweep("run", possible_grid, "-q", "-o", "out")
     assert (code, out) == (2, "")
     assert err.startswith(f"error: cannot write into out: {os.strerror(number)}")

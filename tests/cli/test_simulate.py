@@ -242,6 +242,15 @@ def test_a_row_that_cannot_be_computed(sweep, grid):
     assert (row["verdict"], row["same_bits"]) == ("error", True)
 
 
+def test_a_row_whose_uncertain_inputs_are_too_many_to_be_listed_is_refused(sweep, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    means = "soil.friction_angle={mean: {from: 36 deg, to: 42 deg, count: 1001}, cov: 5 %}"
+    assert sweep("run", CONFIGS / "rwg.yaml", "-q", "-o", "many.sweep", "--set", means)[0] == 0
+    code, out, err = sweep("simulate", "many.sweep", "--design", "3")
+    assert (code, out) == (2, "")
+    assert "the table does not list the values of its uncertain inputs" in err
+
+
 def test_a_row_that_came_out_otherwise(sweep, finished, monkeypatch):
     monkeypatch.setattr("boulder_sweep.impact.recomputing._same", lambda a, b: isinstance(a, str))
     monkeypatch.setattr("boulder_sweep.store.provenance.kernels_sha256", lambda: "0" * 64)

@@ -14,7 +14,14 @@ from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.runner import sweeper
 from boulder_sweep.runner.estimate import RowCost, take_sample, time_and_disk, too_large
 from boulder_sweep.runner.sweeper import estimate, run
-from boulder_sweep.runner.workers import LARGEST_BLOCK, Admission, blocks, rows_in_progress, rows_per_block
+from boulder_sweep.runner.workers import (
+    LARGEST_BLOCK,
+    Admission,
+    blocks,
+    rows_in_progress,
+    rows_per_block,
+    rows_per_task,
+)
 from boulder_sweep.store.failures import DoesNotFitError
 from boulder_sweep.store.schema import encode, part_table
 from boulder_sweep.text import size_text
@@ -51,6 +58,19 @@ def test_blocks_are_short_and_there_is_one_for_every_worker(seconds, rows, jobs)
     assert 1 <= size <= LARGEST_BLOCK
     assert size == 1 or size * seconds <= 0.2
     assert size == 1 or rows / size >= jobs
+
+
+@pytest.mark.parametrize(
+    ("seconds_per_row", "rows", "jobs", "expected"),
+    [
+        (1e-6, 10**9, 2, 2_000_000 - 2_000_000 % 131_072),  # whole parts, two seconds of work
+        (1e-4, 10**9, 2, 20_000),  # less than a part where rows take long
+        (1e-6, 1000, 2, 125),  # four for every worker
+        (100.0, 1000, 2, 1),
+    ],
+)
+def test_tasks_are_long_compared_with_their_scheduling(seconds_per_row, rows, jobs, expected):
+    assert rows_per_task(seconds_per_row, rows, jobs, 131_072) == expected
 
 
 def test_a_whole_part_can_always_be_in_progress():
