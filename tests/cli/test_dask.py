@@ -7,6 +7,7 @@ import shlex
 import pytest
 from distributed import LocalCluster
 
+from boulder_sweep.store import writer
 from boulder_sweep.store.reader import finished_table
 from tests.runner.grids import same_bits
 from tests.store.states import status
@@ -39,12 +40,17 @@ def test_a_run_on_a_cluster_that_is_there(sweep, possible_grid, scheduler):
 
 
 def test_the_command_to_go_on_names_the_scheduler(sweep, possible_grid, scheduler, monkeypatch):
-    def full(*_):
-        raise OSError(28, "No space left on device")
+    save, saved = writer.save, []
+
+    def full(*given):
+        saved.append(given)
+        if len(saved) > 1:  # after the folder was opened
+            raise OSError(28, "No space left on device")
+        save(*given)
 
     words = ["-q", "-o", "out", "--backend", "dask", "--scheduler", scheduler]
     with monkeypatch.context() as patch:
-        patch.setattr("boulder_sweep.store.writer.save", full)
+        patch.setattr(writer, "save", full)
         code, out, err = sweep("run", possible_grid, *words)
     assert (code, out) == (2, "")
     command = f"sweep run grid.yaml -o out --backend dask --scheduler {scheduler} --resume"
