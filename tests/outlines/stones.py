@@ -48,6 +48,7 @@ def stone_of(outline: np.ndarray) -> Stone:
 
 
 def constants(design: bk.Design, outline: np.ndarray, elements: int, readings=None, layers=None):
+    layers = uniform_layers(design) if layers is None else layers
     return constants_in(design, readings or bk.corrected(), elements, profile_of(layers, elements, outline))
 
 
