@@ -148,12 +148,11 @@ class TableFile:
         import pyarrow as pa
 
         unread = _Unread(self._source.seek(0, 2))
-        empty = pa.PythonFile(unread, mode="r")
+        unread.file = pa.PythonFile(unread, mode="r")
         try:
-            self._opened(empty, metadata=self._file.metadata, pre_buffer=True).read(use_threads=False)
-        except (pa.ArrowException, OSError):
-            if not unread.asked:
-                raise
+            self._opened(unread.file, metadata=self._file.metadata, pre_buffer=True).read(use_threads=False)
+        except _ReachedError as reached:
+            reached.__traceback__ = None  # pyarrow keeps the exception for good, and it would keep all of this
 
     def _check_bytes(self, columns: Sequence[str] | None) -> set[str]:
         """Add up the unpacked bytes of columns before reading; return text that pyarrow cannot read as codes."""
@@ -199,15 +198,18 @@ class TableFile:
                 raise ParquetLimitError(f"has more than {most} of text, up to column {shown}")
 
 
-class _Unread(io.RawIOBase):
-    """A file of some size that gives no bytes, and notes whether any were asked for.
+class _ReachedError(Exception):
+    """Bytes were asked for."""
 
-    It raises nothing: pyarrow would keep the exception, and all that it holds, for good.
-    """
+
+class _Unread(io.RawIOBase):
+    """A file of some size of which nothing can be read."""
+
+    file: pa.PythonFile
+    """The same for pyarrow; kept, because a thread of pyarrow that lets go of it last may end the process."""
 
     def __init__(self, size: int) -> None:
         self._size, self._at = size, 0
-        self.asked = False
 
     def readable(self) -> bool:
         return True
@@ -223,8 +225,7 @@ class _Unread(io.RawIOBase):
         return self._at
 
     def read(self, size: int = -1) -> bytes:
-        self.asked = True
-        return b""
+        raise _ReachedError
 
 
 @contextmanager

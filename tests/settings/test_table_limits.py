@@ -218,7 +218,7 @@ def test_more_columns_than_a_table_has(tmp_path, name):
     [
         (f'{HEIGHT},note\n2,"' + '\n","' * 300_000, "has a row of more than 1,000,000 characters; is a quotation mark"),
         (f"{HEIGHT},note\n2," + "x" * 1_000_001, "has a row of more than 1,000,000 characters"),
-        (f"{HEIGHT},note\n2," + '"' + "x" * 200_000, "field larger than field limit"),
+        (f"{HEIGHT},note\n2," + '"' + "x" * 200_000, "is a quotation mark not closed, or does text"),
         (f"{HEIGHT}\n" + "2\n" * 6, "has more than 6 lines"),
         (f"{HEIGHT}\n" + "\n#\n" * 3, "has more than 6 lines"),
         (f"{HEIGHT},a_id\n2,a\n2,b\n2,c\n", "column a_id has more than 2 different words"),
