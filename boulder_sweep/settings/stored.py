@@ -32,7 +32,10 @@ from boulder_sweep.settings.shape import ProfilePoint, Scan
 from boulder_sweep.settings.sweep import IMPACT_HEIGHT_RULE, Heading, derived_words, wrong_with
 
 _NAMES = {entry.name for entry in INPUTS}
-_ALWAYS = (EMBEDMENT, *((entry.name,) for entry in INPUTS if not (entry.optional or entry.name in EMBEDMENT)))
+_ALWAYS = (
+    EMBEDMENT,
+    *((e.name,) for e in INPUTS if e.name not in EMBEDMENT and (not e.optional or e.default is not None)),
+)
 """Inputs of which all settings have one."""
 _WORDS = {
     **{switch: {PRINTED, corrected} for switch, corrected in SWITCHES.items()},
