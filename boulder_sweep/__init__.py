@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from boulder_sweep.report.export import export as export
     from boulder_sweep.report.writing import write_explorer as write_explorer
     from boulder_sweep.report.writing import write_report as write_report
-    from boulder_sweep.runner.sweeper import Summary as Summary
-    from boulder_sweep.runner.sweeper import run as run
+    from boulder_sweep.runner.run import Summary as Summary
+    from boulder_sweep.runner.run import run as run
     from boulder_sweep.settings import SettingsError as SettingsError
     from boulder_sweep.settings import Sweep as Sweep
     from boulder_sweep.settings import load as load
@@ -42,7 +42,7 @@ _PUBLIC = {
     "boulder_sweep.report.comparison": ("compare",),
     "boulder_sweep.report.export": ("export",),
     "boulder_sweep.report.writing": ("write_explorer", "write_report"),
-    "boulder_sweep.runner.sweeper": ("Summary", "run"),
+    "boulder_sweep.runner.run": ("Summary", "run"),
     "boulder_sweep.settings": ("SettingsError", "Sweep", "load"),
     "boulder_sweep.store": ("read",),
 }

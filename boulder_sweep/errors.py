@@ -70,6 +70,10 @@ class HistoryFileError(BoulderSweepError):
     """A time history cannot be written."""
 
 
+class LinkError(BoulderSweepError):
+    """A link lies where a file is to be written; whoever put it there would choose what is overwritten."""
+
+
 class NothingToMeasureError(BoulderSweepError, ValueError):
     """None of the designs of a sample can be computed."""
 

@@ -289,7 +289,7 @@ def _table_of(asked: Question | LightestQuestion, start: int, stop: int) -> tupl
 
     The table has the inputs, the answer and its bracket, and the outcome at the answer.
     """
-    from boulder_sweep.store.schema import word_array
+    from boulder_sweep.store.part import word_array
 
     answers, key = asked.answered(start, stop), asked.key
     unit = key.field.unit

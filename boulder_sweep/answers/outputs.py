@@ -22,7 +22,7 @@ from boulder_sweep.columns import BY_NAME as COLUMN_OF
 from boulder_sweep.designs import SIDES, Label
 from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning
 from boulder_sweep.impact.recomputing import model_of
-from boulder_sweep.locations import Location, RemotePath
+from boulder_sweep.locations import Location
 from boulder_sweep.parquet import ParquetError, TableFile
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.fields import BY_NAME, INPUTS
@@ -31,9 +31,9 @@ from boulder_sweep.settings.problems import shorten
 from boulder_sweep.settings.stored import check_entries
 from boulder_sweep.settings.sweep import Axis, DesignList, allowed_in
 from boulder_sweep.store.failures import settings_file
-from boulder_sweep.store.files import MANIFEST_NAME
+from boulder_sweep.store.folder import part_file
 from boulder_sweep.store.provenance import check_identity, identity_in, judged_by, other_version, settings_sha256
-from boulder_sweep.store.reader import FinishedRows
+from boulder_sweep.store.reading import FinishedRows
 from boulder_sweep.text import counted, why
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ MARKS = {
     UNCERTAINTY: ("p_pass", "p_pass_low", "p_pass_high", "p_pass_driver"),
 }
 """Columns by which the answers of a command are known."""
-OF_ONE_FILE = {"repeat", "commit", "cpu"}
+OF_ONE_FILE = {"repeat"}
 """Entries of the metadata by which equal files differ."""
 _IDENTITY = {"settings", "settings_sha256", "kernels_sha256", "readings", "control", "versions"}
 """Entries of the metadata that every such file has."""
@@ -300,7 +300,7 @@ def result_of(
     BoulderSweepError
         As of `AnswerFile`.
     """
-    if isinstance(path, RemotePath) or not path.is_file() or (path.resolve().parent / MANIFEST_NAME).exists():
+    if not isinstance(path, Path) or not path.is_file() or part_file(path.name):
         return FinishedRows(path)
     return AnswerFile(path, refusal, histories=histories)
 

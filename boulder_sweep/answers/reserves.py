@@ -141,7 +141,7 @@ def classes(
 
 def _table(sweep: Sweep, judges: Judges, start: int, stop: int) -> pa.Table:
     """Return the table of the designs ``[start, stop)``."""
-    from boulder_sweep.store.schema import word_array
+    from boulder_sweep.store.part import word_array
 
     rows = sweep.plan.given_rows(start, stop)
     block = block_of(rows)

@@ -18,8 +18,8 @@ import numpy as np
 from boulder_sweep.columns import DESIGN_ID, REASONS
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.quantities import QUANTITIES, quantities
-from boulder_sweep.locations import Location, RemotePath, location_of
-from boulder_sweep.store.files import check_target, replacing
+from boulder_sweep.locations import Location, location_of, put, replacing
+from boulder_sweep.store.folder import check_target
 from boulder_sweep.store.provenance import file_metadata, identity
 from boulder_sweep.text import ProgressCallback, why
 
@@ -65,7 +65,7 @@ class Result:
 
 def chance_columns(sampled: Sampled, meaning: str) -> list[TableColumn]:
     """Return the columns of probabilities of passing, the first with a meaning of its own."""
-    from boulder_sweep.store.schema import word_array
+    from boulder_sweep.store.part import word_array
 
     low = "lower end of the interval of p_pass"
     high = "upper end of the interval of p_pass, at which all that is undecided passes"
@@ -97,7 +97,7 @@ def rows_table(
     """
     import pyarrow as pa
 
-    from boulder_sweep.store.schema import number_array, part_table, word_array
+    from boulder_sweep.store.part import number_array, part_table, word_array
 
     def array_of(values: np.ndarray | pa.Array | Sequence[str | None]) -> pa.Array:
         if isinstance(values, pa.Array):
@@ -159,10 +159,10 @@ def joined_tables(
     """
     import pyarrow as pa
 
-    from boulder_sweep.store.schema import PANDAS_ATTRIBUTES
+    from boulder_sweep.store.part import PANDAS_ATTRIBUTES
 
     entries = identity(sweep.resolved(), *judges.final.settings(), judges.accuracy.to_dict())
-    metadata = file_metadata(entries if question is None else entries | {"question": question}, repeat)
+    metadata = file_metadata(entries if question is None else entries | {"question": question}, repeat=repeat)
     table = pa.concat_tables(tables).unify_dictionaries().combine_chunks()
     attributes = json.dumps(_attributes(table)).encode()
     return table.replace_schema_metadata({PANDAS_ATTRIBUTES: attributes, **metadata})
@@ -202,8 +202,8 @@ def write_parquet(table: pa.Table, path: str | Location) -> Location:
                 use_byte_stream_split=split,
                 write_page_checksum=True,
             )
-        if isinstance(target, RemotePath):
-            target.put(content.getbuffer())
+        if not isinstance(target, Path):
+            put(target, content.getbuffer())
     except OSError as problem:
         raise QuestionError(f"{path} cannot be written: {why(problem)}") from problem
     return target

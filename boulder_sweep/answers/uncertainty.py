@@ -186,7 +186,7 @@ class _Asked:
 
 def _rows(asked: _Asked, points: Points, parallel: Pool, start: int, stop: int) -> pa.Table:
     """Return the table of the rows ``[start, stop)``: inputs, outcome at the means, probability, main input."""
-    from boulder_sweep.store.schema import word_array
+    from boulder_sweep.store.part import word_array
 
     draws = asked.draws(start, stop, parallel)
     n = stop - start

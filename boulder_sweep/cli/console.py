@@ -14,8 +14,7 @@ from boulder_sweep.text import counted, duration_text, size_text
 
 if TYPE_CHECKING:
     from boulder_sweep.locations import Location
-    from boulder_sweep.runner.estimate import Estimate
-    from boulder_sweep.runner.summary import Summary
+    from boulder_sweep.runner.progress import Estimate, Summary
     from boulder_sweep.settings import Sweep
 
 

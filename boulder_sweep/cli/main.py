@@ -34,7 +34,7 @@ from boulder_sweep.errors import (
     Interrupted,
     OlderRulesWarning,
 )
-from boulder_sweep.runner.interruption import noted_signals
+from boulder_sweep.runner.signals import noted_signals
 from boulder_sweep.text import why
 
 THREADS_OF_OPENBLAS = "OPENBLAS_NUM_THREADS"

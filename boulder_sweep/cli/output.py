@@ -22,7 +22,7 @@ from boulder_sweep.text import duration_text, printable
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from boulder_sweep.runner.summary import Progress
+    from boulder_sweep.runner.progress import Progress
 
 PLAIN_EVERY_S = 10.0
 """Time between two lines of progress where there is no terminal."""
@@ -151,7 +151,7 @@ def working(quiet: bool, doing: str = "simulating", of: str = "designs") -> Iter
         if shown is None:
             yield None
             return
-        from boulder_sweep.runner.summary import Progress
+        from boulder_sweep.runner.progress import Progress
 
         begun = time.monotonic()
 

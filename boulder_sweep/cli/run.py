@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shlex
-import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from functools import partial
@@ -90,8 +89,8 @@ def run(
         say("\n".join(console.value_lines(sweep.resolved())))
     if not quiet:
         say(f"{sweep.name}: {counted(sweep.n_designs, 'design')} into {target}")
-    from boulder_sweep.runner.interruption import noted_signals
-    from boulder_sweep.runner.sweeper import run as run_sweep
+    from boulder_sweep.runner.run import run as run_sweep
+    from boulder_sweep.runner.signals import noted_signals
 
     notes = Notes()
     # Who waits for this command does not act on a signal before it has said how to go on.
@@ -101,7 +100,6 @@ def run(
                 sweep,
                 target,
                 progress=shown,
-                command=shlex.join(["sweep", *sys.argv[1:]]),
                 resume_command=_resume_command(grid, target, overrides, accuracy, second_opinion, at, options),
                 **options,
             )
@@ -121,8 +119,8 @@ def run(
 def _dry_run(sweep: Sweep, out: Location, options: dict[str, Any], as_json: bool) -> int:
     """Show what a run would do."""
     from boulder_sweep.cli import console
-    from boulder_sweep.runner.estimate import too_large
-    from boulder_sweep.runner.sweeper import estimate
+    from boulder_sweep.runner.progress import too_large
+    from boulder_sweep.runner.run import estimate
 
     effort = estimate(sweep, out, jobs=options["jobs"], resume=options["resume"])
     objection = too_large(effort.rows, "about", effort.disk_bytes, out)

@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Mapping
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -24,7 +25,7 @@ from boulder_sweep.cli.options import (
 )
 from boulder_sweep.cli.output import say, show, working, wrap
 from boulder_sweep.errors import EXIT_SOME_ROWS_FAILED
-from boulder_sweep.locations import Location, RemotePath, location_of
+from boulder_sweep.locations import Location, location_of
 
 if TYPE_CHECKING:
     from boulder_sweep.impact.recomputing import Recomputed
@@ -145,7 +146,7 @@ def simulate(
 
 def _is_result(case: Location) -> bool:
     """Whether a case is the result of a run, or is named like one, and no settings file."""
-    return isinstance(case, RemotePath) or case.is_dir() or case.suffix.lower() in (".sweep", ".parquet")
+    return not isinstance(case, Path) or case.is_dir() or case.suffix.lower() in (".sweep", ".parquet")
 
 
 def _computed_again(folder: Location, number: int, quiet: bool) -> Recomputed:

@@ -7,7 +7,6 @@ once more, to compare it bit for bit, and to show what happened over time.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,16 +20,15 @@ from boulder_sweep.judge.judged import worst_of
 from boulder_sweep.judge.refinement import reported_step_s
 from boulder_sweep.judge.robustness import can_be_asked
 from boulder_sweep.judge.verdict import limits_of
-from boulder_sweep.locations import RemotePath, location_of
+from boulder_sweep.locations import Location, location_of
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import Criterion, Ground, Model, ReadingChoice, SolverSettings
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import shown_values
 from boulder_sweep.settings.sweep import DesignList, allowed_in
-from boulder_sweep.store.manifest import load as load_manifest
+from boulder_sweep.store.part import part_table
 from boulder_sweep.store.provenance import differences, identity, judged_by
-from boulder_sweep.store.reader import read_row
-from boulder_sweep.store.schema import part_table
+from boulder_sweep.store.reading import FinishedRows
 
 if TYPE_CHECKING:
     from boulder_sweep.impact.trajectory import Trajectory
@@ -94,7 +92,7 @@ class Recomputed:
         }
 
 
-def recompute(out: str | Path | RemotePath, design_id: int) -> Recomputed:
+def recompute(out: str | Location, design_id: int) -> Recomputed:
     """Compute one row of a result again, from the result alone.
 
     Parameters
@@ -117,14 +115,14 @@ def recompute(out: str | Path | RemotePath, design_id: int) -> Recomputed:
         The table has no such row, or not yet.
     """
     folder = location_of(out)
-    manifest = load_manifest(folder)
-    there = manifest.identity
-    row = read_row(folder, design_id)
+    finished = FinishedRows(folder)
+    there = finished.identity
+    row = finished.asked(design_id)
     values = row.to_pylist()[0]
     inputs = {name: values[name] for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS) if name in values}
     control, readings = Control(**there["control"]), Readings(**there["readings"])
     name = there["settings"]["name"]
-    called = name if manifest.rows == 1 else f"{name} #{design_id}"
+    called = name if finished.rows == 1 else f"{name} #{design_id}"
     sweep = one_design(
         there["settings"] | {"name": called}, inputs, control, values["step_s"] or reported_step_s(control)
     )
@@ -137,7 +135,7 @@ def recompute(out: str | Path | RemotePath, design_id: int) -> Recomputed:
     again = part_table(block, worst_of(cases), {}).to_pylist()[0]
     return Recomputed(
         design_id=design_id,
-        designs=manifest.rows,
+        designs=finished.rows,
         sweep=sweep,
         inputs=inputs,
         stored={name: value for name, value in values.items() if isinstance(BY_NAME.get(name), OutcomeColumn)},

@@ -16,8 +16,9 @@ from boulder_sweep.drawing import draw
 from boulder_sweep.errors import HistoryFileError
 from boulder_sweep.impact.history import MODE_NAMES, EnergyLedger, Motion, forces_along, ledger_of
 from boulder_sweep.judge.judged import Judged
+from boulder_sweep.locations import replacing
 from boulder_sweep.settings.model import ReadingChoice
-from boulder_sweep.store.files import check_target, replacing
+from boulder_sweep.store.folder import check_target
 from boulder_sweep.text import printable, why
 
 if TYPE_CHECKING:
@@ -266,7 +267,9 @@ class Trajectory:
         readings = Readings(*ReadingChoice(**self.settings["model"]["readings"]).corrected)
         run_identity = identity(self.settings, readings._asdict(), self.motion.control._asdict())
         repeat = f"boulder_sweep.simulate({self.name!r}, {self.design_id})"
-        return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=file_metadata(run_identity, repeat)))
+        return pa.Table.from_arrays(
+            arrays, schema=pa.schema(fields, metadata=file_metadata(run_identity, repeat=repeat))
+        )
 
     def to_parquet(self, path: str | Path, *, energy: bool = False) -> None:
         """Write the time history to a Parquet file.

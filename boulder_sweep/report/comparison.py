@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.outputs import MARKS, NEED, RUN, UNCERTAINTY, AnswerFile, answered, result_of
 from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.errors import ReportError
-from boulder_sweep.locations import Location, RemotePath, location_of
+from boulder_sweep.locations import Location, location_of
 from boulder_sweep.settings.sweep import IMPACT_HEIGHT_RULE
 from boulder_sweep.store.provenance import differences
-from boulder_sweep.store.reader import FinishedRows, read
+from boulder_sweep.store.reading import FinishedRows, read
 from boulder_sweep.text import counted
 from boulder_sweep.views.wording import RATIO, name_of, unit_of
 
@@ -123,7 +122,7 @@ class Comparison:
         return {**counts, "least_change": ends[0], "largest_change": ends[1], "unit": self.answers[name]}
 
 
-def compare(before: str | Path | RemotePath, after: str | Path | RemotePath) -> Comparison:
+def compare(before: str | Location, after: str | Location) -> Comparison:
     """Compare two results, design by design.
 
     Parameters

@@ -13,10 +13,10 @@ from boulder_sweep.answers.outputs import AnswerFile, result_of
 from boulder_sweep.columns import BOULDER_MASS, BY_NAME
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.quantities import NEEDED, QUANTITIES, quantities_by
-from boulder_sweep.locations import RemotePath, location_of
+from boulder_sweep.locations import Location, location_of, replacing
 from boulder_sweep.settings.shown_units import Shown, check_system, shown_as, shown_column, shown_settings
-from boulder_sweep.store.files import check_target, replacing
-from boulder_sweep.store.reader import FinishedRows
+from boulder_sweep.store.folder import check_target
+from boulder_sweep.store.reading import FinishedRows
 from boulder_sweep.text import printable, why
 from boulder_sweep.views.wording import NOT_A_TEST
 
@@ -35,7 +35,7 @@ FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
 """First characters of text that a spreadsheet takes for a formula."""
 
 
-def export(out: str | Path | RemotePath, file: str | Path, *, units: str = "si") -> int:
+def export(out: str | Location, file: str | Path, *, units: str = "si") -> int:
     """Write a result as one table.
 
     Parameters

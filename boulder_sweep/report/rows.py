@@ -26,7 +26,7 @@ from boulder_sweep.judge.validity import flag_counts
 from boulder_sweep.locations import Location
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.shape import Shape
-from boulder_sweep.store.reader import FinishedRows, read_row
+from boulder_sweep.store.reading import FinishedRows, read_row
 from boulder_sweep.text import counted
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.accuracy import accuracy_of, control_of, readings_of
 from boulder_sweep.judge.quantiles import at_values
-from boulder_sweep.locations import RemotePath, location_of
+from boulder_sweep.locations import Location, location_of, replacing
 from boulder_sweep.report.answers import answer_of
 from boulder_sweep.report.asked import Named, answers_table
 from boulder_sweep.report.build import kernel
@@ -28,7 +28,7 @@ from boulder_sweep.settings.model import FOOT_WORDS, SolverSettings
 from boulder_sweep.settings.shown_units import check_system, quantity_text
 from boulder_sweep.settings.sweep import NO_HEADING, SECTION, Heading, derived_words, wrong_with
 from boulder_sweep.stones.rock import ROCK_KG_M3
-from boulder_sweep.store.files import check_target, put_file
+from boulder_sweep.store.folder import check_target
 from boulder_sweep.store.provenance import identity as identity_of
 from boulder_sweep.store.provenance import versions
 from boulder_sweep.text import counted, printable, why
@@ -62,7 +62,7 @@ SETTLED_MS = 30_000
 
 
 def write_report(
-    out: str | Path | RemotePath,
+    out: str | Location,
     page: str | Path,
     *,
     designs: Sequence[int] = (),
@@ -283,7 +283,8 @@ def _written(page: Path, text: str) -> Path:
     """
     content = printed(text) if page.suffix.lower() == ".pdf" else text.encode()
     try:
-        put_file(page.parent, page.name, content)
+        with replacing(page) as file:
+            file.write(content)
     except OSError as problem:
         raise ReportError(f"{page} cannot be written: {why(problem)}") from problem
     return page

@@ -1,29 +1,34 @@
-"""Calls of a function on the cores of this machine or on a Dask cluster, for answers that are not rows of a sweep."""
+"""Calls of a function on the cores of this machine or on a Dask cluster, by joblib.
+
+Dask cares for workers that are lost: it makes their calls again, on others. What it gives up ends here in words.
+"""
 
 from __future__ import annotations
 
 import itertools
-import time
+import logging
+import queue
+import threading
+import warnings
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from contextlib import contextmanager, suppress
+from importlib import import_module
+from typing import Any
 
-from boulder_sweep.errors import BackendError, BoulderSweepError
+from boulder_sweep.errors import BackendError, BoulderSweepError, ClusterLostError
 from boulder_sweep.text import one_line
-
-if TYPE_CHECKING:
-    from boulder_sweep.runner.cluster import Cluster
-    from boulder_sweep.runner.dispatch import Task
 
 THREADING, DASK = "threading", "dask"
 BACKENDS = (THREADING, DASK)
 """Threads of this process: the kernels run without the interpreter's lock. Or a Dask cluster."""
 MOST_JOBS = 4096
 """Most workers that may be asked for, more than a machine has cores; starting a million would exhaust it."""
+CONNECT_S = 10.0
+"""How long to wait for a scheduler, for a first worker, and for the answer of every worker [s]."""
 Call = tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
 """Function, arguments and named arguments, see `call`."""
-_CALLS_PER_THREAD = 3
-"""Calls on a cluster whose results were not yielded yet."""
+_LOOK_EVERY_S = 0.5
+_LOOPBACK = "127.0.0.1:0"
 
 
 def call(function: Callable[..., Any], *arguments: Any, **named: Any) -> Call:
@@ -32,7 +37,7 @@ def call(function: Callable[..., Any], *arguments: Any, **named: Any) -> Call:
 
 
 class Pool:
-    """Yields the results of calls in their order, with a bounded number of calls in progress.
+    """Yields the results of calls, with a bounded number of calls in progress.
 
     What is sent to a worker together with a pool gets one that works in the calling thread.
 
@@ -40,10 +45,8 @@ class Pool:
     ----------
     jobs
         Threads; all cores by default. With one job everything runs in the calling thread.
-    cluster
-        Where to work instead.
-    clock
-        Gives the time [s].
+    client
+        Of the Dask cluster on which to work instead.
 
     Raises
     ------
@@ -51,13 +54,28 @@ class Pool:
         The number of threads is not a whole number, or out of range.
     """
 
-    def __init__(self, jobs: int | None, cluster: Cluster | None = None, clock: Callable[[], float] = time.monotonic):
+    def __init__(self, jobs: int | None, client: Any = None):
         check_jobs(jobs)
-        self._clock = clock
-        self._jobs, self._cluster = jobs, cluster
+        self._jobs, self.client = jobs, client
 
-    def __call__(self, calls: Iterable[Call]) -> Iterator[Any]:
+    @property
+    def jobs(self) -> int:
+        """Threads that work side by side."""
+        if self.client is not None:
+            return max(sum(self.client.ncores().values()), 1)
+        return self._jobs or available_cores()
+
+    def __call__(self, calls: Iterable[Call], *, in_order: bool = True, shared: Any = None) -> Iterator[Any]:
         """Make the calls.
+
+        Parameters
+        ----------
+        calls
+            What to call.
+        in_order
+            Whether results come in the order of the calls, or as they are there.
+        shared
+            An argument that calls have in common; it is sent to each worker of a cluster once.
 
         Raises
         ------
@@ -66,50 +84,73 @@ class Pool:
         ClusterLostError
             The scheduler or the workers are gone.
         """
-        if self._cluster is not None:
-            return self._on_cluster(self._cluster, calls)
+        if self.client is not None:
+            return _watched(self.client, lambda: self._results(calls, in_order, shared))
         calls = iter(calls)
         first = list(itertools.islice(calls, 2))
         calls = itertools.chain(first, calls)
         if self._jobs == 1 or len(first) < 2:
             return (function(*arguments, **named) for function, arguments, named in calls)
+        with telling_start_failure(self._jobs):
+            return self._results(calls, in_order, shared)
+
+    def _results(self, calls: Iterable[Call], in_order: bool, shared: Any) -> Iterator[Any]:
         import joblib  # a quarter of the time of a short question
 
-        with telling_start_failure(self._jobs):
-            return joblib.Parallel(n_jobs=self._jobs or -1, backend="threading", return_as="generator")(calls)
+        backend: dict[str, Any] = {"backend": THREADING}
+        if self.client is not None:
+            backend = {"backend": DASK, "client": self.client, "scatter": [shared] if shared is not None else None}
+        with joblib.parallel_config(**backend):
+            how = "generator" if in_order else "generator_unordered"
+            results: Iterator[Any] = joblib.Parallel(n_jobs=self._jobs or -1, return_as=how, batch_size=1)(calls)
+            return results
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Pool, (1,)
 
-    def _on_cluster(self, cluster: Cluster, calls: Iterable[Call]) -> Iterator[Any]:
-        """Make the calls on a cluster."""
-        from boulder_sweep.runner.dispatch import Dispatcher, Task
 
-        dispatcher: Dispatcher[int] = Dispatcher(cluster, clock=self._clock)
-        numbered = enumerate(calls)
-        results: dict[int, Any] = {}
-        first = submitted = 0
+def _watched(client: Any, start: Callable[[], Iterator[Any]]) -> Iterator[Any]:
+    """Yield results from a cluster; joblib waits for ever for what Dask has given up, and this does not."""
+    arrived: queue.SimpleQueue[tuple[str, Any]] = queue.SimpleQueue()
 
-        def next_task() -> Task[int] | None:
-            """Return the next call, unless there are results enough that wait for the one of an earlier call."""
-            nonlocal submitted
-            if submitted - first >= _CALLS_PER_THREAD * max(dispatcher.threads, 1):
-                return None
-            number, one = next(numbered, (-1, None))
-            if one is None:
-                return None
-            submitted = number + 1
-            return Task(number, *one)
+    def work() -> None:
+        try:
+            for result in start():
+                arrived.put(("result", result))
+            arrived.put(("end", None))
+        except BaseException as problem:
+            arrived.put(("problem", problem))
 
-        for number, result, problem in dispatcher.outcomes(next_task):
-            if isinstance(problem, BoulderSweepError):
-                raise problem
-            if problem is not None:
-                raise BackendError(f"the workers cannot answer this: {one_line(problem)}") from problem
-            results[number] = result
-            while first in results:
-                yield results.pop(first)
-                first += 1
+    threading.Thread(target=work, name="results of a cluster", daemon=True).start()
+    kind = ""
+    while kind != "end":
+        try:
+            kind, what = arrived.get(timeout=_LOOK_EVERY_S)
+        except queue.Empty:
+            _refuse_lost(client)
+            continue
+        if kind == "result":
+            yield what
+        elif isinstance(what, BoulderSweepError):
+            raise what
+        elif kind == "problem":
+            _refuse_lost(client)
+            raise BackendError(f"the workers cannot compute this: {one_line(what)}") from what
+
+
+def _refuse_lost(client: Any) -> None:
+    """Refuse to wait for what does not come.
+
+    Raises
+    ------
+    ClusterLostError
+        The scheduler is gone, or has given up a call: workers died of it, or what it needs is lost.
+    """
+    if client.status != "running":
+        raise ClusterLostError("the connection to the Dask scheduler was lost")
+    states = {state.status for state in list(client.futures.values())}
+    if gone := states & {"error", "lost", "cancelled"}:
+        raise ClusterLostError(f"Dask has given up a part of the work ({gone.pop()}): its workers were lost")
 
 
 @contextmanager
@@ -124,16 +165,113 @@ def pool(jobs: int | None, backend: str = THREADING, scheduler: str | None = Non
         The number of jobs is not a whole number, or out of range.
     """
     check_backend(backend, scheduler)
+    check_jobs(jobs)
     if backend != DASK:
         yield Pool(jobs)
         return
-    from boulder_sweep.runner.cluster import Cluster
-
-    cluster = Cluster(jobs or available_cores(), scheduler)
     try:
-        yield Pool(jobs, cluster)
+        distributed = import_module("distributed")  # an extra: most users have no cluster
+    except ImportError:
+        raise BackendError("the backend dask needs a package: pip install 'boulder-sweep[dask]'") from None
+    with _silenced_loggers():
+        ends: list[Callable[..., Any]] = []
+        try:
+            if scheduler is None:
+                cluster = _local_cluster(distributed, jobs or available_cores())
+                ends.append(cluster.close)
+                client = distributed.Client(cluster, set_as_default=False)
+            else:
+                client = _connected(distributed, scheduler)
+            ends.insert(0, client.close)
+            if scheduler is not None:
+                _check_workers(client, scheduler)
+            yield Pool(jobs, client)
+        finally:
+            for end in ends:
+                with suppress(Exception):  # a scheduler that died cannot be told
+                    end(timeout=2)
+
+
+def _local_cluster(distributed: Any, jobs: int) -> Any:
+    """Start a scheduler and a worker in this process, reachable from this machine only."""
+    with warnings.catch_warnings():  # a machine without a network is no reason for a warning
+        warnings.filterwarnings("ignore", "Couldn't detect a suitable IP address", RuntimeWarning)
+        return distributed.LocalCluster(
+            processes=False,
+            n_workers=1,
+            threads_per_worker=jobs,
+            dashboard_address=_LOOPBACK,
+            worker_dashboard_address=_LOOPBACK,
+        )
+
+
+def _connected(distributed: Any, scheduler: str) -> Any:
+    """Connect to a scheduler."""
+    try:
+        return distributed.Client(scheduler, timeout=CONNECT_S, set_as_default=False)
+    except (OSError, ValueError) as problem:
+        raise BackendError(f"no Dask scheduler answers at {scheduler}: {one_line(problem)}") from problem
+
+
+def _check_workers(client: Any, scheduler: str) -> None:
+    """Wait for a worker, and refuse workers whose rows could differ from those of this machine.
+
+    Raises
+    ------
+    BackendError
+        There is none, one does not answer, or one has other versions.
+    """
+    work = client.submit(int, pure=False)  # the scheduler of an adaptive cluster starts a worker when there is work
+    try:
+        client.wait_for_workers(1, timeout=CONNECT_S)
+    except TimeoutError:
+        text = f"the Dask scheduler at {scheduler} has no worker; start one with: dask worker {scheduler}"
+        raise BackendError(text) from None
+    work.release()
+    try:
+        answers = client.sync(client._run, fingerprint, on_error="return", callback_timeout=CONNECT_S)
+    except TimeoutError:
+        raise BackendError("a worker of the Dask scheduler does not answer: look whether it hangs") from None
+    here, different = fingerprint(), []
+    for address, there in answers.items():
+        if isinstance(there, Exception):
+            if not isinstance(there, OSError):  # one that leaves meanwhile does not matter
+                raise BackendError(f"the worker {address} cannot compute: {one_line(there)}")
+        elif tuple(there) != here:
+            different.append(address)
+    if different:
+        raise BackendError(other_versions_text(f"the workers {', '.join(different)}"))
+
+
+def fingerprint() -> tuple[dict[str, str], str, str]:
+    """Return versions and hashes of the code that computes here."""
+    from boulder_sweep.store.provenance import kernels_sha256, rules_sha256, versions
+
+    return versions(), kernels_sha256(), rules_sha256()
+
+
+def other_versions_text(who: str) -> str:
+    """Say that versions differ."""
+    return (
+        f"{who} and this machine have different versions of boulder-sweep, Python or NumPy, or processors that differ "
+        f"in the last bits (with and without fused multiply-add); install the same versions everywhere, on processors "
+        f"of one kind"
+    )
+
+
+@contextmanager
+def _silenced_loggers() -> Iterator[None]:
+    """Silence the loggers of Dask, whose messages the errors of a run replace."""
+    names = [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]
+    loggers = [logging.getLogger(name) for name in (*names, "tornado.application", "asyncio")]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
     finally:
-        cluster.close()
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
 
 
 def available_cores() -> int:

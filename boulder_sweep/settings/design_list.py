@@ -17,7 +17,7 @@ import numpy as np
 from boulder_sweep.columns import BY_NAME as TABLE_COLUMNS
 from boulder_sweep.columns import OUTCOME_COLUMNS
 from boulder_sweep.designs import Label
-from boulder_sweep.locations import Location, LocationError, is_url, location_of, source_of
+from boulder_sweep.locations import Location, LocationError, is_url, location_of, opened, source_of
 from boulder_sweep.parquet import MOST_BYTES, MOST_ROWS, ParquetError, TableFile
 from boulder_sweep.settings.fields import INPUTS, Field
 from boulder_sweep.settings.problems import (
@@ -174,7 +174,7 @@ def _read_xlsx(path: Location, problems: ProblemList) -> DesignList:
 
     Parameters
     ----------
-    path : Path or RemotePath
+    path : Path or UPath
         Excel workbook; first row the column names. Empty rows are skipped, formulas count by their stored value.
     problems : ProblemList
         Receives mistakes.
@@ -272,7 +272,7 @@ def _check_pieces(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, label: str) 
 def _read_columns(path: Location, problems: ProblemList) -> DesignList:
     label = str(path)
     try:
-        with path.open("rb") as source:
+        with opened(path) as source:
             return _checked_columns(TableFile(source, MAX_TABLE_ROWS, most_text=math.inf), path, problems)
     except ParquetError as problem:
         raise refuse(label, str(problem)) from None

@@ -6,10 +6,9 @@ import stat
 from collections import Counter
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from boulder_sweep.errors import BoulderSweepError
-from boulder_sweep.locations import RemotePath
+from boulder_sweep.locations import Location, stat_of
 
 MAX_REPORTED = 100
 """Most problems reported at once: a longer list does not help, and a hostile file could make it endless."""
@@ -138,12 +137,12 @@ def refuse(file: str, message: str, line: int | None = None, column: int | None 
     return SettingsError([Problem(file, line, column, "", message)])
 
 
-def check_regular_file(path: Path | RemotePath, max_bytes: int, what: str) -> None:
+def check_regular_file(path: Location, max_bytes: int, what: str) -> None:
     """Refuse anything but a regular file of at most `max_bytes`, before a byte is read.
 
     Parameters
     ----------
-    path : Path or RemotePath
+    path : Path or UPath
         The file.
     max_bytes : int
         Largest size admitted.
@@ -157,7 +156,7 @@ def check_regular_file(path: Path | RemotePath, max_bytes: int, what: str) -> No
     """
     label = str(path)
     try:
-        status = path.stat()
+        status = stat_of(path)
     except FileNotFoundError:
         raise refuse(label, "there is no such file") from None
     except (OSError, ValueError) as error:

@@ -8,6 +8,7 @@ a file, its lines, its columns, and the characters of a row.
 from __future__ import annotations
 
 import csv
+import io
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -16,7 +17,7 @@ from typing import TextIO
 
 import numpy as np
 
-from boulder_sweep.locations import Location
+from boulder_sweep.locations import Location, opened
 from boulder_sweep.settings.problems import Alike, Position, ProblemList, cell_position, refuse, shorten
 from boulder_sweep.settings.values import NumberError, split_number
 
@@ -272,7 +273,7 @@ def open_text(path: Location, most_lines: int, known: Sequence[str], problems: P
     """
     label = str(path)
     try:
-        with path.open(encoding="utf-8-sig", newline="") as stream:
+        with io.TextIOWrapper(opened(path), encoding="utf-8-sig", newline="") as stream:
             lines = _Lines(stream, label, most_lines)
             try:
                 yield _table_of(lines, known, problems)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 
 from boulder_sweep.errors import EXIT_CONFLICT, EXIT_INTERNAL, EXIT_WRONG_USE, BoulderSweepError
-from boulder_sweep.locations import Location, RemotePath
+from boulder_sweep.locations import Location
 from boulder_sweep.text import printable
 
 _LONGEST = 200
@@ -21,12 +21,6 @@ def settings_file(path: object) -> str:
 
 class StoreError(BoulderSweepError):
     """An output folder cannot be used, or can no longer be written."""
-
-
-def refuse_to_guess(location: Location, problem: OSError) -> None:
-    """Raise StoreError where a file is on an object store: what does not answer is not damaged."""
-    if isinstance(location, RemotePath):
-        raise StoreError(f"{location} cannot be read: {problem.strerror}") from None
 
 
 class OutputExistsError(StoreError):
@@ -102,17 +96,30 @@ class OtherVersionError(StoreError):
 
     def __init__(self, out: Location, said: str):
         self.out = out
-        super().__init__(f"{out} {said}. Into the same folder, `sweep run` needs --overwrite")
+        super().__init__(f"{out} {said}. `sweep run` writes into another folder, or into this one once it is empty")
 
 
 class DamagedError(StoreError):
-    """A part or the manifest is damaged: truncated, changed or missing."""
+    """A part is damaged: truncated, changed, or of another run."""
 
     exit_code = EXIT_INTERNAL
 
 
+class TwoResultsError(DamagedError):
+    """The same rows are there twice, with different content."""
+
+    exit_code = EXIT_CONFLICT
+
+    def __init__(self, out: Location, first: str, second: str):
+        self.out, self.names = out, (first, second)
+        super().__init__(
+            f"{out} holds two different results for the same rows: {first} and {second}. Remove the wrong one, or "
+            f"start again with --overwrite"
+        )
+
+
 class ImpossibleRecordsError(DamagedError):
-    """A manifest is intact, but holds what no sweep writes: somebody else made it."""
+    """A part is intact, but says of itself what no sweep writes: somebody else made it."""
 
     exit_code = EXIT_WRONG_USE
 
@@ -122,8 +129,8 @@ class ImpossibleRecordsError(DamagedError):
 
     def __str__(self) -> str:
         return (
-            f"{self.path} holds what no sweep writes ({self.what}); nothing beside it was read or changed. Get the "
-            f"folder anew from where it came, or start again with --overwrite"
+            f"{self.path} holds what no sweep writes ({self.what}). Get the folder anew from where it came, or start "
+            f"again with --overwrite"
         )
 
 
@@ -131,23 +138,5 @@ class WriteError(StoreError):
     """The folder could not be written; finished parts are intact, and the run can be resumed."""
 
 
-class LinkError(StoreError):
-    """A link lies where a file is to be written; whoever put it there would choose what is overwritten."""
-
-
-class FolderRemovedError(StoreError):
-    """The output folder was removed during the run, or moved, or is that of another run by now."""
-
-    def __init__(self, out: Location):
-        super().__init__(out)
-        self.out = out
-
-    def __str__(self) -> str:
-        return (
-            f"{self.out} was removed, moved or replaced during the run, or its file _lock was; nothing more is "
-            f"written. Run again to compute what is missing"
-        )
-
-
 class DoesNotFitError(StoreError):
-    """The result cannot fit on the disk or in memory; found before any work."""
+    """The result cannot fit on the disk; found before any work."""

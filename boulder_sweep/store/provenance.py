@@ -1,24 +1,18 @@
-"""Settings, code and machine behind a table.
+"""Settings and code behind a table.
 
-The *identity* is what must be equal for rows to belong to one table: settings, control of the integration,
-versions and the hashes of the code that decides a row. It goes into every part and into the manifest, and a
-run is resumed only with the same; the heading of reports, on which no row depends, may change. When, where
-and with how many workers rows were computed does not affect
-them; that is kept in the manifest only, and the name of the processor in the parts, so that equal runs on equal
-machines give equal parts.
+The *identity* is what must be equal for rows to belong to one table: settings, control of the integration, versions,
+the instructions of the processor that decide bits, and the hashes of the code that decides a row. It goes into every
+part, and a run is resumed only with the same; the heading of reports, on which no row depends, may change. When, where
+and with how many workers rows were computed does not affect them, and is not kept.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import os
 import platform
-import socket
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
-from datetime import UTC, datetime
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -44,34 +38,14 @@ _DECIDING_SOURCES = (
     "stones/rock.py",
 )
 """Modules, in addition to the kernels, whose code determines the rows: of settings and stones what others import."""
-IDENTITY_KINDS = {
-    "format": int,
-    "settings": {"name": str, "inputs": dict, "model": dict, "criterion": dict, "solver": dict, "labels": dict},
-    "readings": dict,
-    "control": dict,
-    "accuracy": dict,
-    "versions": dict,
-    "settings_sha256": str,
-    "kernels_sha256": str,
-    "rules_sha256": str,
+_JSON = {"format", "settings", "readings", "control", "accuracy", "versions"} | {
+    *("rows", "ranges", "range", "verdicts", "firmness"),  # of parts only
 }
-"""Kinds of the entries of an identity that are looked at by name."""
-
-
-@dataclass
-class Session:
-    """One run into the folder: the first, or one that resumed."""
-
-    started: str
-    host: str
-    pid: int
-    cpu: str
-    jobs: int
-    backend: str
-    command: str
-    ended: str | None = None
-    how: str | None = None
-    """How it ended: ``finished``, or what stopped it; None while it runs, and also if it was killed."""
+"""Entries of the metadata that are JSON."""
+_OWN = tuple(f"{PREFIX}{name}".encode() for name in ("range", "verdicts"))
+"""Entries in which the parts of a table differ."""
+_DEEPEST = 32
+"""Most levels of nested records; a settings file has fewer than ten."""
 
 
 def canonical(content: Any) -> str:
@@ -140,11 +114,38 @@ def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
 
 
 def identity_in(metadata: Mapping[bytes, bytes] | None) -> dict[str, Any]:
-    """Return the identity in the metadata of a file, and what else `file_metadata` wrote; empty of another file."""
+    """Return the identity in the metadata of a file, and what else `file_metadata` wrote; empty of another file.
+
+    Raises
+    ------
+    ValueError, RecursionError
+        It holds what no command writes.
+    """
     texts = {key.decode(errors="replace"): value for key, value in (metadata or {}).items()}
     entries = {key.removeprefix(PREFIX): value for key, value in texts.items() if key.startswith(PREFIX)}
-    parsed = ("format", "settings", "readings", "control", "accuracy", "versions")
-    return {key: json.loads(value) if key in parsed else value.decode() for key, value in entries.items()}
+    parsed = {key: json.loads(value) if key in _JSON else value.decode() for key, value in entries.items()}
+    if _is_deep(parsed):
+        raise ValueError("its records are nested too deeply")
+    return parsed
+
+
+def common_in(metadata: Mapping[bytes, bytes] | None) -> dict[bytes, bytes]:
+    """Return the metadata that all parts of a table have in common."""
+    return {key: value for key, value in (metadata or {}).items() if not is_own(key)}
+
+
+def is_own(key: bytes) -> bool:
+    """Whether an entry of the metadata is one in which the parts of a table differ."""
+    return key in _OWN
+
+
+def _is_deep(content: Any) -> bool:
+    """Whether records are nested so deeply that functions that call themselves could fail."""
+    level = [content]
+    for _ in range(_DEEPEST):
+        nested = [one.values() if isinstance(one, dict) else one for one in level if isinstance(one, dict | list)]
+        level = [value for values in nested for value in values]
+    return bool(level)
 
 
 def other_version(there: Any) -> str:
@@ -186,6 +187,8 @@ def check_identity(there: Mapping[str, Any]) -> None:
     for name in ("settings", "control", "readings", "versions"):
         if not isinstance(there.get(name), dict):
             raise ValueError(f"{name} is missing")
+    if not isinstance(there.get("accuracy", {}), dict):
+        raise ValueError("accuracy is no record")
     check_stored(there["settings"])
     check_control(there["control"], there["readings"])
     if any(type(version) is not str for version in there["versions"].values()):
@@ -209,52 +212,24 @@ def judged_by(there: Mapping[str, Any]) -> str:
     return f"judged by the rules of version {shorten(str(version_))} ({hashes})"
 
 
-def file_metadata(
-    identity_: Mapping[str, Any], repeat: str, firmness: Mapping[str, Any] | None = None
-) -> dict[bytes, bytes]:
-    """Metadata of a part: its identity, and also command, commit and processor.
+def file_metadata(identity_: Mapping[str, Any], **more: Any) -> dict[bytes, bytes]:
+    """Metadata of a file: the identity of its rows, and more entries by name; None for none.
 
     Parameters
     ----------
     identity_
         See `identity`.
-    repeat
-        Command that computes the same table.
-    firmness
-        How many verdicts of a sample small changes would change, see `boulder_sweep.judge.firmness`.
+    more
+        Of a part: ``rows`` of its table, the number of its ``ranges``, and ``firmness``, see
+        `boulder_sweep.judge.firmness`. Of answers: the command that would ``repeat`` them.
     """
-    entries = {**identity_, "repeat": repeat, "commit": commit(), "firmness": firmness}
-    metadata = {
+    return {
         f"{PREFIX}{key}".encode(): (value if isinstance(value, str) else canonical(value)).encode(
             errors="backslashreplace"
         )
-        for key, value in entries.items()
+        for key, value in {**identity_, **more}.items()
         if value is not None
     }
-    return metadata | cpu_metadata()
-
-
-def cpu_metadata() -> dict[bytes, bytes]:
-    """Metadata of a part that only the worker that computes it knows: its processor."""
-    return {f"{PREFIX}cpu".encode(): cpu_name().encode(errors="backslashreplace")}
-
-
-def new_session(command: str, jobs: int, backend: str) -> Session:
-    """Describe the run that starts now."""
-    return Session(
-        started=now(),
-        host=socket.gethostname(),
-        pid=os.getpid(),
-        cpu=cpu_name(),
-        jobs=jobs,
-        backend=backend,
-        command=command,
-    )
-
-
-def now() -> str:
-    """Time in ISO 8601, UTC, to the millisecond."""
-    return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
 @cache
@@ -302,37 +277,6 @@ def rules_sha256() -> str:
             raise FileNotFoundError(f"{_PACKAGE_FOLDER / pattern}: sources that decide a row are missing")
         sources += paths
     return _sources_sha256(sources)
-
-
-@cache
-def cpu_name() -> str:
-    """Name of the processor."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
-        lines = []
-    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
-    return next(names, "") or platform.processor() or platform.machine()
-
-
-@cache
-def commit() -> str | None:
-    """Git commit of the source tree this package runs from; None for an installed package."""
-    folder = _PACKAGE_FOLDER.parent
-    try:
-        if 'name = "boulder-sweep"' not in (folder / "pyproject.toml").read_text(encoding="utf-8"):
-            return None
-        head = (folder / ".git" / "HEAD").read_text().strip()
-        if not head.startswith("ref: "):
-            return head
-        reference = head.removeprefix("ref: ")
-        loose = folder / ".git" / reference
-        if loose.exists():
-            return loose.read_text().strip()
-        packed = (folder / ".git" / "packed-refs").read_text().splitlines()
-    except OSError:
-        return None
-    return next((line.split()[0] for line in packed if line.endswith(f" {reference}")), None)
 
 
 def _sources_sha256(sources: list[Path]) -> str:

@@ -28,7 +28,7 @@ from boulder_sweep.judge.inputs import Designs, sampled_designs
 from boulder_sweep.judge.judged import FAIL, PASS, UNDECIDED
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.judge.verdict import Limits, judge
-from boulder_sweep.store.files import replacing
+from boulder_sweep.locations import replacing
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep

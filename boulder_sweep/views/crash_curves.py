@@ -11,7 +11,7 @@ import numpy as np
 from boulder_sweep.crash_tests.cases import CLOSE_UNTIL_S, NAMES, PAPERS_N
 from boulder_sweep.crash_tests.measured import PULSE_UNITS
 from boulder_sweep.crash_tests.overlay import simulated_signal
-from boulder_sweep.store.files import replacing
+from boulder_sweep.locations import replacing
 from boulder_sweep.views import pictures
 from boulder_sweep.views.pictures import BLACK, BLUE, GREY, ORANGE
 

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.errors import PictureError
-from boulder_sweep.store.files import check_target, replacing
+from boulder_sweep.locations import replacing
+from boulder_sweep.store.folder import check_target
 from boulder_sweep.text import NO_BREAK_SPACE, printable, why
 
 if TYPE_CHECKING:

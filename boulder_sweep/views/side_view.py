@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from boulder_sweep.errors import PictureError
-from boulder_sweep.store.files import replacing
+from boulder_sweep.locations import replacing
 from boulder_sweep.text import ProgressCallback, why
 from boulder_sweep.views import pictures
 from boulder_sweep.views.scene import STYLES, SceneItem, SideView, samples_shown

@@ -20,7 +20,7 @@ from boulder_sweep.views.wording import RATIO
 if TYPE_CHECKING:
     import pandas as pd
 
-    from boulder_sweep.store.reader import FinishedRows
+    from boulder_sweep.store.reading import FinishedRows
 
 
 DEPTH, HEIGHT = "embedment_depth_m", "boulder_height_m"

@@ -12,19 +12,17 @@ import os
 import signal
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any, TypeVar
 
 from boulder_sweep.errors import Interrupted
+from boulder_sweep.locations import remove_unfinished
 
 Returned = TypeVar("Returned")
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _LOOK_EVERY_S = 0.05
-LAST_S = 3.0
-"""How long a run that ends waits for what it does last, such as closing its folder [s]."""
 
 
 class Signals:
@@ -94,33 +92,16 @@ class Signals:
             if self.caught is not None and not waits and thread.is_alive():
                 if not is_first():
                     break
-                self._abandoned.append(thread)
+                self.abandon(thread)
                 raise Interrupted(self.caught)
         thread.join()
         if problem:
             raise problem[0]
         return outcome[0]
 
-    def attempt(self, *functions: Callable[[], object], hurry: bool) -> None:
-        """Call functions in threads of their own, and wait until they have ended, but not for ever.
-
-        Parameters
-        ----------
-        functions
-            What to call, such as what asks a store that may be silent; they must not raise.
-        hurry
-            Whether to wait for `LAST_S` only, as after a signal. They then go on until the process ends.
-        """
-        threads = [threading.Thread(target=function, name="last work", daemon=True) for function in functions]
-        for thread in threads:
-            thread.start()
-        while not hurry and self.caught is None and any(thread.is_alive() for thread in threads):
-            for thread in threads:
-                thread.join(_LOOK_EVERY_S)
-        end = time.monotonic() + LAST_S
-        for thread in threads:
-            thread.join(max(end - time.monotonic(), 0.0))
-        self._abandoned += [thread for thread in threads if thread.is_alive()]
+    def abandon(self, thread: threading.Thread) -> None:
+        """Leave a thread to the end of the process, which does not wait for it."""
+        self._abandoned.append(thread)
 
     @contextmanager
     def deferred(self) -> Iterator[None]:
@@ -140,6 +121,7 @@ class Signals:
     def end_abandoned(self) -> None:
         """End the process now if abandoned work is still running: it could crash while the interpreter shuts down."""
         if self.caught is not None and any(thread.is_alive() for thread in self._abandoned):
+            remove_unfinished()
             for stream in (sys.stdout, sys.stderr):
                 with suppress(OSError, ValueError):
                     stream.flush()

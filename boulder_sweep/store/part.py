@@ -1,8 +1,12 @@
-"""The table on disk: types, units, encodings, and the way from columns of numbers to the bytes of a part.
+"""A part of a table: the rows of one range, as the bytes of a Parquet file that says everything of itself.
+
+The ranges of a table follow from its settings alone (`folder.Ranges`), and so do the bytes of each part. Nothing in
+them depends on machine, moment, number of workers or interruptions: a part may be written twice without harm. Its
+metadata holds what all rows of the table have in common (`provenance`), its range, and its rows by verdict.
 
 Inputs repeat a few values over and over, so they are dictionary-encoded and stay codes from the grid to the
 file. Computed numbers hardly ever repeat: their bytes are stored split by significance, which compresses best.
-Every page has a checksum. Nothing here depends on time or machine load, so the same rows give the same bytes.
+Every page has a checksum.
 """
 
 from __future__ import annotations
@@ -29,6 +33,7 @@ from boulder_sweep.columns import (
     column_spec,
 )
 from boulder_sweep.judge.judged import PASS, Judged
+from boulder_sweep.store.provenance import PREFIX, canonical
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import Column, DesignBlock
@@ -85,6 +90,26 @@ def part_table(block: DesignBlock, judged: Judged, metadata: Mapping[bytes, byte
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=_complete(metadata, specs)))
 
 
+def encoded_part(
+    block: DesignBlock, judged: Judged, metadata: Mapping[bytes, bytes]
+) -> tuple[memoryview, dict[str, int]]:
+    """Return the bytes of a part, and its rows of each verdict and reason, see `verdict_counts`.
+
+    Parameters
+    ----------
+    block
+        Inputs of the rows [start, stop) of one range.
+    judged
+        Outcomes of the same rows.
+    metadata
+        What all parts have in common, see `provenance.file_metadata`.
+    """
+    verdicts = verdict_counts(judged)
+    own = {"range": [block.start, block.stop], "verdicts": verdicts}
+    entries = {f"{PREFIX}{key}".encode(): canonical(value).encode() for key, value in own.items()}
+    return encode(part_table(block, judged, {**metadata, **entries})), verdicts
+
+
 def encode(table: pa.Table) -> memoryview:
     """Return the bytes of a Parquet file with the whole table in one row group."""
     split = [field.name for field in table.schema if field.name != DESIGN_ID.name and pa.types.is_floating(field.type)]
@@ -102,17 +127,6 @@ def encode(table: pa.Table) -> memoryview:
         row_group_size=max(len(table), 1),
     )
     return memoryview(sink.getvalue())
-
-
-def judged_rows(table: pa.Table) -> Judged:
-    """Return the outcomes of a table that was read back, as they were before it was written."""
-    columns, words = {}, {}
-    for spec in OUTCOMES:
-        if spec.type == "dictionary":
-            words[spec.name], columns[spec.name] = _coded(table[spec.name], spec.words)
-        else:
-            columns[spec.name] = table[spec.name].to_numpy()  # null becomes NaN
-    return Judged(columns, words)
 
 
 def verdict_counts(judged: Judged) -> dict[str, int]:
@@ -194,17 +208,3 @@ def _texts(words: tuple[str, ...]) -> pa.Array:
     encoded = [word.encode() for word in words]
     ends = np.cumsum([0, *map(len, encoded)], dtype=np.int32)
     return pa.StringArray.from_buffers(len(words), pa.py_buffer(ends), pa.py_buffer(b"".join(encoded)))
-
-
-def _coded(column: pa.ChunkedArray, words: tuple[str, ...]) -> tuple[tuple[str, ...], np.ndarray]:
-    """Words of a column, the known ones first, and the code of each row; -1 where it is null."""
-    array = column.unify_dictionaries().combine_chunks()
-    if isinstance(array, pa.ChunkedArray):
-        array = array.chunk(0)
-    stored = array.dictionary.to_pylist()
-    words = (*words, *(word for word in stored if word not in words))
-    translation = np.array([words.index(word) for word in stored], dtype=np.int32)
-    codes = np.full(len(array), -1, dtype=np.int32)
-    present = array.is_valid().to_numpy(zero_copy_only=False)
-    codes[present] = translation[array.indices.drop_null().to_numpy()]
-    return words, codes

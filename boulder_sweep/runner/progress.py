@@ -1,0 +1,295 @@
+"""What a run reports: its cost before, from a timed sample; progress on the way; a summary at the end."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
+from boulder_sweep.locations import Location
+from boulder_sweep.text import size_text
+
+if TYPE_CHECKING:
+    from boulder_sweep.judge.evaluation import Evaluation
+    from boulder_sweep.settings import Sweep
+
+_SAMPLES = (1, 16, 128, 1024, 8192)
+"""Rows of the samples, each computed if the one before lets expect no more than `_SAMPLE_S`; the last one counts."""
+_SAMPLE_S = 0.2
+_STRETCHES = 24
+"""Positions all over the table from which a sample takes consecutive rows, equally many from each."""
+_GOLDEN = 0.618033988749895
+
+
+class RowCost(NamedTuple):
+    """Cost of a few sampled rows: time on one worker, bytes, and bytes of a part without rows."""
+
+    seconds_per_row: float
+    bytes_per_row: float
+    bytes_per_part: float
+
+
+_GUESS = RowCost(seconds_per_row=1e-5, bytes_per_row=50.0, bytes_per_part=30_000.0)
+"""For a sweep none of whose sampled rows can be computed."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a run needs: the rows of the table, those it computes, their time and disk, and damaged parts by name."""
+
+    rows: int
+    rows_to_compute: int
+    seconds: float
+    disk_bytes: int
+    jobs: int
+    damaged: dict[str, str] = field(default_factory=dict)
+
+
+def take_sample(
+    evaluation: Evaluation,
+    sweep: Sweep,
+    metadata: Mapping[bytes, bytes],
+    work_clock: Callable[[], float] = time.thread_time,
+) -> RowCost:
+    """Compute a few rows spread over the table and measure the time; the kernels must be warm.
+
+    The largest sample counts: it is computed like a block of the run, so that what a block costs besides its rows, and
+    lanes that are not full, weigh as little as they will. The time is the processor's, by `work_clock` [s]: while other
+    programs keep it busy, blocks must not become shorter.
+    """
+    import pyarrow as pa  # heavy, and only runs need it
+
+    from boulder_sweep.store.part import encode, part_table, table_schema
+
+    seconds_per_row, table = 0.0, None
+    for size in (1, *_SAMPLES):  # the first loads what it needs, which takes time of its own
+        if size > 1 and (table is None or size * seconds_per_row > _SAMPLE_S or len(table) == sweep.n_designs):
+            break
+        begun = work_clock()
+        try:
+            block = sweep.plan.selection(_spread_rows(sweep.n_designs, size))
+            table = part_table(block, evaluation(block), metadata)
+        except Exception:  # the run itself will retry and name the rows; the sample before counts
+            break
+        seconds_per_row = (work_clock() - begun) / len(block)
+    if table is None:
+        return _GUESS
+    beside_rows = len(encode(pa.Table.from_batches([], table_schema(metadata))))
+    return RowCost(seconds_per_row, max(len(encode(table)) - beside_rows, 0) / len(table), beside_rows)
+
+
+def _spread_rows(rows: int, count: int) -> np.ndarray:
+    """Return numbers of about so many rows, ascending, int64: short stretches from all over a table."""
+    if count >= rows:
+        return np.arange(rows, dtype=np.int64)
+    stretch = -(-count // _STRETCHES)
+    positions = (0.5 + _GOLDEN * np.arange(-(-count // stretch))) % 1.0
+    starts = (positions * (rows - stretch)).astype(np.int64)
+    return np.unique(starts[:, np.newaxis] + np.arange(stretch))
+
+
+def time_and_disk(cost: RowCost, rows: int, parts: int, workers: int) -> tuple[float, int]:
+    """Return how long so many rows take [s], and how many bytes, from the cost of a sample."""
+    return rows * cost.seconds_per_row / workers, int(rows * cost.bytes_per_row + parts * cost.bytes_per_part)
+
+
+def too_large(rows: int, about: str, needed_bytes: int, out: Location) -> str:
+    """Say that a table does not fit on its disk; empty where it does, and of an object store."""
+    free = _disk_free(out)
+    if free is None or needed_bytes <= free:
+        return ""
+    return (
+        f"the table of {rows:,} rows needs {about} {size_text(needed_bytes)} of disk, and {size_text(free)} are free. "
+        f"Free some space, or choose another folder (-o)"
+    )
+
+
+def _disk_free(out: Location) -> int | None:
+    """Free space on the disk where a folder is, or would be created; None for an object store."""
+    if not isinstance(out, Path):
+        return None
+    while not out.exists() and out != out.parent:
+        out = out.parent
+    return shutil.disk_usage(out).free
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a run got; passed to the `progress` function of `run` up to ten times a second.
+
+    Parameters
+    ----------
+    rows_done, rows
+        Rows computed so far, including earlier runs; rows of the whole table.
+    seconds
+        Since the computing began.
+    rows_per_second
+        Computed by this run.
+    seconds_left
+        At that speed; None before there is one.
+    notes
+        What the user should know so far: damaged parts.
+    """
+
+    rows_done: int
+    rows: int
+    seconds: float
+    rows_per_second: float
+    seconds_left: float | None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a finished run did.
+
+    Parameters
+    ----------
+    out
+        Folder of the table.
+    rows
+        Rows of the table.
+    rows_computed
+        Rows computed by this run; the others existed before.
+    verdicts
+        Rows of each verdict.
+    reasons
+        Rows of each verdict and reason, keyed ``verdict/reason``, or ``verdict`` where there is none.
+    seconds
+        From the call to the finished table.
+    started, host
+        When the run began, in ISO 8601, and on which machine.
+    jobs, backend
+        Workers.
+    parts, bytes
+        Files of the table and their size.
+    accuracy
+        The accuracy requested, the step chosen for it, and the error estimated by a pilot.
+    firmness
+        How many verdicts of a sample small changes of the inputs would change, see `boulder_sweep.judge.firmness`.
+    notes
+        What the user should know: damaged parts that were computed again.
+    boulder
+        What is assumed of the boulders: their ``foot``, and whether the density of the rock is (``rock_assumed``).
+    """
+
+    out: Location
+    rows: int
+    rows_computed: int
+    verdicts: dict[str, int]
+    reasons: dict[str, int]
+    seconds: float
+    started: str
+    host: str
+    jobs: int
+    backend: str
+    parts: int
+    bytes: int
+    accuracy: dict[str, Any] = field(default_factory=dict)
+    firmness: dict[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    boulder: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def rows_per_second(self) -> float:
+        """Rows computed by this run in a second, everything included."""
+        return self.rows_computed / self.seconds if self.seconds > 0 else 0.0
+
+    @property
+    def errors(self) -> int:
+        """Rows that could not be computed."""
+        return self.verdicts.get("error", 0)
+
+    @property
+    def exit_code(self) -> int:
+        """0, or 3 where some rows could not be computed."""
+        return EXIT_SOME_ROWS_FAILED if self.errors else EXIT_DONE
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        return {
+            **asdict(self),
+            "out": str(self.out),
+            "rows_per_second": self.rows_per_second,
+            "errors": self.errors,
+            "exit_code": self.exit_code,
+        }
+
+
+def progress_of(rows_before: int, rows_computed: int, rows: int, seconds: float, notes: Sequence[str] = ()) -> Progress:
+    """Return the progress of a run.
+
+    Parameters
+    ----------
+    rows_before
+        Rows that existed when the run began.
+    rows_computed
+        Rows computed since.
+    rows
+        Rows of the whole table.
+    seconds
+        Since the computing began.
+    notes
+        What the user should know so far.
+    """
+    speed = rows_computed / seconds if seconds > 0 else 0.0
+    done = rows_before + rows_computed
+    return Progress(
+        rows_done=done,
+        rows=rows,
+        seconds=seconds,
+        rows_per_second=speed,
+        seconds_left=(rows - done) / speed if speed > 0 else None,
+        notes=tuple(notes),
+    )
+
+
+def summary_of(
+    out: Location,
+    identity: Mapping[str, Any],
+    rows: int,
+    parts: Iterable[tuple[int, Mapping[str, int]]],
+    **more: Any,
+) -> Summary:
+    """Return the summary of a finished run.
+
+    Parameters
+    ----------
+    out
+        Folder of the table.
+    identity
+        See `boulder_sweep.store.provenance.identity`.
+    rows
+        Rows of the table.
+    parts
+        Bytes of each part, and its rows of each verdict and reason.
+    more
+        The other entries of `Summary`.
+    """
+    reasons: Counter[str] = Counter()
+    verdicts: Counter[str] = Counter()
+    count, size = 0, 0
+    for part_bytes, part_reasons in parts:
+        count, size = count + 1, size + part_bytes
+        reasons.update(part_reasons)
+    for key, number in reasons.items():
+        verdicts[key.partition("/")[0]] += number
+    model = identity["settings"]["model"]
+    return Summary(
+        out=out,
+        rows=rows,
+        verdicts=dict(sorted(verdicts.items())),
+        reasons=dict(sorted(reasons.items())),
+        parts=count,
+        bytes=size,
+        accuracy=identity.get("accuracy", {}),
+        boulder={name: model[name] for name in ("foot", "rock_assumed") if name in model},
+        **more,
+    )

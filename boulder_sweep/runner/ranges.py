@@ -1,0 +1,152 @@
+"""How many rows a part and a block have, and what is done with them; the same on every machine.
+
+The numbers follow from the class of the designs by a fixed table of costs, never from a clock. A block that raises is
+tried again, then halved until the rows that raise are alone; those become rows of verdict ``error``. Where thousands of
+tries fail, nothing more is computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from boulder_sweep.errors import ComputationError
+from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST
+from boulder_sweep.judge.judged import Judged, joined, not_computed
+from boulder_sweep.locations import location_of
+from boulder_sweep.soils import is_layered
+from boulder_sweep.store.folder import Ranges, put_part, ranges_of
+from boulder_sweep.text import one_line
+
+if TYPE_CHECKING:
+    from boulder_sweep.designs import DesignBlock
+    from boulder_sweep.judge.evaluation import Evaluation
+    from boulder_sweep.settings import Sweep
+
+WORK_S = 0.25
+"""Work of a range, and most of a block [s]: so long that its few rows that need finer steps fill lanes, and short
+enough for Ctrl-C to act at once."""
+_PLAIN_S, _LAYERED_S, _OUTLINED_S = 1e-5, 4e-5, 6e-5
+"""Cost of a row on one core [s]: of a box in uniform soil, in layers, and of a boulder of several pieces in them."""
+_STEP_S, _LOCATED_STEP_S, _LOCATED = 0.012, 0.006, 3.0
+"""Steps at which these hold; where steps end at the yield, rows take three times as long at half the step."""
+_OPINION_S = 1e-4
+"""Cost of a second opinion [s]."""
+_TRIES = 2
+_FAILURES_BUDGET = 5_000
+"""Failed tries after which a run stops: something is then wrong with more than single designs."""
+
+
+def seconds_per_row(sweep: Sweep, evaluation: Evaluation) -> float:
+    """Return about what a row costs on one core [s], by the table of costs."""
+    model, control = sweep.model, evaluation.control
+    layered = is_layered(model.resistance, model.ground, model.shape)
+    base = _PLAIN_S if not layered else _LAYERED_S if model.shape.is_box else _OUTLINED_S
+    step, times = (_LOCATED_STEP_S, _LOCATED) if control.locate_yield else (_STEP_S, 1.0)
+    base *= times * max(step / control.h, 1.0) * (1.0 + control.elements / ELEMENTS_AS_FAST)
+    cases = 1 + len(sweep.block(0, 1).cases)
+    return cases * (base + len(evaluation.second_opinion) * _OPINION_S)
+
+
+def planned(sweep: Sweep, evaluation: Evaluation) -> Ranges:
+    """Return the ranges of a table."""
+    return ranges_of(sweep.n_designs, WORK_S / seconds_per_row(sweep, evaluation))
+
+
+class Written(NamedTuple):
+    """What a worker says of a part that it has written."""
+
+    name: str
+    rows: int
+    bytes: int
+    verdicts: dict[str, int]
+
+
+class Stopped(Exception):  # noqa: N818 - not an error: the run was stopped
+    """The run was stopped before the range was finished."""
+
+
+@dataclass
+class Work:
+    """How the rows of one sweep are computed and written; the same for every worker, and picklable.
+
+    Parameters
+    ----------
+    evaluate
+        Simulates and judges a block.
+    make_block
+        Gives the inputs of some rows.
+    metadata
+        What the files of all parts have in common.
+    out
+        The folder, by path or URL.
+    rows_per_block
+        Rows that are computed at once.
+    """
+
+    evaluate: Callable[[DesignBlock], Judged]
+    make_block: Callable[[int, int], DesignBlock]
+    metadata: Mapping[bytes, bytes]
+    out: str
+    rows_per_block: int
+    _failures: int = field(default=0, init=False)
+
+    def write(self, first: int, stop: int, tick: Callable[[int], None] = lambda rows: None) -> Written:
+        """Compute a range and write its part.
+
+        Parameters
+        ----------
+        first, stop
+            The range.
+        tick
+            Called with the rows of each block that is done; it may raise to stop.
+
+        Raises
+        ------
+        ComputationError
+            As for `judged`.
+        WriteError
+            The part cannot be written.
+        """
+        from boulder_sweep.store.part import encoded_part  # imports pyarrow
+
+        pieces = []
+        for start, end in self._blocks(first, stop):
+            pieces.append(self.judged(start, end))
+            tick(end - start)
+        content, verdicts = encoded_part(self.make_block(first, stop), joined(pieces), self.metadata)
+        part = put_part(location_of(self.out), first, stop, content)
+        return Written(part.name, stop - first, len(content), verdicts)
+
+    def _blocks(self, first: int, stop: int) -> Iterator[tuple[int, int]]:
+        count = -(-(stop - first) // self.rows_per_block)
+        return (
+            (first + number * (stop - first) // count, first + (number + 1) * (stop - first) // count)
+            for number in range(count)
+        )
+
+    def judged(self, start: int, stop: int, tries: int = _TRIES) -> Judged:
+        """Compute the rows [start, stop); those that fail every time are rows of verdict ``error``.
+
+        Raises
+        ------
+        ComputationError
+            So many tries have failed, of these rows or others, that something must be wrong with all of them.
+        """
+        reason = ""
+        for _ in range(tries):
+            try:
+                return self.evaluate(self.make_block(start, stop))
+            except Exception as problem:
+                self._failures += 1
+                reason = one_line(problem)
+        if self._failures >= _FAILURES_BUDGET:
+            raise ComputationError(f"{self._failures:,} attempts to compute designs failed, the last with: {reason}")
+        if stop - start > 1:
+            middle = (start + stop) // 2
+            return joined([self.judged(start, middle, 1), self.judged(middle, stop, 1)])
+        reasons = (f"the computation of this design failed: {reason}",)
+        return not_computed(reasons, np.zeros(stop - start, dtype=np.int32))

@@ -1,0 +1,470 @@
+"""A whole sweep: every design of a grid simulated, judged and stored.
+
+Workers compute ranges of rows and write their parts themselves; the calling thread reports progress and watches for
+signals. What the table holds depends on the settings alone, not on workers, speed or interruptions.
+"""
+
+from __future__ import annotations
+
+import shlex
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from boulder_sweep.errors import BackendError, ClusterLostError, ComputationError, Interrupted
+from boulder_sweep.judge.accuracy import accuracy_of
+from boulder_sweep.judge.evaluation import Evaluation, Simulate, by_kernels, evaluation_of
+from boulder_sweep.judge.firmness import firmness_of
+from boulder_sweep.judge.quantiles import at_values
+from boulder_sweep.locations import Location, location_of, names_in
+from boulder_sweep.runner.pool import (
+    THREADING,
+    Pool,
+    available_cores,
+    call,
+    check_backend,
+    check_jobs,
+    pool,
+    telling_start_failure,
+)
+from boulder_sweep.runner.progress import (
+    Estimate,
+    Progress,
+    Summary,
+    progress_of,
+    summary_of,
+    take_sample,
+    time_and_disk,
+    too_large,
+)
+from boulder_sweep.runner.ranges import WORK_S, Stopped, Work, Written, planned, seconds_per_row
+from boulder_sweep.runner.signals import Signals, noted_signals
+from boulder_sweep.store import failures
+from boulder_sweep.store.folder import Ranges, clear, locked, make, part_file, part_files, remove_parts
+from boulder_sweep.store.provenance import differences, file_metadata, identity
+from boulder_sweep.store.reading import Contents, FinishedRows, Table, contents, refuse_no_result, refuse_two
+from boulder_sweep.text import why
+
+if TYPE_CHECKING:
+    from boulder_sweep.settings import Sweep
+
+__all__ = ["Estimate", "Interrupted", "Progress", "Summary", "estimate", "run"]
+
+Report = Callable[[Progress], None]
+_LOOK_EVERY_S = 0.1
+_PATIENCE_S = 3.0
+"""How long a run that was stopped waits for the blocks in hand; they then end with the process."""
+_MOST_BYTES_PER_ROW = 1000
+"""More than a row takes; where so many fit on the disk, no sample is taken."""
+
+
+@dataclass
+class _Plan:
+    """What is to be done."""
+
+    sweep: Sweep
+    evaluation: Evaluation
+    identity: dict[str, Any]
+    ranges: Ranges
+    there: Contents = field(default_factory=Contents)
+
+    @property
+    def missing(self) -> list[tuple[int, int]]:
+        """Ranges that are not there, or damaged."""
+        there = {(part.first, part.stop) for part in self.there.intact}
+        return [bounds for bounds in self.ranges if bounds not in there]
+
+    @property
+    def rows_done(self) -> int:
+        """Rows that are there."""
+        return sum(part.stop - part.first for part in self.there.intact)
+
+    def metadata(self, firmness: dict[str, Any]) -> dict[bytes, bytes]:
+        """Return what all parts say."""
+        return file_metadata(self.identity, rows=self.ranges.rows, ranges=self.ranges.count, firmness=firmness)
+
+
+def run(
+    sweep: Sweep,
+    out: str | Location,
+    *,
+    jobs: int | None = None,
+    backend: str = THREADING,
+    scheduler: str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Report | None = None,
+    resume_command: str | None = None,
+    simulate: Simulate = by_kernels,
+) -> Summary:
+    """Simulate every design of a sweep and store the table.
+
+    Parameters
+    ----------
+    sweep
+        What `boulder_sweep.load` returned.
+    out
+        Folder of the table; it is made. A path, or a URL such as ``s3://bucket/m30.sweep``.
+    jobs
+        Workers; as many as this process may use cores by default, and one for a single design.
+    backend
+        ``threading`` or ``dask``.
+    scheduler
+        Address of a Dask scheduler; with ``dask`` only.
+    resume
+        Continue what `out` holds, if it is the same sweep; damaged parts are computed again. Starts from the
+        beginning if `out` does not exist.
+    overwrite
+        Replace what a sweep wrote into `out` before.
+    progress
+        Called up to ten times a second, from the calling thread.
+    resume_command
+        The command that resumes the run; built from the arguments by default.
+    simulate
+        Function that simulates a table of designs; tests inject faults with it.
+
+    Returns
+    -------
+    Summary
+        Counts and times of the finished run.
+
+    Raises
+    ------
+    StoreError
+        `out` cannot be used, see `boulder_sweep.store.failures`; nothing has been computed then. `WriteError`
+        also when the disk fills up during the run: what is written is whole, and the run can be resumed.
+    TypeError, ValueError
+        An argument is of the wrong type, or a count is below one.
+    BackendError
+        The workers are not available.
+    ClusterLostError
+        Scheduler or workers were lost; the run can be resumed.
+    ComputationError
+        Thousands of attempts to compute designs failed; the run can be resumed.
+    Interrupted
+        SIGINT or SIGTERM arrived (main thread only); the run can be resumed.
+    """
+    begun, started = time.monotonic(), datetime.now(UTC).isoformat(timespec="seconds")
+    out = location_of(out)
+    _check_arguments(sweep, jobs, progress)
+    if resume and overwrite:
+        raise failures.StoreError("--resume and --overwrite cannot be used together")
+    sweep = at_values(sweep)
+    check_backend(backend, scheduler)
+    again = resume_command or _resume_command(sweep, out, jobs, backend, scheduler)
+    jobs = jobs or (1 if sweep.n_designs == 1 else available_cores())
+    with noted_signals() as signals, signals.deferred(), _folder(out, signals):
+        whole = _Run(out, signals, sweep.n_designs)
+        try:
+            with telling_start_failure(jobs):
+                signals.call(lambda: _refuse_taken(out, resume, overwrite))
+                if said := too_large(sweep.n_designs, "at least", sweep.n_designs if not resume else 0, out):
+                    raise failures.DoesNotFitError(said)  # a row takes a byte or more; nothing is compiled yet
+                plan = signals.call(lambda: _planned(sweep, simulate))
+                plan.there = signals.call(lambda: _there(plan, out, overwrite))
+                whole.done = plan.rows_done
+                firmness = signals.call(lambda: _firmness(plan, out))
+                whole.compute(plan, plan.metadata(firmness), lambda: pool(jobs, backend, scheduler), progress)
+        except Interrupted as stop:
+            raise Interrupted(stop.signum, whole.done, sweep.n_designs, again) from None
+        except (ClusterLostError, ComputationError) as problem:
+            safe = f"{whole.done:,} of {sweep.n_designs:,} rows are safe"
+            raise type(problem)(f"{problem}. {safe}. Resume with: {again}") from problem
+        except failures.WriteError as problem:
+            raise failures.WriteError(f"{problem}. Finished rows are safe. Resume with: {again}") from problem
+        _check_whole(out, plan, whole.written)
+    parts = [(part.bytes, part.verdicts) for part in (*plan.there.intact.values(), *whole.written)]
+    return summary_of(
+        out,
+        plan.identity,
+        sweep.n_designs,
+        parts,
+        rows_computed=sum(part.rows for part in whole.written),
+        seconds=time.monotonic() - begun,
+        started=started,
+        host=socket.gethostname(),
+        jobs=whole.jobs,
+        backend=backend,
+        firmness=firmness,
+        notes=tuple(_notes(plan)),
+    )
+
+
+class _Run:
+    """The computing part of a run.
+
+    Attributes
+    ----------
+    done : int
+        Rows that are safe.
+    written : list of Written
+        Parts written by this run.
+    jobs : int
+        Workers.
+    """
+
+    def __init__(self, out: Location, signals: Signals, rows: int):
+        self.done, self.written, self.jobs = 0, list[Written](), 1
+        self._out, self._signals, self._rows = out, signals, rows
+        self._stopped = threading.Event()
+        self._ticked = 0
+        self._problem: BaseException | None = None
+
+    def compute(
+        self, plan: _Plan, metadata: dict[bytes, bytes], workers: Callable[[], Any], progress: Report | None
+    ) -> None:
+        """Compute and write what is missing; raises as `run`."""
+        size = max(int(WORK_S / seconds_per_row(plan.sweep, plan.evaluation)), 1)
+        work = Work(plan.evaluation, plan.sweep.block, metadata, str(self._out), size)
+        thread = threading.Thread(target=self._work, args=(plan, work, workers), name="run", daemon=True)
+        thread.start()
+        before, begun = plan.rows_done, time.monotonic()
+        stopped_at = None
+        while thread.is_alive():
+            thread.join(_LOOK_EVERY_S)
+            now = time.monotonic()
+            if progress is not None and stopped_at is None:
+                progress(progress_of(before, self._ticked, self._rows, now - begun, _notes(plan)))
+            if self._signals.caught is not None:
+                self._stopped.set()
+                stopped_at = stopped_at or now
+                if now - stopped_at > _PATIENCE_S:
+                    self._signals.abandon(thread)
+                    break
+        if self._problem is not None and not isinstance(self._problem, Stopped):
+            raise self._problem
+        self._signals.check()
+
+    def _work(self, plan: _Plan, work: Work, workers: Callable[[], Any]) -> None:
+        """Have everything computed, in a thread that may be left behind."""
+        try:
+            missing = plan.missing
+            if not missing:
+                return
+            plan.evaluation.warm_up()
+            with workers() as some:
+                self.jobs = some.jobs
+                self._ranges(some, work, missing)
+        except BaseException as problem:
+            self._problem = problem
+
+    def _ranges(self, workers: Pool, work: Work, missing: list[tuple[int, int]]) -> None:
+        more = () if workers.client is not None else (self._tick,)
+        calls = (call(_written, work, first, stop, *more) for first, stop in missing if not self._stopped.is_set())
+        for part in workers(calls, in_order=False, shared=work):
+            if part is not None:
+                self.written.append(part)
+                self.done += part.rows
+                if workers.client is not None:
+                    self._ticked += part.rows
+            elif workers.client is not None:
+                raise Stopped
+            if self._stopped.is_set() and workers.client is not None:
+                raise Stopped
+
+    def _tick(self, rows: int) -> None:
+        """Count a block; called by the threads of this process."""
+        if self._stopped.is_set():
+            raise Stopped
+        self._ticked += rows
+
+
+def _written(work: Work, first: int, stop: int, *tick: Callable[[int], None]) -> Written | None:
+    """Compute a range and write its part; None where the run was stopped meanwhile. A call on a worker."""
+    try:
+        return work.write(first, stop, *tick)
+    except Stopped:
+        return None
+
+
+@contextmanager
+def _folder(out: Location, signals: Signals) -> Iterator[None]:
+    """Make and lock the folder; leave nothing behind but parts."""
+    with locked(out):
+        is_new = make(out)
+        try:
+            clear(out)
+            yield
+        finally:
+            clear(out)
+            if is_new and isinstance(out, Path):
+                with suppress(OSError):  # parts are in it
+                    out.rmdir()
+
+
+def _refuse_taken(out: Location, resume: bool, overwrite: bool) -> None:
+    """Refuse a folder that holds something else, or a result that is neither continued nor replaced.
+
+    Raises
+    ------
+    StoreError
+        Says what it holds.
+    """
+    try:
+        names = names_in(out)
+    except OSError as problem:
+        raise failures.WriteError(f"cannot write into {out}: {why(problem)}") from problem
+    parts = part_files(names)
+    strange = [name for name in names if not part_file(name) and not name.startswith(".")]
+    if strange and not parts:
+        with suppress(failures.NotASweepError):
+            refuse_no_result(out)
+        raise failures.ForeignFilesError(out, strange)
+    if strange := [name for name in strange if name.endswith(".parquet")]:
+        raise failures.ForeignFilesError(out, strange)  # readers would take them for rows
+    if parts and not (resume or overwrite):
+        there = FinishedRows(out)
+        raise failures.OutputExistsError(out, there.rows_done, there.rows)
+
+
+def _planned(sweep: Sweep, simulate: Simulate) -> _Plan:
+    """Return what the settings alone decide."""
+    accuracy = accuracy_of(sweep)
+    evaluation = evaluation_of(sweep, accuracy, simulate)
+    described = identity(sweep.resolved(), *evaluation.settings(), accuracy.to_dict())
+    return _Plan(sweep, evaluation, described, planned(sweep, evaluation))
+
+
+def _there(plan: _Plan, out: Location, overwrite: bool) -> Contents:
+    """Return what a folder holds of a table; what is damaged or to be replaced is removed."""
+    if overwrite:
+        remove_parts(out, [part.name for part in part_files(names_in(out))])
+        return Contents()
+    found = _same(plan, out)
+    remove_parts(out, list(found.damaged))
+    return found
+
+
+def _same(plan: _Plan, out: Location) -> Contents:
+    """Return what a folder holds of a table.
+
+    Raises
+    ------
+    SettingsDifferError
+        It holds rows of another.
+    """
+    found = contents(out)
+    here = Table(plan.identity, plan.ranges).described
+    for table in {id(one.table): one.table for one in found.intact.values()}.values():
+        if unlike := differences(table.described, here):
+            raise failures.SettingsDifferError(out, unlike)
+    return found
+
+
+def _firmness(plan: _Plan, out: Location) -> dict[str, Any]:
+    """Return how firm the verdicts are; and check that the table will fit."""
+    firmness = firmness_of(plan.sweep).to_dict()
+    rows, missing = plan.ranges.rows, plan.missing
+    if missing and too_large(rows, "", (rows - plan.rows_done) * _MOST_BYTES_PER_ROW, out):
+        plan.evaluation.warm_up()
+        cost = take_sample(plan.evaluation, plan.sweep, plan.metadata(firmness))
+        needed = time_and_disk(cost, rows - plan.rows_done, len(missing), 1)[1]
+        if said := too_large(rows, "about", needed, out):
+            raise failures.DoesNotFitError(said)
+    return firmness
+
+
+def _check_whole(out: Location, plan: _Plan, written: list[Written]) -> None:
+    """Check that the parts of all workers are in the folder as this machine sees it.
+
+    Raises
+    ------
+    BackendError
+        Some are not.
+    TwoResultsError
+        Somebody else wrote other rows.
+    """
+    names = names_in(out)
+    refuse_two(out, part_files(names))
+    if missing := {part.name for part in written} - {*names}:
+        raise BackendError(
+            f"{len(missing)} of {len(written)} parts that workers wrote are not in {out} as this machine sees it: "
+            f"workers on other machines need a file system that all share, or a URL"
+        )
+
+
+def _notes(plan: _Plan) -> list[str]:
+    return [f"{name} was damaged ({what}) and is computed again" for name, what in plan.there.damaged.items()]
+
+
+def estimate(
+    sweep: Sweep,
+    out: str | Location | None = None,
+    *,
+    jobs: int | None = None,
+    resume: bool = False,
+    simulate: Simulate = by_kernels,
+) -> Estimate:
+    """Estimate what a run will take from a timed sample of a tenth of a second; nothing is written.
+
+    Parameters
+    ----------
+    sweep, out, jobs, simulate
+        As of `run`.
+    resume
+        Count only the rows that are missing in `out` or damaged there.
+
+    Returns
+    -------
+    Estimate
+        Rows, time and disk.
+
+    Raises
+    ------
+    TypeError, ValueError
+        The number of jobs is not a whole number, or out of range.
+    StoreError
+        A run cannot be resumed in `out`.
+    """
+    check_jobs(jobs)
+    sweep = at_values(sweep)
+    plan = _planned(sweep, simulate)
+    if resume and out is not None:
+        plan.there = _same(plan, location_of(out))
+    plan.evaluation.warm_up()
+    cores = available_cores()
+    cost = take_sample(plan.evaluation, sweep, plan.metadata(firmness_of(sweep).to_dict()))
+    missing = sweep.n_designs - plan.rows_done
+    needed = time_and_disk(cost, missing, len(plan.missing), min(jobs or cores, cores))
+    return Estimate(sweep.n_designs, missing, *needed, jobs or cores, plan.there.damaged)
+
+
+def _check_arguments(sweep: Sweep, jobs: int | None, progress: Report | None) -> None:
+    """Refuse arguments of wrong types and counts below one, by name.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Says what is allowed.
+    """
+    from boulder_sweep.settings import Sweep
+
+    if not isinstance(sweep, Sweep):
+        raise TypeError(f"sweep must be what boulder_sweep.load returns, not {type(sweep).__name__}")
+    check_jobs(jobs)
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress must be a function, not {type(progress).__name__}")
+
+
+def _resume_command(sweep: Sweep, out: Location, jobs: int | None, backend: str, scheduler: str | None) -> str:
+    """Return the command that resumes a run with the given arguments."""
+    if sweep.path is None:
+        return f"boulder_sweep.run(sweep, {str(out)!r}, resume=True)"
+    words = ["sweep", "run", str(sweep.path), "-o", str(out)]
+    if jobs is not None:
+        words += ["--jobs", str(jobs)]
+    if backend != THREADING:
+        words += ["--backend", backend]
+    if scheduler is not None:
+        words += ["--scheduler", scheduler]
+    if sweep.taken_at:
+        words += ["--at", next(iter(sweep.taken_at.values())).partition(" ")[0]]
+    for entry in sweep.overrides:  # as they were given
+        words += entry.split("=", 1) if entry.startswith("--") else ["--set", entry]
+    return shlex.join([*words, "--resume"])
