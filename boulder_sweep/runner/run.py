@@ -179,7 +179,8 @@ def run(
         except failures.WriteError as problem:
             raise failures.WriteError(f"{problem}. Finished rows are safe. Resume with: {again}") from problem
         _check_whole(out, plan, whole.written)
-    parts = [(part.bytes, part.verdicts) for part in (*plan.there.intact.values(), *whole.written)]
+    parts = [(part.bytes, part.verdicts) for part in plan.there.intact.values()]
+    parts += [(part.bytes, part.verdicts) for part in whole.written]
     return summary_of(
         out,
         plan.identity,
@@ -225,18 +226,19 @@ class _Run:
         thread = threading.Thread(target=self._work, args=(plan, work, workers), name="run", daemon=True)
         thread.start()
         before, begun = plan.rows_done, time.monotonic()
-        stopped_at = None
-        while thread.is_alive():
-            thread.join(_LOOK_EVERY_S)
-            now = time.monotonic()
-            if progress is not None and stopped_at is None:
-                progress(progress_of(before, self._ticked, self._rows, now - begun, _notes(plan)))
-            if self._signals.caught is not None:
-                self._stopped.set()
-                stopped_at = stopped_at or now
-                if now - stopped_at > _PATIENCE_S:
-                    self._signals.abandon(thread)
-                    break
+        try:
+            while thread.is_alive():
+                thread.join(_LOOK_EVERY_S)
+                self._signals.check()
+                if progress is not None:
+                    seconds = time.monotonic() - begun
+                    progress(progress_of(before, self._ticked, self._rows, seconds, _notes(plan)))
+        except BaseException:
+            self._stopped.set()
+            thread.join(_PATIENCE_S)
+            if thread.is_alive():
+                self._signals.abandon(thread)
+            raise
         if self._problem is not None and not isinstance(self._problem, Stopped):
             raise self._problem
         self._signals.check()

@@ -113,8 +113,8 @@ class TwoResultsError(DamagedError):
     def __init__(self, out: Location, first: str, second: str):
         self.out, self.names = out, (first, second)
         super().__init__(
-            f"{out} holds two different results for the same rows: {first} and {second}. Remove the wrong one, or "
-            f"start again with --overwrite"
+            f"{out} holds two different results for the same rows: {first} and {second}. `sweep run` of "
+            f"its settings file with --resume removes a damaged one; if both are intact, remove the wrong one"
         )
 
 

@@ -324,7 +324,7 @@ def check_target(target: Location, refusal: type[BoulderSweepError]) -> None:
     with suppress(OSError):  # a store that does not answer, or lets nobody read: writing will tell
         if part_files(names_in(folder)):
             raise refusal(f"{target}: the folder {folder} holds the result of a run; name a file outside it")
-    if not isinstance(target, Path):
+    if not (isinstance(target, Path) and isinstance(folder, Path)):
         return
     if target.is_dir():
         raise refusal(f"{target} cannot be written: {os.strerror(errno.EISDIR)}")

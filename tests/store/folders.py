@@ -1,93 +1,85 @@
-"""Small output folders for the tests of the store."""
+"""Small results for the tests of the store, and ways to change what their parts say."""
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
-from boulder_sweep.store.files import MANIFEST_NAME
-from boulder_sweep.store.manifest import Manifest
-from boulder_sweep.store.provenance import file_metadata, identity, new_session
-from boulder_sweep.store.schema import encode, part_table, verdict_counts
-from boulder_sweep.store.writer import EncodedPart, OutputFolder, claim_output
+from boulder_sweep.runner.run import run
+from boulder_sweep.store.folder import PartFile, hash_of, hidden_folder, part_file, part_files
+from boulder_sweep.store.part import encode
+from boulder_sweep.store.provenance import PREFIX, canonical, identity
+from boulder_sweep.store.reading import contents
 from tests.runner.grids import grid, plausible
 
 IDENTITY = identity(
     grid().resolved(), *evaluation_of(grid(), accuracy_of(grid()), plausible).settings(), accuracy_of(grid()).to_dict()
 )
-ROWS, SIZE = 441, 100
-
-
-def open_folder(
-    out: Path,
-    *,
-    identity: dict[str, Any] = IDENTITY,
-    rows: int = ROWS,
-    resume_command: str = "sweep run x.yaml --resume",
-    **how: bool,
-) -> OutputFolder:
-    """Take a folder for a run of 441 rows in parts of 100."""
-    manifest = Manifest(identity, rows, SIZE, resume_command)
-    claimed = claim_output(out, **how)
-    try:
-        return claimed.open(manifest, new_session("sweep run x.yaml", 2, "threading"))
-    except BaseException:
-        claimed.release()
-        raise
-
-
-def part_bytes(first: int, rows: int) -> tuple[bytes, dict[str, int]]:
-    """Bytes of a part, and how many rows have which verdict."""
-    sweep = grid()
-    block = sweep.block(first, first + rows)
-    judged = evaluation_of(sweep, accuracy_of(sweep), plausible)(block)
-    return bytes(encode(part_table(block, judged, file_metadata(IDENTITY, "sweep run x.yaml")))), verdict_counts(judged)
-
-
-def encoded_part(first: int, of: int | None = None) -> EncodedPart:
-    """A part of 100 rows; with the content of those from another row on, if one is given."""
-    content, verdicts = part_bytes(first if of is None else of, SIZE)
-    return EncodedPart(first, SIZE, content, verdicts)
-
-
-def commit(folder: OutputFolder, first: int, rows: int | None = None) -> None:
-    """Put a part into a folder."""
-    rows = min(SIZE, ROWS - first) if rows is None else rows
-    content, verdicts = part_bytes(first, rows)
-    folder.commit([folder.stage(EncodedPart(first, rows, content, verdicts))])
+ROWS, PARTS = 441, 4
 
 
 def finished_folder(out: Path) -> Path:
-    """Make a finished folder."""
-    folder = open_folder(out)
-    for first in range(0, ROWS, SIZE):
-        commit(folder, first)
-    folder.close("finished")
+    """Make a finished folder of four parts."""
+    run(grid(), out, jobs=1, simulate=plausible)
     return out
 
 
-def rewrite_records(out: Path, change: Callable[[dict[str, Any]], object]) -> None:
-    """Write the manifest of a folder anew with other records, whole and with their checksum."""
-    path = out / MANIFEST_NAME
-    schema = pq.read_schema(path)
-    key = b"boulder_sweep.manifest"
-    records = json.loads(schema.metadata[key][64:])
-    change(records)
-    text = json.dumps(records).encode()
-    value = hashlib.sha256(text).hexdigest().encode() + text
-    pq.write_table(schema.with_metadata({**schema.metadata, key: value}).empty_table(), path)
+def parts_of(out: Path) -> dict[str, bytes]:
+    """Return all files of a folder by their names."""
+    return {path.name: path.read_bytes() for path in sorted(out.iterdir())}
 
 
-def part_record(records: dict[str, Any]) -> dict[str, Any]:
-    """Return the record of the first part."""
-    return next(iter(records["parts"].values()))
+def part_of(out: Path, which: int = 0) -> PartFile:
+    """Return the name of a part, in what it says."""
+    return part_files([path.name for path in out.iterdir()])[which]
+
+
+def rows_done(out: Path) -> int:
+    """Return how many rows of a folder are in intact parts, none of which is damaged; nothing else may be there."""
+    if not out.exists():
+        return 0
+    assert all(part_file(path.name) for path in out.iterdir())
+    found = contents(out)
+    assert not found.damaged
+    return sum(part.stop - part.first for part in found.intact)
+
+
+def nothing_left(out: Path) -> bool:
+    """Whether a run has left nothing but parts."""
+    return not hidden_folder(out).exists() and all(part_file(path.name) for path in out.iterdir())
+
+
+def rewrite(out: Path, change: Callable[[dict[str, Any]], object], which: int = 0) -> Path:
+    """Let a part say something else of itself, under the name that then is right; return its path."""
+    part = part_of(out, which)
+    table = pq.read_table(out / part.name)
+    plain = {key.decode().removeprefix(PREFIX): value.decode() for key, value in table.schema.metadata.items()}
+    texts = {"settings_sha256", "kernels_sha256", "rules_sha256", "PANDAS_ATTRS"}
+    said = {key: value if key in texts else json.loads(value) for key, value in plain.items()}
+    change(said)
+    metadata = {
+        (key if key == "PANDAS_ATTRS" else f"{PREFIX}{key}").encode(): (
+            value if isinstance(value, str) else canonical(value)
+        ).encode()
+        for key, value in said.items()
+    }
+    (out / part.name).unlink()
+    return put(out, part, table.replace_schema_metadata(metadata))
+
+
+def put(out: Path, part: PartFile, table: pa.Table) -> Path:
+    """Write a table as a part of some rows, under the right name."""
+    content = encode(table)
+    path = out / part._replace(hash=hash_of(content)).name
+    path.write_bytes(content)
+    return path
 
 
 OTHER_VERSIONS: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
