@@ -21,6 +21,7 @@ from pathlib import Path
 
 from boulder_kernels import _ahead, source_hash
 from boulder_kernels._cache import CACHE_VARIABLE, LEVELS, SHIPPED, SOURCES
+from boulder_sweep.locations import replacing
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 WET, COHESIVE = "soil.water_table=0.5 m", "soil.cohesion=5 kPa"
@@ -81,7 +82,8 @@ def compile_recorded(recorded: Path, target: Path) -> None:
         if library is None:
             raise RuntimeError(f"{module}.{kernel} cannot be linked by {os.environ.get('CC', 'cc')}")
         _ahead.keep(target / file.stem, code, library, kept)
-    (target / SOURCES).write_text(source_hash())
+    with replacing(target / SOURCES) as sources:
+        sources.write(source_hash().encode())
 
 
 def main() -> None:

@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
+import os
 import pickle
-import threading
+import re
 from pathlib import Path
 
 import fsspec
 import pytest
 
-from boulder_sweep import locations
-from boulder_sweep.locations import LocationError, RemotePath, beside, location_of
-from tests.waiting import HANG_GUARD_S, wait_until
+import boulder_sweep
+from boulder_sweep.errors import LinkError, PictureError
+from boulder_sweep.locations import (
+    LocationError,
+    beside,
+    is_folder,
+    location_of,
+    names_in,
+    opened,
+    put,
+    read_bytes,
+    remove,
+    remove_unfinished,
+    replacing,
+    stat_of,
+)
+from boulder_sweep.store.folder import check_target
 
 
 @pytest.mark.parametrize(
@@ -59,23 +74,39 @@ def test_urls_that_cannot_be_opened_are_refused(url, words):
         location_of(url)
 
 
-def test_a_url_behaves_like_a_path_and_can_be_sent():
+def test_a_url_can_be_read_written_and_sent():
     place = location_of("memory://places/m30.sweep/")
-    assert isinstance(place, RemotePath)
     assert str(place / "a.csv") == "memory://places/m30.sweep/a.csv"
     assert ((place / "a.csv").name, (place / "a.csv").suffix, (place / "a.csv").parent) == ("a.csv", ".csv", place)
-    assert pickle.loads(pickle.dumps(place)) == place
-    assert not (place / "a.csv").exists()
-    (place / "a.csv").put("a,é\n".encode())
-    assert (place / "a.csv").open(encoding="utf-8").read() == "a,é\n"
-    assert (place / "a.csv").stat().st_size == 5
-    assert place.is_dir()
-    assert place.names() == ["a.csv"]
-    with pytest.raises(FileExistsError):
-        (place / "a.csv").put(b"", only_new=True)
-    (place / "a.csv").unlink()
+    assert pickle.loads(pickle.dumps(place)) == location_of(str(place)) == location_of(place) == place
+    assert names_in(place) == []
+    put(place / "a.csv", "a,é\n".encode())
+    assert opened(place / "a.csv").read().decode() == "a,é\n"
+    assert stat_of(place / "a.csv").st_size == 5
+    assert is_folder(place)
+    assert names_in(place) == ["a.csv"]
+    for _ in range(2):  # it may be gone
+        remove(place / "a.csv")
     with pytest.raises(FileNotFoundError):
-        (place / "a.csv").read_bytes()
+        read_bytes(place / "a.csv")
+
+
+@pytest.mark.parametrize(
+    ("act", "method"),
+    [(read_bytes, "cat_file"), (names_in, "ls"), (stat_of, "info"), (lambda place: put(place, b""), "pipe_file")],
+)
+def test_what_a_store_raises_is_an_error_of_the_system_without_secrets(monkeypatch, act, method):
+    monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "no-one-may-read-this")
+    place = location_of("memory://places/out")
+
+    def fail(*_, **__):
+        raise LookupError("no-one-may-read-this at https://user:pw@host/x?signature=abc")
+
+    monkeypatch.setattr(type(place.fs), method, fail)
+    with pytest.raises(OSError, match=r"\*\*\* at https://host/x\?\*\*\*") as told:
+        act(place)
+    assert "pw" not in str(told.value)
+    assert told.value.__cause__ is None
 
 
 def test_files_made_from_a_result_lie_beside_it_or_here():
@@ -86,44 +117,94 @@ def test_files_made_from_a_result_lie_beside_it_or_here():
 def test_a_try_at_a_store_has_limits_of_its_own_and_other_options_stay(monkeypatch):
     """Without them botocore tries for minutes by itself."""
     monkeypatch.setitem(fsspec.config.conf, "s3", {"config_kwargs": {"signature_version": "s3v4", "read_timeout": 9}})
-    config = location_of("s3://bucket/out")._filesystem.config_kwargs
+    config = location_of("s3://bucket/out").fs.config_kwargs
     assert config == {
         "connect_timeout": 3,
         "read_timeout": 9,
-        "retries": {"total_max_attempts": 1},
+        "retries": {"total_max_attempts": 2},
         "signature_version": "s3v4",
     }
 
 
-def test_a_request_that_is_given_up_is_not_tried_again(monkeypatch):
-    monkeypatch.setattr(locations, "REQUEST_S", 0.05)  # no answer comes, however long it is
-    monkeypatch.setattr(locations, "FIRST_WAIT_S", HANG_GUARD_S)  # hang guard
-    place, asked = location_of("memory://places/out"), []
-
-    def fail(path):
-        asked.append(path)
-        raise ConnectionResetError("not now")
-
-    monkeypatch.setattr(place._filesystem, "info", fail)
-    with pytest.raises(TimeoutError, match="the store has not answered for 0 s"):
-        place.stat()
-    wait_until(lambda: not [one for one in threading.enumerate() if one.name == "request"], "no thread is left")
-    assert len(asked) == 1
+def test_no_output_is_written_through_a_link(tmp_path):
+    outside = tmp_path / "outside"
+    outside.write_text("precious")
+    (tmp_path / "map.png").symlink_to(outside)
+    with pytest.raises(LinkError, match="is a link"), replacing(tmp_path / "map.png"):
+        pytest.fail("nothing may be written")
+    with pytest.raises(LinkError, match="is a link"):
+        check_target(tmp_path / "map.png", PictureError)
+    assert outside.read_text() == "precious"
 
 
-def test_a_file_of_any_size_has_the_time_to_be_read(monkeypatch):
-    place, limits = location_of("memory://places/design.csv"), []
-    monkeypatch.setattr(RemotePath, "read_bytes", lambda self, most=None: limits.append(most) or b"")
-    for size in (10**9, 5):
-        monkeypatch.setattr(place._filesystem, "info", lambda path, size=size: {"size": size, "type": "file"})
-        place.open("rb")
-    assert limits == [10**9, 1 << 24]
+def test_a_process_that_ends_removes_what_it_is_writing(tmp_path):
+    def ended():
+        with replacing(tmp_path / "map.png") as file:
+            file.write(b"half")
+            remove_unfinished()
+
+    with pytest.raises(FileNotFoundError):
+        ended()
+    assert names_in(tmp_path) == []
 
 
-def test_a_list_of_many_pages_has_more_time_than_one_answer(monkeypatch):
-    monkeypatch.setattr(locations, "REQUEST_S", 0.2)  # no answer comes, however long it is
-    place, end = location_of("memory://places/out"), threading.Event()
-    monkeypatch.setattr(place._filesystem, "ls", lambda path, detail: end.wait(HANG_GUARD_S))  # hang guard
-    with pytest.raises(TimeoutError, match="the store has not answered for 1 s"):
-        place.names()
-    end.set()
+@pytest.mark.parametrize("dangling", [True, False])
+def test_a_pipe_or_a_dangling_link_is_refused_too(tmp_path, dangling):
+    target = tmp_path / "map.png"
+    target.symlink_to(tmp_path / "nowhere") if dangling else os.mkfifo(target)
+    with pytest.raises(LinkError):
+        check_target(target, PictureError)
+    assert not (tmp_path / "nowhere").exists()
+
+
+def test_what_a_killed_process_left_of_an_output_does_not_matter(tmp_path):
+    """It stays: another process may be writing it."""
+    left = tmp_path / ".map.png.0123456789abcdef.part"
+    left.write_bytes(b"half of a longer one")
+    with replacing(tmp_path / "map.png") as file:
+        file.write(b"whole")
+    assert names_in(tmp_path) == [left.name, "map.png"]
+    assert (tmp_path / "map.png").read_bytes() == b"whole"
+
+
+@pytest.mark.parametrize("name", ["map.png", "é" * 125 + ".png"])
+def test_two_that_write_one_output_leave_it_whole(tmp_path, name):
+    target = tmp_path / name
+    with replacing(target) as first:
+        first.write(b"of the first")
+        with replacing(target) as second:
+            second.write(b"of the second")
+        assert target.read_bytes() == b"of the second"
+    assert target.read_bytes() == b"of the first"
+    assert names_in(tmp_path) == [name]
+
+
+def test_an_output_that_cannot_be_completed_changes_nothing(tmp_path):
+    (tmp_path / "map.png").write_bytes(b"whole")
+
+    def half():
+        with replacing(tmp_path / "map.png") as file:
+            file.write(b"half")
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        half()
+    assert names_in(tmp_path) == ["map.png"]
+    assert (tmp_path / "map.png").read_bytes() == b"whole"
+
+
+WRITES = re.compile(r"""O_TRUNC|O_CREAT|write_(text|bytes)\(|open\([^)]*["'][wax]b?\+?["']""")
+BY_ITSELF = {
+    "locations.py": "creates files",
+    "store/folder.py": "creates parts",
+    "cli/settings_files.py": "only a new file",
+    "cli/output.py": "nowhere, and its own cache",
+    "report/build.py": "for developers",
+    "report/writing.py": "a folder of its own for the browser",
+}
+
+
+def test_no_other_module_opens_files_for_writing_by_itself():
+    root = Path(boulder_sweep.__file__).parent
+    found = {str(path.relative_to(root)) for path in root.rglob("*.py") if WRITES.search(path.read_text())}
+    assert found == BY_ITSELF.keys()

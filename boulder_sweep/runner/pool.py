@@ -12,6 +12,7 @@ import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from importlib import import_module
 from typing import Any
 
@@ -178,6 +179,7 @@ def pool(jobs: int | None, backend: str = THREADING, scheduler: str | None = Non
         try:
             if scheduler is None:
                 cluster = _local_cluster(distributed, jobs or available_cores())
+                ends += [partial(_end_worker, cluster, worker) for worker in cluster.workers.values()]
                 ends.append(cluster.close)
                 client = distributed.Client(cluster, set_as_default=False)
             else:
@@ -203,6 +205,11 @@ def _local_cluster(distributed: Any, jobs: int) -> Any:
             dashboard_address=_LOOPBACK,
             worker_dashboard_address=_LOOPBACK,
         )
+
+
+def _end_worker(cluster: Any, worker: Any, timeout: float) -> None:
+    """End a worker of this process, without waiting for what it computes."""
+    cluster.sync(worker.close, timeout=timeout, executor_wait=False, callback_timeout=timeout)
 
 
 def _connected(distributed: Any, scheduler: str) -> Any:

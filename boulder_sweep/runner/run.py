@@ -74,11 +74,15 @@ class _Plan:
     ranges: Ranges
     there: Contents = field(default_factory=Contents)
 
-    @property
-    def missing(self) -> list[tuple[int, int]]:
-        """Ranges that are not there, or damaged."""
+    def missing(self) -> Iterator[tuple[int, int]]:
+        """Yield the ranges that are not there, or damaged."""
         there = {(part.first, part.stop) for part in self.there.intact}
-        return [bounds for bounds in self.ranges if bounds not in there]
+        return (bounds for bounds in self.ranges if bounds not in there)
+
+    @property
+    def parts_missing(self) -> int:
+        """Number of such ranges."""
+        return self.ranges.count - len(self.there.intact)
 
     @property
     def rows_done(self) -> int:
@@ -157,7 +161,7 @@ def run(
         raise failures.StoreError("--resume and --overwrite cannot be used together")
     sweep = at_values(sweep)
     check_backend(backend, scheduler)
-    again = resume_command or _resume_command(sweep, out, jobs, backend, scheduler)
+    again = resume_command or resuming(sweep, out, jobs, backend, scheduler)
     jobs = jobs or (1 if sweep.n_designs == 1 else available_cores())
     with noted_signals() as signals, signals.deferred(), _folder(out, signals):
         whole = _Run(out, signals, sweep.n_designs)
@@ -246,29 +250,28 @@ class _Run:
     def _work(self, plan: _Plan, work: Work, workers: Callable[[], Any]) -> None:
         """Have everything computed, in a thread that may be left behind."""
         try:
-            missing = plan.missing
-            if not missing:
+            if not plan.parts_missing:
                 return
             plan.evaluation.warm_up()
             with workers() as some:
                 self.jobs = some.jobs
-                self._ranges(some, work, missing)
+                self._ranges(some, work, plan.missing())
         except BaseException as problem:
             self._problem = problem
 
-    def _ranges(self, workers: Pool, work: Work, missing: list[tuple[int, int]]) -> None:
+    def _ranges(self, workers: Pool, work: Work, missing: Iterator[tuple[int, int]]) -> None:
         more = () if workers.client is not None else (self._tick,)
         calls = (call(_written, work, first, stop, *more) for first, stop in missing if not self._stopped.is_set())
         for part in workers(calls, in_order=False, shared=work):
-            if part is not None:
+            if isinstance(part, Written):
                 self.written.append(part)
                 self.done += part.rows
-                if workers.client is not None:
-                    self._ticked += part.rows
-            elif workers.client is not None:
-                raise Stopped
+                self._ticked += part.rows if workers.client is not None else 0
+            else:  # what is in hand ends, and nothing more is begun
+                self._problem = self._problem or part
+                self._stopped.set()
             if self._stopped.is_set() and workers.client is not None:
-                raise Stopped
+                return
 
     def _tick(self, rows: int) -> None:
         """Count a block; called by the threads of this process."""
@@ -277,12 +280,12 @@ class _Run:
         self._ticked += rows
 
 
-def _written(work: Work, first: int, stop: int, *tick: Callable[[int], None]) -> Written | None:
-    """Compute a range and write its part; None where the run was stopped meanwhile. A call on a worker."""
+def _written(work: Work, first: int, stop: int, *tick: Callable[[int], None]) -> Written | Exception:
+    """Compute a range and write its part, or return what went wrong: a call on a worker."""
     try:
         return work.write(first, stop, *tick)
-    except Stopped:
-        return None
+    except Exception as problem:  # joblib would not wait for the other threads
+        return problem
 
 
 @contextmanager
@@ -362,11 +365,11 @@ def _same(plan: _Plan, out: Location) -> Contents:
 def _firmness(plan: _Plan, out: Location) -> dict[str, Any]:
     """Return how firm the verdicts are; and check that the table will fit."""
     firmness = firmness_of(plan.sweep).to_dict()
-    rows, missing = plan.ranges.rows, plan.missing
-    if missing and too_large(rows, "", (rows - plan.rows_done) * _MOST_BYTES_PER_ROW, out):
+    rows = plan.ranges.rows
+    if plan.parts_missing and too_large(rows, "", (rows - plan.rows_done) * _MOST_BYTES_PER_ROW, out):
         plan.evaluation.warm_up()
         cost = take_sample(plan.evaluation, plan.sweep, plan.metadata(firmness))
-        needed = time_and_disk(cost, rows - plan.rows_done, len(missing), 1)[1]
+        needed = time_and_disk(cost, rows - plan.rows_done, plan.parts_missing, 1)[1]
         if said := too_large(rows, "about", needed, out):
             raise failures.DoesNotFitError(said)
     return firmness
@@ -433,7 +436,7 @@ def estimate(
     cores = available_cores()
     cost = take_sample(plan.evaluation, sweep, plan.metadata(firmness_of(sweep).to_dict()))
     missing = sweep.n_designs - plan.rows_done
-    needed = time_and_disk(cost, missing, len(plan.missing), min(jobs or cores, cores))
+    needed = time_and_disk(cost, missing, plan.parts_missing, min(jobs or cores, cores))
     return Estimate(sweep.n_designs, missing, *needed, jobs or cores, plan.there.damaged)
 
 
@@ -454,7 +457,7 @@ def _check_arguments(sweep: Sweep, jobs: int | None, progress: Report | None) ->
         raise TypeError(f"progress must be a function, not {type(progress).__name__}")
 
 
-def _resume_command(sweep: Sweep, out: Location, jobs: int | None, backend: str, scheduler: str | None) -> str:
+def resuming(sweep: Sweep, out: Location, jobs: int | None, backend: str, scheduler: str | None) -> str:
     """Return the command that resumes a run with the given arguments."""
     if sweep.path is None:
         return f"boulder_sweep.run(sweep, {str(out)!r}, resume=True)"

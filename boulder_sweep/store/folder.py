@@ -39,7 +39,7 @@ WRITING = ".writing"
 _UNFINISHED_NAME = re.compile(rf"\.?([0-9a-f]{{8}})-([0-9]{{1,10}})-[0-9a-f]{{16}}{re.escape(WRITING)}")
 _ABANDONED_S = 3600.0
 """Age of an unfinished file of another machine at which nobody writes it any more [s]."""
-_TRIES = 3
+_TRIES = 20
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ def _put_on_disk(out: Path, name: str, content: bytes | memoryview) -> None:
                     os.fsync(file.fileno())
                 os.rename(passing.name, out / name, src_dir_fd=at)
             break
-        except FileNotFoundError:  # another run that ended has removed the hidden folder
+        except FileNotFoundError:  # another worker that is done has removed the hidden folder
             if left == 1 or not out.is_dir():
                 raise
     folder = os.open(out, os.O_RDONLY | os.O_DIRECTORY)
@@ -163,12 +163,12 @@ def _created(name: str, at: int) -> int:
 def _passing(out: Path) -> Iterator[tuple[Path, int]]:
     """Give the path at which a file of a table may be written, and a descriptor of its folder."""
     name, flags = f"{_machine()}-{os.getpid()}-{secrets.token_hex(8)}{WRITING}", os.O_RDONLY | os.O_DIRECTORY
-    hidden = hidden_folder(out)
+    hidden, device = hidden_folder(out), out.stat().st_dev
     try:
         with suppress(FileExistsError):
             hidden.mkdir()
         at = os.open(hidden, flags | os.O_NOFOLLOW)
-        if os.fstat(at).st_dev != out.stat().st_dev or not os.access(hidden, os.W_OK):
+        if os.fstat(at).st_dev != device or not os.access(hidden, os.W_OK):
             os.close(at)
             raise OSError(errno.EXDEV, os.strerror(errno.EXDEV))
     except OSError:
@@ -178,6 +178,9 @@ def _passing(out: Path) -> Iterator[tuple[Path, int]]:
             yield passing, at
     finally:
         os.close(at)
+        if hidden != out:
+            with suppress(OSError):  # others write there, too
+                hidden.rmdir()
 
 
 def hidden_folder(out: Path) -> Path:

@@ -44,7 +44,7 @@ def test_a_hopeless_neighbour_does_not_matter() -> None:
 def test_workers_and_parts_do_not_matter(accuracy: str, tmp_path: Path) -> None:
     import pyarrow.parquet as pq
 
-    from boulder_sweep.runner.sweeper import run
+    from boulder_sweep.runner.run import run
     from boulder_sweep.settings import load_text
     from tests.runner.grids import DEFAULTS, GRID
 

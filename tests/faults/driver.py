@@ -13,7 +13,7 @@ import threading
 
 from boulder_sweep.errors import Interrupted
 from boulder_sweep.judge.evaluation import by_kernels
-from boulder_sweep.runner.sweeper import Progress, run
+from boulder_sweep.runner.run import Progress, run
 from boulder_sweep.store.failures import StoreError
 from tests.faults import faulty
 from tests.runner.grids import grid_of
@@ -28,8 +28,6 @@ def main() -> int:
     parser.add_argument("--simulate", default="by_kernels")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--backend", default="threading")
-    parser.add_argument("--rows-per-part", type=int, default=500)
-    parser.add_argument("--commit-every", type=float, default=0.05)
     parser.add_argument("--stuck", action="store_true", help="never return from a report of rows")
     parser.add_argument("--resume", action="store_true")
     parser.add_argument("--overwrite", action="store_true")
@@ -49,8 +47,6 @@ def main() -> int:
             resume=options.resume,
             overwrite=options.overwrite,
             progress=report,
-            rows_per_part=options.rows_per_part,
-            commit_every_s=options.commit_every,
             simulate=by_kernels if options.simulate == "by_kernels" else getattr(faulty, options.simulate),
         )
     except (Interrupted, StoreError) as problem:

@@ -6,25 +6,25 @@ import numpy as np
 import pytest
 
 from boulder_sweep.errors import ComputationError
-from boulder_sweep.runner import workers
-from boulder_sweep.runner.sweeper import run
-from boulder_sweep.store.reader import finished_table
+from boulder_sweep.runner import ranges
+from boulder_sweep.runner.run import run
+from boulder_sweep.store.reading import finished_table
 from tests.faults import faulty
 from tests.faults.processes import run_driver
 from tests.runner.grids import grid_of, plausible, same_bits
-from tests.store.states import status
+from tests.store.folders import nothing_left, rows_done
 
 pytestmark = pytest.mark.faults
 
 ROWS = 80
-OPTIONS = ("--rows", str(ROWS), "--rows-per-part", "30")
+OPTIONS = ("--rows", str(ROWS))
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     """The table without faults."""
     out = tmp_path_factory.mktemp("whole") / "out"
-    run(grid_of(ROWS), out, rows_per_part=30, simulate=plausible)
+    run(grid_of(ROWS), out, simulate=plausible)
     return finished_table(out)
 
 
@@ -55,14 +55,13 @@ def test_designs_that_raise(tmp_path, whole, backend):
 
 @pytest.mark.parametrize("backend", ["threading", "dask"])
 def test_a_run_of_which_most_raises_stops_and_can_be_resumed(tmp_path, whole, monkeypatch, backend):
-    monkeypatch.setattr(workers, "_FAILURES_BUDGET", 10)
+    monkeypatch.setattr(ranges, "_FAILURES_BUDGET", 10)
     monkeypatch.setenv(faulty.POISON, poison(whole, list(range(35, 80))))
     out = tmp_path / "out"
     with pytest.raises(ComputationError, match=r"1\d attempts .*arithmetic error.* 80 rows are safe\. Resume"):
-        run(grid_of(ROWS), out, rows_per_part=30, jobs=1, backend=backend, simulate=faulty.raises)
-    found = status(out)
-    assert found.rows_done < ROWS
-    assert not found.running
+        run(grid_of(ROWS), out, jobs=1, backend=backend, simulate=faulty.raises)
+    assert rows_done(out) < ROWS
+    assert nothing_left(out)
     monkeypatch.setenv(faulty.POISON, "0")
-    run(grid_of(ROWS), out, rows_per_part=30, backend=backend, resume=True, simulate=faulty.raises)
+    run(grid_of(ROWS), out, backend=backend, resume=True, simulate=faulty.raises)
     assert same_bits(finished_table(out), whole)

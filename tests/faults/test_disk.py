@@ -11,14 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boulder_sweep.runner import estimate as limits
-from boulder_sweep.runner.sweeper import run
-from boulder_sweep.store import files
+from boulder_sweep.runner import progress as limits
+from boulder_sweep.runner.run import run
 from boulder_sweep.store.failures import DoesNotFitError, StoreError, WriteError
-from boulder_sweep.store.reader import finished_table
+from boulder_sweep.store.reading import finished_table
 from tests.faults.processes import ROOT
 from tests.runner.grids import grid, grid_of, plausible, same_bits
-from tests.store.states import status
 
 pytestmark = pytest.mark.faults
 
@@ -137,7 +135,7 @@ _NO_LONG_FILES = """
 import resource, sys
 resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
 from boulder_sweep.store.failures import WriteError
-from boulder_sweep.runner.sweeper import run
+from boulder_sweep.runner.run import run
 from tests.runner.grids import grid_of, plausible
 try:
     run(grid_of(20_000), sys.argv[1], rows_per_part=10_000, simulate=plausible)

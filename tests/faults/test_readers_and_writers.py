@@ -10,15 +10,15 @@ import duckdb
 import pandas as pd
 import polars as pl
 import pytest
-
 from boulder_sweep.runner.sweeper import run
-from boulder_sweep.store import read
 from boulder_sweep.store.manifest import load
 from boulder_sweep.store.reader import finished_table
+from tests.store.states import status
+
+from boulder_sweep.store import read
 from tests.faults.faulty import Bar
 from tests.faults.processes import Driver, run_driver
 from tests.runner.grids import grid_of, plausible, same_bits
-from tests.store.states import status
 from tests.waiting import wait_until
 
 pytestmark = pytest.mark.faults

@@ -5,13 +5,13 @@ from __future__ import annotations
 import signal
 
 import pytest
-
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store.reader import finished_table
+from tests.store.states import status
+
 from tests.faults.faulty import Bar
 from tests.faults.processes import Driver
 from tests.runner.grids import grid_of, plausible, same_bits
-from tests.store.states import status
 from tests.waiting import wait_until
 
 pytestmark = pytest.mark.faults

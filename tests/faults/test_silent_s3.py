@@ -5,10 +5,10 @@ from __future__ import annotations
 import signal
 
 import pytest
-
-from boulder_sweep.locations import location_of
 from boulder_sweep.runner.sweeper import run
 from boulder_sweep.store.reader import finished_table
+
+from boulder_sweep.locations import location_of
 from tests.faults.processes import Driver
 from tests.faults.s3_server import BUCKET, S3Server
 from tests.runner.grids import grid_of, plausible, same_bits

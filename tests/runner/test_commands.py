@@ -1,25 +1,33 @@
-"""The commands that repeat or resume a run."""
+"""The command that resumes a run."""
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 
+import pytest
+
 import boulder_sweep
-from boulder_sweep.runner.running import repeat_command, resume_command
+from boulder_sweep.runner.run import resuming
 from tests.runner.grids import grid
 
 RWG = Path(__file__).parents[2] / "configs" / "rwg.yaml"
 
 
-def test_what_replaced_entries_of_the_file_is_repeated() -> None:
-    sweep = boulder_sweep.load(RWG, ["vehicle.speed=50 mph", "--accuracy=fine"])
-    expected = ["sweep", "run", "rwg.yaml", "--set", "vehicle.speed=50 mph", "--accuracy", "fine"]
-    assert shlex.split(repeat_command(sweep)) == expected
-    resume = resume_command(sweep, Path("out"), None, "threading", None)
-    assert "--set 'vehicle.speed=50 mph' --accuracy fine --resume" in resume
+@pytest.mark.parametrize(
+    ("replaced", "how", "words"),
+    [
+        ([], (None, "threading", None), "-o out --resume"),
+        ([], (3, "dask", "tcp://x:1"), "-o out --jobs 3 --backend dask --scheduler tcp://x:1 --resume"),
+        (
+            ["vehicle.speed=50 mph", "--accuracy=fine"],
+            (None, "threading", None),
+            "-o out --set 'vehicle.speed=50 mph' --accuracy fine --resume",
+        ),
+    ],
+)
+def test_a_run_is_resumed_as_it_was_started(replaced, how, words) -> None:
+    assert resuming(boulder_sweep.load(RWG, replaced), Path("out"), *how) == f"sweep run {RWG} {words}"
 
 
-def test_a_file_alone_needs_no_options() -> None:
-    assert repeat_command(boulder_sweep.load(RWG)) == "sweep run rwg.yaml"
-    assert repeat_command(grid()) == "sweep run test.yaml"
+def test_a_file_that_is_none_has_its_name() -> None:
+    assert resuming(grid(), Path("out"), None, "threading", None) == "sweep run test.yaml -o out --resume"

@@ -6,24 +6,15 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
-from boulder_sweep.runner import sweeper
-from boulder_sweep.runner.estimate import RowCost, take_sample, time_and_disk, too_large
-from boulder_sweep.runner.sweeper import estimate, run
-from boulder_sweep.runner.workers import (
-    LARGEST_BLOCK,
-    Admission,
-    blocks,
-    rows_in_progress,
-    rows_per_block,
-    rows_per_task,
-)
+from boulder_sweep.runner import run as running
+from boulder_sweep.runner.progress import RowCost, take_sample, time_and_disk, too_large
+from boulder_sweep.runner.ranges import planned, seconds_per_row
+from boulder_sweep.runner.run import estimate, run
 from boulder_sweep.store.failures import DoesNotFitError
-from boulder_sweep.store.schema import encode, part_table
+from boulder_sweep.store.part import encode, part_table
 from boulder_sweep.text import size_text
 from tests.runner.grids import grid, grid_of, plausible
 
@@ -36,59 +27,20 @@ HUGE = {
 }
 
 
-@given(
-    st.lists(st.integers(1, 50), min_size=1, max_size=10),
-    st.integers(1, 20),
-)
-def test_blocks_cover_every_row_once_in_order_and_stay_within_their_range(lengths, size):
-    ranges, start = [], 0
-    for length in lengths:
-        ranges.append((start, start + length))
-        start += length + 3  # a gap: rows that are there already
-    cut = list(blocks(iter(ranges), size))
-    assert [row for a, b in cut for row in range(a, b)] == [row for a, b in ranges for row in range(a, b)]
-    assert all(b - a <= size for a, b in cut)
-    assert all(any(a >= first and b <= last for first, last in ranges) for a, b in cut)
-
-
-@settings(max_examples=100)
-@given(st.floats(1e-9, 100.0), st.integers(1, 10**12), st.integers(1, 256))
-def test_blocks_are_short_and_there_is_one_for_every_worker(seconds, rows, jobs):
-    size = rows_per_block(seconds, rows, jobs)
-    assert 1 <= size <= LARGEST_BLOCK
-    assert size == 1 or size * seconds <= 0.2
-    assert size == 1 or rows / size >= jobs
-
-
 @pytest.mark.parametrize(
-    ("seconds_per_row", "rows", "jobs", "expected"),
+    ("changes", "least", "most"),
     [
-        (1e-6, 10**9, 2, 2_000_000 - 2_000_000 % 131_072),  # whole parts, two seconds of work
-        (1e-4, 10**9, 2, 20_000),  # less than a part where rows take long
-        (1e-6, 1000, 2, 125),  # four for every worker
-        (100.0, 1000, 2, 1),
+        ({}, 1e-5, 5e-5),
+        ({"step": "1 ms"}, 5e-5, 2e-4),
+        ({"soil": "{elements: 160}"}, 5e-5, 4e-4),
     ],
 )
-def test_tasks_are_long_compared_with_their_scheduling(seconds_per_row, rows, jobs, expected):
-    assert rows_per_task(seconds_per_row, rows, jobs, 131_072) == expected
-
-
-def test_a_whole_part_can_always_be_in_progress():
-    for jobs in (1, 2, 64):
-        for block in (1, 100, LARGEST_BLOCK):
-            assert rows_in_progress(block, jobs, 131_072) >= 2 * 131_072
-
-
-def test_admission_bounds_the_rows_in_progress_but_lets_one_block_through():
-    admission = Admission(100)
-    assert admission.admit(60)
-    assert not admission.admit(60)
-    assert admission.admit(40)
-    admission.release(60)
-    assert admission.admit(30)
-    tight = Admission(1)
-    assert tight.admit(50)
-    assert not tight.admit(1)
+def test_costs_grow_with_the_work_by_a_fixed_table(changes, least, most):
+    sweep = grid(**changes)
+    evaluation = evaluation_of(sweep, accuracy_of(sweep), plausible)
+    assert least < seconds_per_row(sweep, evaluation) < most
+    assert seconds_per_row(sweep, evaluation) == seconds_per_row(sweep, evaluation)
+    assert planned(sweep, evaluation).rows == 441
 
 
 def test_sizes_for_people():
@@ -193,22 +145,22 @@ def test_a_sample_sees_the_bytes_of_a_whole_part(wide):
 
 def test_an_estimate_is_in_proportion():
     cost = RowCost(1e-6, 50.0, 10_000.0)
-    one, ten = (time_and_disk(cost, rows, 2, 131_072) for rows in (10**6, 10**7))
+    one, ten = (time_and_disk(cost, rows, rows // 25_000, 2) for rows in (10**6, 10**7))
     assert one[0] == pytest.approx(0.5)
     assert ten[0] == pytest.approx(10 * one[0])
     assert ten[1] == pytest.approx(10 * one[1], rel=0.05)
 
 
 def test_more_workers_than_cores_are_not_faster(monkeypatch):
-    monkeypatch.setattr(sweeper, "take_sample", lambda *_: RowCost(1e-3, 50.0, 10_000.0))
-    monkeypatch.setattr(sweeper, "available_cores", lambda: 2)
+    monkeypatch.setattr(running, "take_sample", lambda *_: RowCost(1e-3, 50.0, 10_000.0))
+    monkeypatch.setattr(running, "available_cores", lambda: 2)
     one, two, eight = (estimate(grid(), jobs=jobs, simulate=plausible) for jobs in (1, 2, 8))
     assert one.seconds == pytest.approx(0.441)
     assert two.seconds == eight.seconds == pytest.approx(0.441 / 2)
 
 
 def test_what_does_not_fit_is_said_with_numbers(tmp_path, monkeypatch):
-    monkeypatch.setattr("boulder_sweep.runner.estimate._disk_free", lambda out: 1_000_000)
+    monkeypatch.setattr("boulder_sweep.runner.progress._disk_free", lambda out: 1_000_000)
     assert too_large(10, "about", 1_000_000, tmp_path) == ""
     assert "needs about 3 GB of disk, and 1 MB are free" in too_large(10, "about", 3_000_000_000, tmp_path)
     monkeypatch.undo()

@@ -7,9 +7,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from boulder_sweep.runner.sweeper import run
+from boulder_sweep.runner.run import run
 from boulder_sweep.settings import Sweep, load
-from boulder_sweep.store import read
+from boulder_sweep.store import folder, read
 from tests.runner.grids import plausible
 
 SOILS = """\
@@ -30,9 +30,14 @@ def soils(tmp_path: Path) -> Sweep:
     return load(tmp_path / "soils.yaml")
 
 
+@pytest.fixture(autouse=True)
+def _small_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(folder, "FEWEST_ROWS", 5)
+
+
 def test_the_name_of_the_soil_is_a_column(soils: Sweep, tmp_path: Path) -> None:
     out = tmp_path / "soils.sweep"
-    run(soils, out, simulate=plausible, rows_per_part=7, jobs=1)
+    run(soils, out, simulate=plausible, jobs=1)
     table = read(out)
     assert table.soil.tolist() == ["loose", "dense"] * 10
     assert isinstance(table.soil.dtype, pd.CategoricalDtype)
@@ -43,14 +48,14 @@ def test_the_name_of_the_soil_is_a_column(soils: Sweep, tmp_path: Path) -> None:
     assert plain.sort_values("design_id").soil.tolist() == table.soil.tolist()
 
 
-def test_it_survives_a_resume_and_a_merge(soils: Sweep, tmp_path: Path) -> None:
+def test_it_survives_a_resume(soils: Sweep, tmp_path: Path) -> None:
     out, whole = tmp_path / "parts.sweep", tmp_path / "whole.sweep"
     run(soils, whole, simulate=plausible, jobs=1)
-    run(soils, out, simulate=plausible, rows_per_part=7, jobs=1)
+    run(soils, out, simulate=plausible, jobs=1)
     parts = sorted(out.glob("rows-*.parquet"))
-    assert len(parts) == 3
+    assert len(parts) == 4
     parts[1].unlink()
-    run(soils, out, simulate=plausible, rows_per_part=7, jobs=1, resume=True)
+    run(soils, out, simulate=plausible, jobs=1, resume=True)
     pd.testing.assert_frame_equal(read(out), read(whole))
 
 
@@ -62,7 +67,7 @@ def test_ids_of_a_table_are_carried_into_the_result(tmp_path: Path) -> None:
     text = text.replace(", height: {from: 1.6 m, to: 3.4 m, count: 10}", "") + "table: designs.csv\n"
     (tmp_path / "table.yaml").write_text(text)
     sweep = load(tmp_path / "table.yaml")
-    run(sweep, tmp_path / "table.sweep", simulate=plausible, rows_per_part=8, jobs=1)
+    run(sweep, tmp_path / "table.sweep", simulate=plausible, jobs=1)
     table = read(tmp_path / "table.sweep")
     assert table.boulder_id.tolist() == [f"B-{k:03d}" for k in range(30)]
     assert table.boulder_height_m.tolist() == pytest.approx([(5 + 0.1 * k) * 0.3048 for k in range(30)])

@@ -10,19 +10,19 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from boulder_sweep.errors import Interrupted
-from boulder_sweep.runner.interruption import Signals, noted_signals
-from boulder_sweep.runner.sweeper import run
+from boulder_sweep.runner.run import run
+from boulder_sweep.runner.signals import Signals, noted_signals
 from boulder_sweep.store.failures import FolderInUseError
-from boulder_sweep.store.reader import finished_table
+from boulder_sweep.store.reading import finished_table
 from tests.faults.faulty import Bar, held, slowly
 from tests.runner.grids import grid_of, plausible, same_bits
-from tests.store.states import status
+from tests.store.folders import nothing_left
 from tests.waiting import HANG_GUARD_S
 
 
 def test_runs_side_by_side(tmp_path):
     def one(number):
-        return run(grid_of(2000 + number), tmp_path / f"out-{number}", jobs=2, rows_per_part=300, simulate=plausible)
+        return run(grid_of(2000 + number), tmp_path / f"out-{number}", jobs=2, simulate=plausible)
 
     with ThreadPoolExecutor(4) as pool:
         assert [summary.rows for summary in pool.map(one, range(4))] == [2000, 2001, 2002, 2003]
@@ -69,12 +69,12 @@ def test_an_interrupted_run_leaves_the_process_as_it_was(tmp_path, monkeypatch, 
         signal.raise_signal(signal.SIGINT)
         bar.allow()  # the run has not ended, so it looks for signals again
 
-    how = {"backend": backend, "jobs": 2, "rows_per_part": 1000, "simulate": held}
+    how = {"backend": backend, "jobs": 2, "simulate": held}
     with pytest.raises(KeyboardInterrupt, match=r"interrupted by SIGINT; .* of 20,000 rows are safe") as stop:
         run(grid_of(20_000), tmp_path / "out", progress=interrupt, **how)
     assert isinstance(stop.value, Interrupted)
     assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before
-    assert not status(tmp_path / "out").running
+    assert nothing_left(tmp_path / "out")
     assert run(grid_of(20_000), tmp_path / "out", resume=True, **how).rows == 20_000
     assert finished_table(tmp_path / "out")["design_id"].to_pylist() == list(range(20_000))
 

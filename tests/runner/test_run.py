@@ -17,13 +17,13 @@ import pyarrow.parquet as pq
 import pytest
 
 from boulder_sweep.columns import COLUMNS
-from boulder_sweep.runner.sweeper import run
-from boulder_sweep.store import read
-from boulder_sweep.store.failures import OutputExistsError, SettingsDifferError, StoreError
+from boulder_sweep.runner.run import run
+from boulder_sweep.store import folder, read
+from boulder_sweep.store.failures import ForeignFilesError, OutputExistsError, SettingsDifferError, StoreError
 from boulder_sweep.store.provenance import canonical, sha256_of
-from boulder_sweep.store.reader import finished_table
+from boulder_sweep.store.reading import finished_table
 from tests.runner.grids import grid, grid_of, partly_impossible, plausible, same_bits
-from tests.store.states import status
+from tests.store.folders import nothing_left, rows_done
 
 ROOT = Path(__file__).parents[2]
 
@@ -35,16 +35,16 @@ def part_files(out: Path) -> dict[str, bytes]:
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
-    """A finished table of 441 real designs in five parts."""
+    """A finished table of 441 real designs in four parts."""
     out = tmp_path_factory.mktemp("finished") / "out"
-    summary = run(grid(), out, jobs=2, rows_per_part=100)
+    summary = run(grid(), out, jobs=2)
     return out, summary
 
 
 def test_summary(finished):
     out, summary = finished
     assert summary.rows == summary.rows_computed == 441
-    assert summary.parts == 5
+    assert summary.parts == 4
     assert sum(summary.verdicts.values()) == 441
     assert summary.verdicts["pass"] > 20
     assert summary.verdicts["fail"] > 20
@@ -99,7 +99,9 @@ def test_every_part_says_what_it_was_computed_from(finished):
         assert len(metadata[b"boulder_sweep.kernels_sha256"]) == 64
         assert json.loads(metadata[b"boulder_sweep.readings"])["inertia_box"] is True
         assert json.loads(metadata[b"boulder_sweep.versions"])["numba"]
-        assert metadata[b"boulder_sweep.cpu"]
+        assert json.loads(metadata[b"boulder_sweep.rows"]) == 441
+        said = b"".join(metadata.values())
+        assert not any(name.encode() in said for name in (str(out), "test.yaml"))
 
 
 @pytest.mark.parametrize(
@@ -108,18 +110,19 @@ def test_every_part_says_what_it_was_computed_from(finished):
         {"jobs": 1},
         {"jobs": 5},
         {"jobs": 2, "backend": "dask"},
-        {"jobs": 2, "commit_every_s": 0.0},
     ],
-    ids=["one", "five", "dask", "grown"],
+    ids=["one", "five", "dask"],
 )
 def test_workers_change_no_byte(finished, tmp_path, how):
-    run(grid(), tmp_path / "out", rows_per_part=100, **how)
+    run(grid(), tmp_path / "out", **how)
     assert part_files(tmp_path / "out") == part_files(finished[0])
 
 
-def test_the_size_of_parts_changes_no_bit(finished, tmp_path):
-    run(grid(), tmp_path / "out", rows_per_part=7)
-    assert len(part_files(tmp_path / "out")) == 63
+def test_the_size_of_parts_changes_no_bit(finished, tmp_path, monkeypatch):
+    monkeypatch.setattr(folder, "FEWEST_ROWS", 1)
+    monkeypatch.setattr("boulder_sweep.runner.ranges.WORK_S", 1e-6)
+    run(grid(), tmp_path / "out")
+    assert len(part_files(tmp_path / "out")) == 440
     assert same_bits(finished_table(tmp_path / "out"), finished_table(finished[0]))
 
 
@@ -127,7 +130,7 @@ def test_blocks_change_no_bit(finished):
     """The rows computed one by one are those computed at once."""
     from boulder_sweep.judge.accuracy import accuracy_of
     from boulder_sweep.judge.evaluation import evaluation_of
-    from boulder_sweep.store.schema import encode, part_table
+    from boulder_sweep.store.part import encode, part_table
 
     sweep = grid()
     evaluation = evaluation_of(sweep, accuracy_of(sweep))
@@ -155,7 +158,7 @@ def test_impossible_rows_are_errors_with_a_reason_and_exit_3(tmp_path):
 def test_dictionaries_that_differ_between_parts_are_one_table(tmp_path):
     """Named reasons occur in some parts only."""
     sweep = partly_impossible()
-    run(sweep, tmp_path / "out", rows_per_part=20)
+    run(sweep, tmp_path / "out")
     frame = pd.read_parquet(tmp_path / "out")
     assert frame["reason"].str.contains("height").sum() == (frame["verdict"] == "error").sum() > 0
     assert pl.read_parquet(tmp_path / "out")["reason"].cast(pl.String).to_list() == frame["reason"].to_list()
@@ -177,7 +180,8 @@ def test_a_progress_function_that_raises_stops_the_run_and_lets_the_folder_go(tm
 
     with pytest.raises(RuntimeError, match="no bar"):
         run(grid(), tmp_path / "out", progress=broken)
-    assert not status(tmp_path / "out").running
+    assert nothing_left(tmp_path / "out")
+    assert rows_done(tmp_path / "out") <= 441
     assert run(grid(), tmp_path / "out", resume=True).rows == 441
 
 
@@ -239,13 +243,40 @@ def test_resuming_with_other_code_is_refused(finished, monkeypatch, name):
 
 def test_overwriting_replaces_the_table(tmp_path):
     out = tmp_path / "out"
-    run(grid(), out, rows_per_part=50, simulate=plausible)
+    run(grid(), out, simulate=plausible)
     summary = run(grid_of(30), out, overwrite=True, simulate=plausible)
     assert summary.rows == len(pd.read_parquet(out)) == 30
-    assert sorted(path.name for path in out.iterdir()) == [
-        "_manifest.parquet",
-        "rows-000000000000-000000000030.parquet",
-    ]
+    assert len(part_files(out)) == len(list(out.iterdir())) == 1
+
+
+@pytest.mark.parametrize("how", [{}, {"resume": True}, {"overwrite": True}])
+@pytest.mark.parametrize(
+    ("name", "is_finished", "refused"),
+    [
+        ("notes.txt", False, True),
+        ("notes.txt", True, False),
+        ("mine.parquet", False, True),
+        ("mine.parquet", True, True),  # readers would take it for rows
+        (".DS_Store", False, False),
+        (".DS_Store", True, False),
+    ],
+)
+def test_other_files_in_the_folder_stay_and_are_told(tmp_path, name, is_finished, refused, how):
+    out = tmp_path / "out"
+    if is_finished:
+        run(grid_of(10), out, simulate=plausible)
+    out.mkdir(exist_ok=True)
+    (out / name).write_text("mine")
+    before = part_files(out)
+    error = ForeignFilesError if refused else OutputExistsError if is_finished and not how else None
+    if error is not None:
+        with pytest.raises(error) as told:
+            run(grid_of(10), out, simulate=plausible, **how)
+        assert told.value.exit_code == 4
+    else:
+        assert run(grid_of(10), out, simulate=plausible, **how).rows == 10
+    assert (out / name).read_text() == "mine"
+    assert not is_finished or part_files(out) == before
 
 
 def test_a_run_outside_the_main_thread(tmp_path):
@@ -261,7 +292,7 @@ _MEMORY = """
 import sys, tempfile
 from pathlib import Path
 from tests.runner.grids import grid_of, settled
-from boulder_sweep.runner.sweeper import run
+from boulder_sweep.runner.run import run
 if __name__ == "__main__":
     rows = int(sys.argv[1])
     with tempfile.TemporaryDirectory() as folder:

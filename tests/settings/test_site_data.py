@@ -8,7 +8,7 @@ import pytest
 
 from boulder_sweep import run
 from boulder_sweep.settings import load
-from boulder_sweep.store.reader import read_row
+from boulder_sweep.store.reading import read_row
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 PLAIN = ("abg", "crash_tests", "m30_sizing", "rwg", "site", "uncertain_site")

@@ -53,7 +53,8 @@ def rows_done(out: Path) -> int:
 
 def nothing_left(out: Path) -> bool:
     """Whether a run has left nothing but parts."""
-    return not hidden_folder(out).exists() and all(part_file(path.name) for path in out.iterdir())
+    names = [path.name for path in out.iterdir()] if out.exists() else []
+    return not hidden_folder(out).exists() and all(map(part_file, names))
 
 
 def rewrite(out: Path, change: Callable[[dict[str, Any]], object], which: int = 0) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -16,7 +17,7 @@ from boulder_sweep.designs import Column, DesignBlock
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.judged import Judged
-from boulder_sweep.store.schema import encode, judged_rows, part_table, table_schema
+from boulder_sweep.store.part import encode, encoded_part, part_table, verdict_counts
 from tests.runner.grids import partly_impossible, plausible
 
 
@@ -44,11 +45,6 @@ def test_columns_and_types_are_those_of_the_register(block, judged):
         assert table.schema.field(spec.name).type == expected[spec.type], spec.name
 
 
-def test_an_empty_table_has_the_same_types(block, judged):
-    empty = pq.read_table(pa.BufferReader(encode(table_schema().empty_table())))
-    assert empty.schema.remove_metadata() == written(block, judged).schema.remove_metadata()
-
-
 def test_inputs_come_back(block, judged):
     table = written(block, judged)
     for name in INPUT_COLUMNS:
@@ -64,12 +60,23 @@ def test_inputs_are_never_written_out_row_by_row(block, judged):
 
 
 def test_outcomes_come_back(block, judged):
-    again = judged_rows(written(block, judged))
+    table = written(block, judged)
     for name in OUTCOME_COLUMNS:
-        one, other = judged[name], again[name]
-        assert one.dtype == other.dtype
-        assert np.array_equal(one, other, equal_nan=one.dtype.kind == "f"), name
-    assert again.words == judged.words
+        values = judged[name]
+        if values.dtype.kind == "f":
+            assert np.array_equal(table[name].to_numpy(), values, equal_nan=True), name
+        else:
+            words = [judged.words[name][code] if code >= 0 else None for code in values]
+            assert table[name].to_pylist() == words, name
+
+
+def test_a_part_says_its_range_and_its_rows_by_verdict(block, judged):
+    content, verdicts = encoded_part(block, judged, {b"a": b"b"})
+    metadata = pq.read_schema(pa.BufferReader(content)).metadata
+    assert metadata[b"boulder_sweep.range"] == f"[0,{len(block)}]".encode()
+    assert json.loads(metadata[b"boulder_sweep.verdicts"]) == verdicts == verdict_counts(judged)
+    assert metadata[b"a"] == b"b"
+    assert sum(verdicts.values()) == len(block)
 
 
 def test_a_missing_value_is_null_never_nan(block, judged):
@@ -146,7 +153,7 @@ def test_tables_pass_the_checks_of_arrow(block, judged):
 _RUN_AND_LIST = """
 import sys
 from tests.runner.grids import grid_of
-from boulder_sweep.runner.sweeper import run
+from boulder_sweep.runner.run import run
 run(grid_of(20), sys.argv[1])
 print(*sorted({"pandas", "matplotlib", "polars", "duckdb"} & set(sys.modules)))
 """

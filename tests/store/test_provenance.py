@@ -9,11 +9,17 @@ import shutil
 from importlib.metadata import version
 from pathlib import Path
 
+import pyarrow.parquet as pq
 import pytest
 
 import boulder_kernels
+import boulder_sweep
+from boulder_sweep.answers.outputs import AnswerFile
+from boulder_sweep.errors import ReportError
 from boulder_sweep.store import provenance
-from boulder_sweep.store.provenance import canonical, differences, file_metadata, identity, sha256_of
+from boulder_sweep.store.provenance import canonical, differences, file_metadata, identity, identity_in, sha256_of
+from tests.answers.designs import site
+from tests.store.folders import OTHER_VERSIONS
 
 
 def test_the_same_content_has_the_same_hash_whatever_its_order():
@@ -123,25 +129,29 @@ def test_differences_are_told_once_and_shortly():
 
 
 def test_file_metadata_has_no_time_and_no_process():
-    one = file_metadata(identity({}, {}, {}), "sweep run x.yaml")
-    assert one == file_metadata(identity({}, {}, {}), "sweep run x.yaml")
+    one = file_metadata(identity({}, {}, {}), repeat="sweep run x.yaml")
+    assert one == file_metadata(identity({}, {}, {}), repeat="sweep run x.yaml")
     assert one[b"boulder_sweep.repeat"] == b"sweep run x.yaml"
     assert not any(re.search(rb"\d\d:\d\d:\d\d", value) for value in one.values())
 
 
-def test_commit_of_a_source_tree(tmp_path, monkeypatch):
-    monkeypatch.setattr(provenance, "_PACKAGE_FOLDER", tmp_path / "boulder_sweep")
-    find = provenance.commit.__wrapped__
-    assert find() is None
-    (tmp_path / "pyproject.toml").write_text('[project]\nname = "boulder-sweep"\n')
-    git = tmp_path / ".git"
-    (git / "refs" / "heads").mkdir(parents=True)
-    (git / "HEAD").write_text("ref: refs/heads/main\n")
-    (git / "packed-refs").write_text("# pack-refs\n" + "b" * 40 + " refs/heads/main\n")
-    assert find() == "b" * 40
-    (git / "refs" / "heads" / "main").write_text("a" * 40 + "\n")
-    assert find() == "a" * 40
-    (git / "HEAD").write_text("c" * 40 + "\n")
-    assert find() == "c" * 40
-    (tmp_path / "pyproject.toml").write_text('[project]\nname = "other"\n')
-    assert find() is None
+@pytest.fixture(scope="module")
+def answers(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a file of answers."""
+    path = tmp_path_factory.mktemp("answers") / "need.parquet"
+    boulder_sweep.need(site(), margin=0.1).write(path)
+    return path
+
+
+@pytest.mark.parametrize("version", OTHER_VERSIONS)
+def test_a_file_of_answers_of_another_version_is_refused(answers, tmp_path, version):
+    change, words = OTHER_VERSIONS[version]
+    table = pq.read_table(answers)
+    there = identity_in(table.schema.metadata)
+    change(there)
+    kept = {key: value for key, value in table.schema.metadata.items() if key != b"boulder_sweep.format"}
+    other = tmp_path / "other.parquet"
+    pq.write_table(table.replace_schema_metadata(kept | file_metadata(there)), other)
+    with pytest.raises(ReportError) as refused:
+        AnswerFile(other, ReportError)
+    assert str(refused.value).startswith(f"{other} {words.format(provenance.versions()['boulder-sweep'])}")
