@@ -46,7 +46,7 @@ from boulder_sweep.runner.progress import (
 from boulder_sweep.runner.ranges import WORK_S, Stopped, Work, Written, planned, seconds_per_row
 from boulder_sweep.runner.signals import Signals, noted_signals
 from boulder_sweep.store import failures
-from boulder_sweep.store.folder import Ranges, clear, locked, make, part_file, part_files, remove_parts
+from boulder_sweep.store.folder import Ranges, check_writable, clear, locked, make, part_file, part_files, remove_parts
 from boulder_sweep.store.provenance import differences, file_metadata, identity
 from boulder_sweep.store.reading import Contents, FinishedRows, Table, contents, refuse_no_result, refuse_two
 from boulder_sweep.text import why
@@ -326,6 +326,7 @@ def _refuse_taken(out: Location, resume: bool, overwrite: bool) -> None:
     if parts and not (resume or overwrite):
         there = FinishedRows(out)
         raise failures.OutputExistsError(out, there.rows_done, there.rows)
+    check_writable(out)
 
 
 def _planned(sweep: Sweep, simulate: Simulate) -> _Plan:

@@ -135,6 +135,23 @@ def put_part(out: Location, first: int, stop: int, content: bytes | memoryview) 
     return part
 
 
+def check_writable(out: Location) -> None:
+    """Find out whether a folder can be written; what is on an object store shows with the first part.
+
+    Raises
+    ------
+    WriteError
+        It cannot.
+    """
+    if isinstance(out, Path):
+        try:
+            with _passing(out) as (passing, at):
+                os.close(_created(passing.name, at))
+                passing.unlink()
+        except OSError as problem:
+            raise failures.WriteError(f"cannot write into {out}: {why(problem)}") from problem
+
+
 def _put_on_disk(out: Path, name: str, content: bytes | memoryview) -> None:
     for left in range(_TRIES, 0, -1):
         try:
