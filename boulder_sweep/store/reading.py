@@ -311,6 +311,8 @@ class FinishedRows:
         with self._open(part) as source:
             try:
                 file = _opened(source)
+            except ParquetLimitError as problem:
+                raise failures.ImpossibleRecordsError(self._folder / part.name, str(problem)) from problem
             except ParquetError as problem:
                 raise self._damaged(part, str(problem)) from problem
             self._schema, self._common = file.schema, common_in(file.schema.metadata)
@@ -397,10 +399,10 @@ class FinishedRows:
                     other = _table_of(self._folder, part, file)
                     if unlike := differences(self._table.described, other.described):
                         raise self._damaged(part, f"of another run: {unlike[0]}")
-                _own(self._folder, part, file, self._table.ranges)
                 if {*file.schema.names} != {*self.columns} or not file.schema.equals(self._schema):
                     raise self._damaged(part, "other columns than those of its settings")
                 table = file.read(columns)
+                _own(self._folder, part, file, self._table.ranges)
             except ParquetLimitError as problem:
                 raise failures.ImpossibleRecordsError(self._folder / part.name, str(problem)) from problem
             except (OSError, ParquetError) as problem:

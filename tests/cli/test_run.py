@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from boulder_sweep.cli import output
-from boulder_sweep.runner.summary import progress_of
-from boulder_sweep.store import writer
+from boulder_sweep.runner.progress import progress_of
+from boulder_sweep.store import folder
 from boulder_sweep.text import duration_text
 
 
@@ -155,9 +155,9 @@ def test_a_dry_run_says_what_resuming_would_compute(sweep, possible_grid):
     code, out, _ = sweep(*resume)
     assert code == 0
     assert "\nwould simulate 18 of 18 designs into small-grid.sweep\n" in out
-    assert f"\ndamaged: {part.name}: changed: its checksum differs\n" in out
+    assert f"\ndamaged: {part.name}: changed: its bytes do not have the hash in its name\n" in out
     assert json.loads(sweep(*resume, "--json")[1])["estimate"]["damaged"] == {
-        part.name: "changed: its checksum differs"
+        part.name: "changed: its bytes do not have the hash in its name"
     }
     code, out, err = sweep(*resume, "--set", "vehicle.speed=31 mph")
     assert (code, out) == (4, "")
@@ -211,7 +211,7 @@ def test_the_command_to_go_on_repeats_every_option(sweep, grid, monkeypatch):
         seen.update(options)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("boulder_sweep.runner.sweeper.run", run)
+    monkeypatch.setattr("boulder_sweep.runner.run.run", run)
     words = [
         "-o",
         "my out",
@@ -239,7 +239,7 @@ def test_an_interrupted_run_tells_how_to_go_on(sweep, grid, monkeypatch, signum)
     def run(*_, **options):
         raise Interrupted(signum, 5, 18, options["resume_command"])
 
-    monkeypatch.setattr("boulder_sweep.runner.sweeper.run", run)
+    monkeypatch.setattr("boulder_sweep.runner.run.run", run)
     code, out, err = sweep("run", grid)
     assert (code, out) == (128 + signum, "")
     assert "sweep run grid.yaml -o small-grid.sweep --resume" in err
@@ -249,7 +249,7 @@ def test_an_internal_error_is_one_line_unless_verbose(sweep, grid, monkeypatch):
     def run(*_, **__):
         raise ZeroDivisionError("on purpose")
 
-    monkeypatch.setattr("boulder_sweep.runner.sweeper.run", run)
+    monkeypatch.setattr("boulder_sweep.runner.run.run", run)
     code, out, err = sweep("run", grid, "-q")
     assert (code, out) == (1, "")
     assert err.count("\n") == 1
@@ -304,15 +304,10 @@ NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 def test_a_folder_that_the_system_refuses_to_write_is_for_the_user_to_mend(
     sweep, possible_grid, monkeypatch, number, when
 ):
-    save, saved = writer.save, []
+    def refused(*_, **__):
+        raise OSError(number, os.strerror(number))
 
-    def refused(*given):
-        saved.append(given)
-        if when == "opened" or len(saved) > 1:
-            raise OSError(number, os.strerror(number))
-        save(*given)
-
-    monkeypatch.setattr(writer, "save", refused)
+    monkeypatch.setattr(*{"opened": (folder, "_created"), "written": (os, "rename")}[when], refused)
     code, out, err = sweep("run", possible_grid, "-q", "-o", "out")
     assert (code, out) == (2, "")
     assert err.startswith(f"error: cannot write into out: {os.strerror(number)}")

@@ -13,7 +13,7 @@ import pytest
 from rich.progress import Progress as Bars
 
 from boulder_sweep.errors import Interrupted
-from boulder_sweep.runner import interruption
+from boulder_sweep.runner import signals
 from tests.conftest import Command
 from tests.waiting import wait_until
 
@@ -26,10 +26,10 @@ def closing(grid: object, monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable
 
     def run(*_: object, **options: str) -> NoReturn:
         signal.raise_signal(signal.SIGINT)
-        wait_until(lambda: interruption._installed.caught == signal.SIGINT, "the signal was noted")
+        wait_until(lambda: signals._installed.caught == signal.SIGINT, "the signal was noted")
         raise Interrupted(signal.SIGINT, 5, 18, options["resume_command"])
 
-    monkeypatch.setattr("boulder_sweep.runner.sweeper.run", run)
+    monkeypatch.setattr("boulder_sweep.runner.run.run", run)
     monkeypatch.setenv("COLUMNS", "200")
     stop = Bars.stop
 
@@ -74,11 +74,11 @@ def test_it_is_said_where_the_bar_takes_its_time(
             return super().is_alive()
 
     functions = {name: getattr(threading, name) for name in ("current_thread", "main_thread")}
-    monkeypatch.setattr(interruption, "threading", SimpleNamespace(Thread=Watched, **functions))
+    monkeypatch.setattr(signals, "threading", SimpleNamespace(Thread=Watched, **functions))
 
     def several_looks() -> None:
         enough = len(looks) + 3
-        wait_until(lambda: len(looks) >= enough or interruption._installed is None, "the waiting thread looked thrice")
+        wait_until(lambda: len(looks) >= enough or signals._installed is None, "the waiting thread looked thrice")
         waited.append(len(looks) >= enough)
 
     closing(several_looks)

@@ -281,7 +281,7 @@ def test_what_a_result_does_not_take(sweep, finished, words, message):
     ("place", "words"),
     [
         ("no.sweep", "there is no no.sweep; the result of a run is a folder"),
-        (".", ". is not the result of a sweep (no _manifest.parquet)"),
+        (".", ". is not the result of a sweep: no rows of it are finished"),
         ("depths.parquet", "there is no depths.parquet; the result of a run is a folder"),
         ("no.yaml", "no.yaml: there is no such file"),
     ],

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from boulder_sweep.runner.sweeper import run
+from boulder_sweep.store.manifest import load as load_manifest
 
 from boulder_kernels.table import finer_step
 from boulder_sweep.cli.console import accuracy_lines
@@ -21,9 +23,7 @@ from boulder_sweep.judge.accuracy import (
     pilot_size,
 )
 from boulder_sweep.judge.inputs import sampled_rows
-from boulder_sweep.runner.sweeper import run
 from boulder_sweep.settings import Sweep, load_text
-from boulder_sweep.store.manifest import load as load_manifest
 from tests.runner.grids import DEFAULTS, GRID, grid, grid_of
 
 

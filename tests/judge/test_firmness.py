@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from boulder_sweep.runner.sweeper import run
+from boulder_sweep.store.manifest import load as load_manifest
 
 import boulder_sweep
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.firmness import CHANGES, firmness_of
 from boulder_sweep.judge.judged import FAIL, PASS
-from boulder_sweep.runner.sweeper import run
 from boulder_sweep.settings.model import ReadingChoice
-from boulder_sweep.store.manifest import load as load_manifest
 from tests.runner.grids import grid
 
 

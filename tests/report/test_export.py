@@ -27,7 +27,7 @@ from boulder_sweep.report.page import ASSETS, SCRIPTS
 from boulder_sweep.settings import load_text
 from boulder_sweep.settings.shown_units import shown_column, shown_settings, shown_unit
 from boulder_sweep.settings.units import factor
-from tests.store.folders import rewrite_records
+from tests.store.folders import rewrite
 
 US = {
     "boulder_length_m": "boulder_length_ft",
@@ -137,7 +137,7 @@ def test_distributions_layers_and_long_axes_are_in_the_units_asked_for():
 def test_a_table_judged_by_other_rules_says_so_in_every_row_and_beside_the_other(result, tmp_path, capsys):
     out = tmp_path / "other.sweep"
     shutil.copytree(result, out)
-    rewrite_records(out, lambda records: records["identity"].update(rules_sha256="abcdef0123456789"))
+    rewrite(out, lambda said: said.update(rules_sha256="abcdef0123456789"))
     judged = f"judged by the rules of version {boulder_sweep.__version__} (rules abcdef01, kernels "
     with pytest.warns(OlderRulesWarning, match="abcdef01"):
         export(out, tmp_path / "other.parquet", units="us")

@@ -13,8 +13,8 @@ from boulder_sweep.report.answers import answer_of
 from boulder_sweep.report.asked import Measure
 from boulder_sweep.report.contents import table_data, thinned
 from boulder_sweep.report.rows import NOT_YET, read_rows
+from boulder_sweep.store import folder
 from tests.report.conftest import GRID, LIST, SETS
-from tests.store.folders import rewrite_records
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +119,7 @@ def test_a_list_of_designs_keeps_its_inputs(tmp_path, result):
 
 
 def test_rows_that_are_not_there_yet_are_neither_pass_nor_fail(result, tmp_path):
-    """As after an interruption: the manifest knows fewer rows than the sweep has."""
+    """As after an interruption: there are fewer rows than the sweep has."""
     rows = read_rows(result)
     codes = rows.codes.copy()
     codes[100:] = len(rows.names) - 1
@@ -128,15 +128,16 @@ def test_rows_that_are_not_there_yet_are_neither_pass_nor_fail(result, tmp_path)
     assert any("152 designs are not computed yet" in str(sentence[0]) for sentence in answer_of(unfinished).sentences)
 
 
-def test_a_list_that_is_not_finished_has_a_report_of_its_finished_rows(tmp_path):
+def test_a_list_that_is_not_finished_has_a_report_of_its_finished_rows(tmp_path, monkeypatch):
     designs = pd.DataFrame({"boulder_height_m": np.linspace(2.0, 3.8, 10).tolist() * 2})
     designs["friction_angle_deg"] = np.repeat([44.0, 30.0], 10)
     designs["embedment_depth_m"] = 0.6 * designs.boulder_height_m
     designs.to_csv(tmp_path / "designs.csv", index=False)
     (tmp_path / "list.yaml").write_text(LIST)
     out = tmp_path / "list.sweep"
-    boulder_sweep.run(boulder_sweep.load(tmp_path / "list.yaml"), out, rows_per_part=15)
-    rewrite_records(out, lambda records: [records["parts"].pop(name) for name in sorted(records["parts"])[1:]])
+    monkeypatch.setattr(folder, "FEWEST_ROWS", 5)
+    boulder_sweep.run(boulder_sweep.load(tmp_path / "list.yaml"), out)
+    max(out.iterdir()).unlink()
     rows = read_rows(out)
     assert rows.counts()[NOT_YET] == 5
     assert thinned(rows).indices[0].tolist() == list(range(15))

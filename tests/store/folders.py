@@ -68,7 +68,7 @@ def rewrite(out: Path, change: Callable[[dict[str, Any]], object], which: int = 
     metadata = {
         (key if key == "PANDAS_ATTRS" else f"{PREFIX}{key}").encode(): (
             value if isinstance(value, str) else canonical(value)
-        ).encode()
+        ).encode(errors="backslashreplace")
         for key, value in said.items()
     }
     (out / part.name).unlink()
