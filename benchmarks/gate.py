@@ -185,7 +185,7 @@ def designs_of_run() -> int:
     """Count the designs that a small run hands to the kernels."""
     import boulder_sweep
     from boulder_sweep.judge.evaluation import by_kernels
-    from boulder_sweep.runner.sweeper import run
+    from boulder_sweep.runner.run import run
 
     simulated: list[int] = []  # appending from several threads at once loses nothing
 

@@ -28,6 +28,7 @@ CONNECT_S = 10.0
 """How long to wait for a scheduler, for a first worker, and for the answer of every worker [s]."""
 Call = tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
 """Function, arguments and named arguments, see `call`."""
+Fingerprint = tuple[dict[str, str], str, str]
 _LOOK_EVERY_S = 0.5
 _LOOPBACK = "127.0.0.1:0"
 
@@ -250,7 +251,7 @@ def _check_workers(client: Any, scheduler: str) -> None:
         raise BackendError(other_versions_text(f"the workers {', '.join(different)}"))
 
 
-def fingerprint() -> tuple[dict[str, str], str, str]:
+def fingerprint() -> Fingerprint:
     """Return versions and hashes of the code that computes here."""
     from boulder_sweep.store.provenance import kernels_sha256, rules_sha256, versions
 

@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from boulder_sweep.errors import ComputationError
+from boulder_sweep.errors import BackendError, ComputationError
 from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST
 from boulder_sweep.judge.judged import Judged, joined, not_computed
 from boulder_sweep.locations import location_of
+from boulder_sweep.runner.pool import Fingerprint, fingerprint, other_versions_text
 from boulder_sweep.soils import is_layered
 from boulder_sweep.store.folder import Ranges, put_part, ranges_of
 from boulder_sweep.text import one_line
@@ -85,6 +86,8 @@ class Work:
         The folder, by path or URL.
     rows_per_block
         Rows that are computed at once.
+    made_by
+        What a worker elsewhere must have, see `pool.fingerprint`; one that comes later may have other versions.
     """
 
     evaluate: Callable[[DesignBlock], Judged]
@@ -92,6 +95,7 @@ class Work:
     metadata: Mapping[bytes, bytes]
     out: str
     rows_per_block: int
+    made_by: Fingerprint | None = None
     _failures: int = field(default=0, init=False)
 
     def write(self, first: int, stop: int, tick: Callable[[int], None] = lambda rows: None) -> Written:
@@ -110,7 +114,11 @@ class Work:
             As for `judged`.
         WriteError
             The part cannot be written.
+        BackendError
+            This worker has other versions.
         """
+        if self.made_by is not None and fingerprint() != self.made_by:
+            raise BackendError(other_versions_text("a worker"))
         from boulder_sweep.store.part import encoded_part  # imports pyarrow
 
         pieces = []

@@ -30,6 +30,7 @@ from boulder_sweep.runner.pool import (
     call,
     check_backend,
     check_jobs,
+    fingerprint,
     pool,
     telling_start_failure,
 )
@@ -261,6 +262,10 @@ class _Run:
 
     def _ranges(self, workers: Pool, work: Work, missing: Iterator[tuple[int, int]]) -> None:
         more = () if workers.client is not None else (self._tick,)
+        if workers.client is not None:
+            work.made_by = fingerprint()
+            if isinstance(self._out, Path):
+                work.out = str(self._out.absolute())  # workers have working folders of their own
         calls = (call(_written, work, first, stop, *more) for first, stop in missing if not self._stopped.is_set())
         for part in workers(calls, in_order=False, shared=work):
             if isinstance(part, Written):

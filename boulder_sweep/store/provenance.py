@@ -126,6 +126,7 @@ def identity_in(metadata: Mapping[bytes, bytes] | None) -> dict[str, Any]:
     parsed = {key: json.loads(value) if key in _JSON else value.decode() for key, value in entries.items()}
     if _is_deep(parsed):
         raise ValueError("its records are nested too deeply")
+    canonical(parsed).encode()  # JSON can escape what is no text
     return parsed
 
 

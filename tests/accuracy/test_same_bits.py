@@ -41,7 +41,7 @@ def test_a_hopeless_neighbour_does_not_matter() -> None:
 
 
 @pytest.mark.parametrize("accuracy", ["fine", "0.001 deg"])
-def test_workers_and_parts_do_not_matter(accuracy: str, tmp_path: Path) -> None:
+def test_workers_and_parts_do_not_matter(accuracy: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import pyarrow.parquet as pq
 
     from boulder_sweep.runner.run import run
@@ -50,9 +50,10 @@ def test_workers_and_parts_do_not_matter(accuracy: str, tmp_path: Path) -> None:
 
     text = GRID.format(**DEFAULTS).replace("step: 4 ms", f"accuracy: {accuracy}")
     found = []
-    for jobs, rows_per_part in ((1, 1000), (2, 100)):
+    for jobs, work_s in ((1, 1e9), (2, 1e-9)):
+        monkeypatch.setattr("boulder_sweep.runner.ranges.WORK_S", work_s)
         out = tmp_path / f"{jobs}"
-        run(load_text(text, Path("grid.yaml")), out, jobs=jobs, rows_per_part=rows_per_part)
+        run(load_text(text, Path("grid.yaml")), out, jobs=jobs)
         found.append(pq.read_table(out))
     assert len(found[0]) == grid().n_designs
     assert same_bits(*found)

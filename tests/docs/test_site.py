@@ -72,7 +72,7 @@ def test_pages_from_elsewhere_are_in_it(site: Path) -> None:
         "quick_start.html": "Which boulder, buried how deep",
         "benchmarks/index.html": "numbalsoda",
         "command_line.html": "sweep fit-vehicle",
-        "reference/python.html": "boulder_sweep.runner.sweeper.run",
+        "reference/python.html": "boulder_sweep.runner.run.run",
         "reference/kernels.html": "boulder_kernels.soil.closed_form",
         "notebooks/m30_sizing.html": "configs/m30_sizing.yaml",
     }

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from boulder_sweep.runner.sweeper import run
-from boulder_sweep.store.manifest import load as load_manifest
 
 from boulder_kernels.table import finer_step
 from boulder_sweep.cli.console import accuracy_lines
@@ -23,7 +21,9 @@ from boulder_sweep.judge.accuracy import (
     pilot_size,
 )
 from boulder_sweep.judge.inputs import sampled_rows
+from boulder_sweep.runner.run import run
 from boulder_sweep.settings import Sweep, load_text
+from boulder_sweep.store.reading import FinishedRows
 from tests.runner.grids import DEFAULTS, GRID, grid, grid_of
 
 
@@ -84,7 +84,7 @@ def test_chosen_and_achieved_stand_in_summary_and_metadata_and_survive_a_resume(
     summary = run(sweep, out, jobs=1)
     told = accuracy_of(sweep).to_dict()
     assert summary.accuracy == told
-    assert load_manifest(out).identity["accuracy"] == told
+    assert FinishedRows(out).identity["accuracy"] == told
     assert told["asked"] == "0.001 deg"
     assert told["estimated_error_p99_9_deg"] <= 1e-3
     again = run(asked("0.001 deg"), out, jobs=2, resume=True)

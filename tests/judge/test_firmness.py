@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from boulder_sweep.runner.sweeper import run
-from boulder_sweep.store.manifest import load as load_manifest
 
 import boulder_sweep
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.firmness import CHANGES, firmness_of
 from boulder_sweep.judge.judged import FAIL, PASS
+from boulder_sweep.runner.run import run
 from boulder_sweep.settings.model import ReadingChoice
+from boulder_sweep.store.reading import FinishedRows
 from tests.runner.grids import grid
 
 
@@ -85,7 +85,7 @@ def test_it_stands_in_summary_and_metadata_and_repeats_itself(tmp_path: Path) ->
     assert json.loads(metadata[b"boulder_sweep.firmness"]) == expected
     again = run(grid(), tmp_path / "one", jobs=2, resume=True)
     assert again.firmness == expected
-    assert load_manifest(tmp_path / "one").rows_done == sweep.n_designs
+    assert FinishedRows(tmp_path / "one").rows_done == sweep.n_designs
 
 
 def test_the_numerical_error_is_that_of_the_accuracy_asked_for() -> None:

@@ -6,7 +6,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from boulder_sweep.store.schema import verdict_counts
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -14,6 +13,7 @@ from boulder_sweep.columns import OUTCOME_COLUMNS, REASONS, VERDICTS
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.judged import joined, not_computed
+from boulder_sweep.store.part import verdict_counts
 from tests.runner.grids import partly_impossible, plausible
 
 

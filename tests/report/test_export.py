@@ -248,7 +248,7 @@ def test_a_page_that_the_system_refuses_is_an_error_of_the_report(tmp_path, monk
     def refuse(*_):
         raise OSError(errno.EROFS, "Read-only file system")
 
-    monkeypatch.setattr(writing, "put_file", refuse)
+    monkeypatch.setattr(writing, "replacing", refuse)
     with pytest.raises(ReportError, match=r"page\.html cannot be written: Read-only file system"):
         write_explorer(writing.example(), 0, tmp_path / "page.html")
 

@@ -232,9 +232,9 @@ def test_the_command_never_holds_more_than_a_few_parts(out, monkeypatch, capsys)
     plain = PictureRows.add
     monkeypatch.setattr(PictureRows, "add", add)
     monkeypatch.setattr("boulder_sweep.store.read", None)
-    assert (
-        boulder_sweep.run(boulder_sweep.load(out.parent / "grid.yaml"), out, overwrite=True, rows_per_part=5).rows == 36
-    )
+    monkeypatch.setattr("boulder_sweep.store.folder.FEWEST_ROWS", 4)
+    monkeypatch.setattr("boulder_sweep.runner.ranges.WORK_S", 1e-9)
+    assert boulder_sweep.run(boulder_sweep.load(out.parent / "grid.yaml"), out, overwrite=True).rows == 36
     assert execute(["plot", str(out), "--at", "subgrade_reaction_MN_m3=95"]) == 0
     assert "18 of 36 designs" in capsys.readouterr().out
     assert len(held) == 8
