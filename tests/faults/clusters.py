@@ -65,7 +65,11 @@ class Cluster:
         return subprocess.Popen(
             [sys.executable, "-m", "dask", *words, "--host", "127.0.0.1"],
             cwd=self._folder,
-            env={**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"},
+            env={
+                **os.environ,
+                "TEST_DASK_WORKER": "1",
+                "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}",
+            },
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
