@@ -242,7 +242,7 @@ class ResultRows:
         margins = np.full(len(numbers), np.nan)
         for table in self.finished.tables(["design_id", "margin"], verify=False):
             ids = table.column("design_id").to_numpy()
-            here = np.flatnonzero((numbers >= ids.min(initial=0)) & (numbers <= ids.max(initial=-1)))
+            here = np.flatnonzero(np.isin(numbers, ids))
             margins[here] = table.column("margin").to_numpy()[np.searchsorted(ids, numbers[here])]
         return margins
 
