@@ -241,7 +241,7 @@ def load(folder: Location) -> Manifest:
         manifest = _from_json(content)
         _check_claims(path, manifest)
         if {*footer.schema.names} != {*manifest.columns}:
-            raise ValueError("other columns than those of its settings")
+            raise ValueError("its columns do not follow from its settings")
         return manifest
     except (ValueError, RecursionError) as problem:
         raise failures.ImpossibleRecordsError(path, str(problem)) from None
@@ -319,7 +319,7 @@ def _part(name: str, record: Any) -> Part:
 
 
 def _entries_of(record: type, what: str, content: Any) -> dict[str, Any]:
-    """Return the entries of a record, if they are those of its dataclass, with values of the right type.
+    """Return the entries of a record; its dataclass must have the same ones, with values of these types.
 
     `what` describes the record, for the message. Nested records are not checked.
 

@@ -53,8 +53,8 @@ def read(out: str | Path | RemotePath, columns: Sequence[str] | None = None, *, 
     -------
     pandas.DataFrame
         Rows in the order of the designs. ``.attrs`` contains ``units`` and ``meanings`` by column name,
-        ``rows`` (of the whole table), ``complete`` (whether all of them are finished) and ``judged_by`` (by whose
-        rules, if not by those of this version; else empty).
+        ``rows`` (of the whole table), ``complete`` (whether all of them are finished) and ``judged_by`` (whose
+        rules judged them; empty where this version's did).
 
     Warns
     -----
@@ -158,7 +158,7 @@ class FinishedRows:
     identity : dict
         What all rows have in common, see `provenance`.
     judged_by : str
-        By whose rules the rows were judged; empty where by those of this version.
+        Whose rules judged the rows; empty where this version's did.
 
     Warns
     -----

@@ -114,7 +114,7 @@ def test_a_table_has_the_columns_of_its_settings(tmp_path):
         schema.append(pa.field("colour", pa.string())),
     ):
         pq.write_table(other.empty_table(), path)
-        with pytest.raises(ImpossibleRecordsError, match="other columns than those of its settings"):
+        with pytest.raises(ImpossibleRecordsError, match="its columns do not follow from its settings"):
             load(tmp_path)
 
 
