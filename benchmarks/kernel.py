@@ -17,7 +17,7 @@ from boulder_kernels.design import design_at
 from boulder_kernels.layered import COUNTS, TO, filled_layers, uniform_layers
 from boulder_kernels.outlined import HEIGHT, given_beside
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
-from boulder_kernels.soil import Kinematics, closed_form, element_sums
+from boulder_kernels.soil import Kinematics, Reaction, closed_form, element_sums
 from boulder_kernels.table import some_rows
 from boulder_kernels.workspace import LayeredLanes, TaperedLanes
 from boulder_sweep.judge.accuracy import LONGEST_HORIZON
@@ -36,25 +36,19 @@ PASSES = 300
 STEP_S = 0.014
 ROUNDS = 5
 
-_compiled = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
 
+def repeated(reaction: Callable[[Kinematics, Constants], Reaction]) -> Callable[[Kinematics, Constants, int], float]:
+    """Return a compiled loop that evaluates a soil, each time at a state that depends on the previous result."""
 
-@_compiled
-def sum_elements_often(k: Kinematics, c: Constants, times: int) -> float:
-    """Sum over the elements repeatedly, at slightly different states."""
-    total = 0.0
-    for i in range(times):
-        total += element_sums(Kinematics(k.A + 1e-6 * i, k.slope_x, k.B, k.slope_v, k.q, k.lever_d), c).M
-    return total
+    @numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+    def often(k: Kinematics, c: Constants, times: int) -> float:
+        total = 0.0
+        for _ in range(times):
+            moved = Kinematics(k.A + 1e-12 * total, k.slope_x, k.B, k.slope_v, k.q, k.lever_d)
+            total += reaction(moved, c).M
+        return total
 
-
-@_compiled
-def integrate_often(k: Kinematics, c: Constants, times: int) -> float:
-    """Evaluate the closed form repeatedly, each time at a state that depends on the previous result."""
-    total = 0.0
-    for _ in range(times):
-        total += closed_form(Kinematics(k.A + 1e-12 * total, k.slope_x, k.B, k.slope_v, k.q, k.lever_d), c).M
-    return total
+    return often
 
 
 def same_soil(designs: bk.DesignTable, count: int) -> np.ndarray:
@@ -100,8 +94,8 @@ def measure() -> Table:
         **{f"{count} layers": in_lanes(table, LayeredLanes, count) for count, table in layered.items()},
         "taper": in_lanes(same_taper(designs), TaperedLanes, 1),
         **{law: partial(second_opinions, with_law(passes, law), asked) for law in SECOND_OPINIONS},
-        "sums": lambda: sum_elements_often(lines, with_elements, SUMS),
-        "closed": lambda: integrate_often(lines, closed, CLOSED_FORMS),
+        "sums": partial(repeated(element_sums), lines, with_elements, SUMS),
+        "closed": partial(repeated(closed_form), lines, closed, CLOSED_FORMS),
     }
     least = {name: min(seconds) for name, seconds in interleaved(work, ROUNDS).items()}
     ratios = [f"{least[f'{count} layers'] / least['box']:.1f}" for count in COUNTS]

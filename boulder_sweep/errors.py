@@ -33,7 +33,7 @@ class BoulderSweepError(Exception):
 
 
 class OlderRulesWarning(UserWarning):
-    """A table was judged by other rules than those of this version; it is read all the same."""
+    """Other rules than this version's judged a table; it is read all the same."""
 
 
 class BackendError(BoulderSweepError):

@@ -1,13 +1,12 @@
 """Parquet files that a user names, opened in one way: plain columns only, and no more bytes than a table may have.
 
 Packed, a page of a thousand bytes can hold gigabytes, and a word that stands once can stand in every row. What the
-columns take once they are unpacked is added up from the footer before a row is read. Text is read as words and codes,
-so that no word is repeated.
+columns take once they are unpacked is added up from the heads of their pages before one is unpacked: the footer may say
+less, and pyarrow believes the page. Text is read as words and codes, so that no word is repeated.
 """
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import lru_cache, partial
@@ -17,6 +16,7 @@ from boulder_sweep.text import printable, size_text
 
 if TYPE_CHECKING:
     import pyarrow as pa
+    import pyarrow.parquet as pq
 
 MOST_COLUMNS = 2000
 """Twice as many as a list of designs may have: a result has its own beside them."""
@@ -36,6 +36,10 @@ _CODED = {"PLAIN", "PLAIN_DICTIONARY", "RLE_DICTIONARY"} | _MARKS
 _SPELLED = {"DELTA_LENGTH_BYTE_ARRAY"} | _MARKS
 """Encodings of text of which no word takes more bytes than its page. By DELTA_BYTE_ARRAY a word repeats the beginning
 of the word before, and may be of any length."""
+_MOST_PAGES = 100_000
+"""Most pages of a piece of a column: every one has a head that is read."""
+_LONGEST_HEAD = 65_536
+"""Most bytes of the head of a page, which may hold its smallest and largest word."""
 _REMEDY = "write it again with pandas.DataFrame.to_parquet"
 
 
@@ -143,16 +147,19 @@ class TableFile:
         """Have pyarrow look at what the footer says of every piece of a column, where it can refuse it.
 
         Asked for a single damaged piece, it ends the process. A read of all looks at them first, in one go, and then
-        meets a file without bytes.
+        meets a file that was closed. Nothing of Python is called in this: a thread of pyarrow that still calls Python
+        when the process ends would end it with an abort.
         """
         import pyarrow as pa
 
-        unread = _Unread(self._source.seek(0, 2))
-        unread.file = pa.PythonFile(unread, mode="r")
+        unread = pa.BufferReader(pa.allocate_buffer(self._source.seek(0, 2)))
+        file = self._opened(unread, metadata=self._file.metadata, pre_buffer=True)
+        unread.close()
         try:
-            self._opened(unread.file, metadata=self._file.metadata, pre_buffer=True).read(use_threads=False)
-        except _ReachedError as reached:
-            reached.__traceback__ = None  # pyarrow keeps the exception for good, and it would keep all of this
+            file.read(use_threads=False)
+        except pa.ArrowInvalid as problem:
+            if "closed" not in str(problem):
+                raise
 
     def _check_bytes(self, columns: Sequence[str] | None) -> set[str]:
         """Add up the unpacked bytes of columns before reading; return text that pyarrow cannot read as codes."""
@@ -168,7 +175,7 @@ class TableFile:
                 if stored.num_values != group.num_rows:
                     raise ParquetError(f"is damaged: column {shown} has not one value in each row")
                 encodings.update(stored.encodings)
-                values, unpacked = group.num_rows * (_width(field.type) or _CODE), stored.total_uncompressed_size
+                values, unpacked = group.num_rows * (_width(field.type) or _CODE), self._unpacked(stored, shown)
                 self._taken += values + unpacked if is_text else max(values, unpacked)
                 if self._taken > self._most_bytes:
                     most = size_text(self._most_bytes)
@@ -178,6 +185,22 @@ class TableFile:
                     raise ParquetLimitError(f"column {shown} is text in an encoding that is not read; {_REMEDY}")
                 spelled.add(field.name)
         return spelled
+
+    def _unpacked(self, stored: pq.ColumnChunkMetaData, shown: str) -> int:
+        """Add up the bytes that the pages of a piece of a column take once they are unpacked."""
+        at = min(filter(None, (stored.dictionary_page_offset, stored.data_page_offset)))
+        end, total = at + stored.total_compressed_size, 0
+        for _ in range(_MOST_PAGES):
+            if at == end:
+                return total
+            self._source.seek(at)
+            head, length = _whole_numbers(self._source.read(min(_LONGEST_HEAD, end - at)), 0, 3)
+            unpacked, packed = head[2], head[3]
+            if min(unpacked, packed) < 0 or at + length + packed > end:
+                raise ParquetError(f"is damaged: a page of column {shown} is longer than its column")
+            total += unpacked
+            at += length + packed
+        raise ParquetLimitError(f"column {shown} is in more than {_MOST_PAGES:,} pages; {_REMEDY}")
 
     def _check_words(self, shown: str, column: pa.ChunkedArray) -> None:
         """Refuse words that are too long, or too many rows of long ones."""
@@ -198,34 +221,52 @@ class TableFile:
                 raise ParquetLimitError(f"has more than {most} of text, up to column {shown}")
 
 
-class _ReachedError(Exception):
-    """Bytes were asked for."""
+def _whole_numbers(data: bytes, at: int, depth: int) -> tuple[dict[int, int], int]:
+    """Return the whole numbers in a record by the numbers of their fields, and the position behind it.
+
+    The record is in the compact protocol of Apache Thrift, in which Parquet writes the heads of its pages: field 2 is
+    the size of a page once it is unpacked, and field 3 its size in the file [bytes].
+
+    Raises
+    ------
+    LookupError, ValueError
+        It does not end within the data, or is nested deeper than asked for.
+    """
+    found, field = {}, 0
+    while start := data[at]:
+        kind, step, at = start & 15, start >> 4, at + 1
+        if step:
+            field += step
+        else:
+            field, at = _signed(data, at)
+        if kind in (4, 5, 6):
+            found[field], at = _signed(data, at)
+        elif kind == 8:
+            size, at = _unsigned(data, at)
+            at += size
+        elif kind == 12 and depth:
+            at = _whole_numbers(data, at, depth - 1)[1]
+        elif kind in (3, 7):
+            at += 1 if kind == 3 else 8
+        elif kind not in (1, 2):  # true and false are their own kinds
+            raise ValueError("no head of a page")
+    return found, at + 1
 
 
-class _Unread(io.RawIOBase):
-    """A file of some size of which nothing can be read."""
+def _unsigned(data: bytes, at: int) -> tuple[int, int]:
+    """Return a number of seven bits a byte, the lowest first, and the position behind it."""
+    number = 0
+    for place in range(10):
+        number |= (data[at + place] & 127) << 7 * place
+        if data[at + place] < 128:
+            return number, at + place + 1
+    raise ValueError("a number of more than 64 bits")
 
-    file: pa.PythonFile
-    """The same for pyarrow; kept, because a thread of pyarrow that lets go of it last may end the process."""
 
-    def __init__(self, size: int) -> None:
-        self._size, self._at = size, 0
-
-    def readable(self) -> bool:
-        return True
-
-    def seekable(self) -> bool:
-        return True
-
-    def seek(self, offset: int, whence: int = 0) -> int:
-        self._at = offset + (0, self._at, self._size)[whence]
-        return self._at
-
-    def tell(self) -> int:
-        return self._at
-
-    def read(self, size: int = -1) -> bytes:
-        raise _ReachedError
+def _signed(data: bytes, at: int) -> tuple[int, int]:
+    """Return a number whose lowest bit is its sign, and the position behind it."""
+    number, at = _unsigned(data, at)
+    return (number >> 1) ^ -(number & 1), at
 
 
 @contextmanager

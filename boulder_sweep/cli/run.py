@@ -177,7 +177,7 @@ def compare(before: str, after: str, listed: int, units: str, as_json: bool) -> 
     """Compare the results in BEFORE and AFTER design by design, matched by the inputs they share.
 
     They are folders of runs, or files that -o of `sweep need`, `capacity` or `uncertainty` wrote, whose answers are
-    compared as well. Of an input of which they share no value, as of two soils, the values are paired in order. Shows
+    compared as well. Where the two share no value of an input, such as two soils, its values are paired in order. Shows
     what differs in settings and versions, how many verdicts changed and how, and the least mass and depth that pass.
     Lists the designs that changed most.
     """

@@ -55,7 +55,7 @@ class Recomputed:
     trajectory : Trajectory or None
         The impact over time; None where the design cannot be computed.
     judged_by : str
-        By whose rules the row was judged; empty where by those of this version.
+        Whose rules judged the row; empty where this version's did.
     """
 
     design_id: int

@@ -44,7 +44,7 @@ class Comparison:
     changed : tuple of str
         Settings, versions and hashes that differ, one line each.
     judged_by : tuple of str
-        By whose rules each of the two was judged; empty where by those of this version.
+        Whose rules judged each of the two; empty where this version's did.
     least : dict
         ``mass_kg`` and ``depth_m``: the least of a design that passes, before and after; None where none does.
     kind : str

@@ -242,8 +242,7 @@ class ResultRows:
         margins = np.full(len(numbers), np.nan)
         for table in self.finished.tables(["design_id", "margin"], verify=False):
             ids = table.column("design_id").to_numpy()
-            first, last = (ids[0], ids[-1]) if len(ids) else (0, -1)
-            here = np.flatnonzero((numbers >= first) & (numbers <= last))
+            here = np.flatnonzero(np.isin(numbers, ids))
             margins[here] = table.column("margin").to_numpy()[np.searchsorted(ids, numbers[here])]
         return margins
 

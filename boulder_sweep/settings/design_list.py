@@ -347,7 +347,7 @@ _READERS: dict[str, Callable[[Location, ProblemList], DesignList]] = {
 MAX_TEXT = 200
 """Longest text that is carried along, in characters."""
 _ID = re.compile(r"(.*_)?(id|no|nr|number|name|label|comment|note)", re.IGNORECASE)
-"""Names of unknown columns that may hold numbers: those of others could be a misspelled input."""
+"""Unknown columns with these names may hold numbers; any other name could be a misspelled input."""
 _LABEL = re.compile(r"\w[\w .+/()#-]{0,79}")
 
 

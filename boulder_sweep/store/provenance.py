@@ -197,7 +197,7 @@ def check_identity(there: Mapping[str, Any]) -> None:
 
 
 def judged_by(there: Mapping[str, Any]) -> str:
-    """Say by whose rules a table was judged; empty where rules and kernels are those of this version.
+    """Say whose rules judged a table; empty where this version has the same rules and kernels.
 
     Parameters
     ----------

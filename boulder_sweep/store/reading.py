@@ -273,7 +273,7 @@ class FinishedRows:
     identity : dict
         What all rows have in common, see `provenance`.
     judged_by : str
-        By whose rules the rows were judged; empty where by those of this version.
+        Whose rules judged the rows; empty where this version's did.
 
     Warns
     -----
@@ -400,7 +400,7 @@ class FinishedRows:
                     if unlike := differences(self._table.described, other.described):
                         raise self._damaged(part, f"of another run: {unlike[0]}")
                 if {*file.schema.names} != {*self.columns} or not file.schema.equals(self._schema):
-                    raise self._damaged(part, "other columns than those of its settings")
+                    raise self._damaged(part, "its columns do not follow from its settings")
                 table = file.read(columns)
                 _own(self._folder, part, file, self._table.ranges)
             except ParquetLimitError as problem:
@@ -464,8 +464,8 @@ def read(out: str | Location, columns: Sequence[str] | None = None, *, verify: b
     -------
     pandas.DataFrame
         Rows in the order of the designs. ``.attrs`` contains ``units`` and ``meanings`` by column name,
-        ``rows`` (of the whole table), ``complete`` (whether all of them are finished) and ``judged_by`` (by whose
-        rules, if not by those of this version; else empty).
+        ``rows`` (of the whole table), ``complete`` (whether all of them are finished) and ``judged_by`` (whose
+        rules judged them; empty where this version's did).
 
     Warns
     -----

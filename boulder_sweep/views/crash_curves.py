@@ -98,11 +98,11 @@ def draw_crash_test(
             _signal(axes, name, trajectories, measured)
         handles, labels = row[0].get_legend_handles_labels()
         fig.legend(handles, labels, loc="outside lower center", ncols=len(labels))
-        title = NAMES.get(test, test) + (
-            f" (Figures {FIGURES[test][0]})" if test in FIGURES and measured is None else ""
-        )
-        words = ", ".join(f"{t.verdict} ({preset.replace('_', ' ')})" for preset, t in trajectories.items())
-        pictures.headline(fig, f"{title}: {words}", size=11.0)
+        words = "measured and simulated"  # only as long as was measured, so there is no verdict
+        if measured is None:
+            words = ", ".join(f"{t.verdict} ({preset.replace('_', ' ')})" for preset, t in trajectories.items())
+        figures = f" (Figures {FIGURES[test][0]})" if test in FIGURES and measured is None else ""
+        pictures.headline(fig, f"{NAMES.get(test, test)}{figures}: {words}", size=11.0)
 
 
 def _signal(axes: Axes, name: str, trajectories: Mapping[str, Trajectory], measured: TimeHistory | None) -> None:

@@ -14,14 +14,18 @@ import weakref
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import duckdb
 import numpy as np
+import pandas as pd
+import polars as pl
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from openpyxl import Workbook
 
-from boulder_sweep.parquet import ParquetError, TableFile
+from boulder_sweep.parquet import ParquetError, ParquetLimitError, TableFile
 from boulder_sweep.store.folder import PartFile, hash_of
 from tests.stones.files import glb, gltf, prism, regular
 
@@ -399,6 +403,72 @@ def test_whatever_pyarrow_writes_is_read(tmp_path, how):
     assert found.column_names == table.column_names
     for name in table.column_names:
         assert found[name].cast(table[name].type).equals(table[name]), name
+
+
+@pytest.mark.parametrize("writer", ["polars", "duckdb"])
+def test_what_others_write_is_read(tmp_path, writer):
+    path = tmp_path / "table.parquet"
+    frame = pd.DataFrame({"number": np.arange(50_000) / 7.0, "word": [f"stone {row % 99}" for row in range(50_000)]})
+    if writer == "polars":
+        pl.from_pandas(frame).write_parquet(path)
+    else:
+        duckdb.sql(f"COPY frame TO '{path}' (FORMAT parquet)")
+    with path.open("rb") as file:
+        assert TableFile(file).read().to_pandas().astype({"word": str}).equals(frame.astype({"word": str}))
+
+
+def test_a_footer_that_says_less_than_its_pages_is_not_believed(tmp_path):
+    """Pyarrow unpacks what the page says."""
+
+    def written(values: np.ndarray) -> tuple[bytes, Any]:
+        out = io.BytesIO()
+        how = {"compression": "zstd", "use_dictionary": False, "data_page_size": 2**30, "write_statistics": False}
+        rows = {"row_group_size": len(values), "write_batch_size": len(values), "max_rows_per_page": len(values)}
+        pq.write_table(pa.table({"number": values}), out, store_schema=False, **how, **rows)
+        return out.getvalue(), pq.read_metadata(io.BytesIO(out.getvalue())).row_group(0).column(0)
+
+    def number(value: int) -> bytes:
+        """As Thrift writes one from 64 to 8191."""
+        return bytes([value << 1 & 127 | 128, value >> 6])
+
+    many, chunk = written(np.arange(1_000_000.0) % 977.0)
+    few, other = written(np.random.default_rng(1).random(chunk.total_compressed_size // 8 - 20))
+    size = int.from_bytes(few[-8:-4], "little")
+    footer = few[-8 - size : -8].replace(number(other.total_compressed_size), number(chunk.total_compressed_size))
+    path = tmp_path / "lie.parquet"
+    path.write_bytes(b"".join([many[: 4 + chunk.total_compressed_size], footer, few[-8:]]))
+    said = pq.read_metadata(path).row_group(0).column(0)
+    assert said.total_compressed_size == chunk.total_compressed_size
+    assert said.total_uncompressed_size < 1_000_000 < 8_000_000 < chunk.total_uncompressed_size
+    with path.open("rb") as file, pytest.raises(ParquetLimitError, match="has more than 1 MB once unpacked"):
+        TableFile(file, most_bytes=1_000_000).read()
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        b"",
+        b"\x15",
+        b"\x15\x00\x15" + b"\xff" * 11,
+        b"\x1c" * 50,
+        b"\x19\x00",
+        b"\x18\xff\xff\xff\x7f",
+        bytes(1),
+        b"\x15\x00\x15\x01\x15\x00\x00",
+        b"\x15\x00\x15\x00\x15\x01\x00",
+        b"\x15\x00\x15\x00\x15\xfe\x7f\x00",
+    ],
+    ids=range(10),
+)
+def test_a_head_of_a_page_that_is_none_is_damage(tmp_path, head):
+    path = tmp_path / "head.parquet"
+    pq.write_table(pa.table({"number": np.arange(40.0)}), path, use_dictionary=False, compression="none")
+    at = pq.read_metadata(path).row_group(0).column(0).data_page_offset
+    with path.open("rb") as file:
+        opened = TableFile(file)
+        opened._source = io.BytesIO(bytes(at) + head)
+        with pytest.raises(ParquetError, match="damaged"):
+            opened.read()
 
 
 def test_a_page_cut_short_is_damaged(tmp_path):
