@@ -1,14 +1,14 @@
-"""Calls of a function on the cores of this machine or on a Dask cluster, by joblib.
+"""Calls of a function on the cores of this machine, by joblib, or on a Dask cluster.
 
-Dask cares for workers that are lost: it makes their calls again, on others. What it gives up ends here in words.
+Dask cares for workers that are lost: it makes their calls again, on others. What it gives up ends here in words. The
+calls go to Dask itself: by joblib's backend, a cluster that has one thread to begin with would get nothing to do, and
+calls that Dask has given up would be waited for without end.
 """
 
 from __future__ import annotations
 
 import itertools
 import logging
-import queue
-import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -30,6 +30,8 @@ Call = tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
 """Function, arguments and named arguments, see `call`."""
 Fingerprint = tuple[dict[str, str], str, str]
 _LOOK_EVERY_S = 0.5
+_AHEAD = 3
+"""Calls for each thread of a cluster that are sent at once, so that none is without work meanwhile."""
 _LOOPBACK = "127.0.0.1:0"
 
 
@@ -86,73 +88,54 @@ class Pool:
         ClusterLostError
             The scheduler or the workers are gone.
         """
-        if self.client is not None:
-            return _watched(self.client, lambda: self._results(calls, in_order, shared))
         calls = iter(calls)
+        if self.client is not None:
+            return _from_cluster(self, self.client, calls, in_order, shared)
         first = list(itertools.islice(calls, 2))
         calls = itertools.chain(first, calls)
         if self._jobs == 1 or len(first) < 2:
             return (function(*arguments, **named) for function, arguments, named in calls)
-        with telling_start_failure(self._jobs):
-            return self._results(calls, in_order, shared)
-
-    def _results(self, calls: Iterable[Call], in_order: bool, shared: Any) -> Iterator[Any]:
         import joblib  # a quarter of the time of a short question
 
-        backend: dict[str, Any] = {"backend": THREADING}
-        if self.client is not None:
-            backend = {"backend": DASK, "client": self.client, "scatter": [shared] if shared is not None else None}
-        with joblib.parallel_config(**backend):
+        with telling_start_failure(self._jobs):
             how = "generator" if in_order else "generator_unordered"
-            results: Iterator[Any] = joblib.Parallel(n_jobs=self._jobs or -1, return_as=how, batch_size=1)(calls)
+            threads = joblib.Parallel(n_jobs=self._jobs or -1, backend=THREADING, return_as=how, batch_size=1)
+            results: Iterator[Any] = threads(calls)
             return results
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Pool, (1,)
 
 
-def _watched(client: Any, start: Callable[[], Iterator[Any]]) -> Iterator[Any]:
-    """Yield results from a cluster; joblib waits for ever for what Dask has given up, and this does not."""
-    arrived: queue.SimpleQueue[tuple[str, Any]] = queue.SimpleQueue()
+def _from_cluster(pool: Pool, client: Any, calls: Iterator[Call], in_order: bool, shared: Any) -> Iterator[Any]:
+    """Yield results from a cluster; some calls for each of its threads wait there, and more where threads come."""
+    from distributed import wait
 
-    def work() -> None:
-        try:
-            for result in start():
-                arrived.put(("result", result))
-            arrived.put(("end", None))
-        except BaseException as problem:
-            arrived.put(("problem", problem))
-
-    threading.Thread(target=work, name="results of a cluster", daemon=True).start()
-    kind = ""
-    while kind != "end":
-        try:
-            kind, what = arrived.get(timeout=_LOOK_EVERY_S)
-        except queue.Empty:
-            _refuse_lost(client)
-            continue
-        if kind == "result":
-            yield what
-        elif isinstance(what, BoulderSweepError):
-            raise what
-        elif kind == "problem":
-            _refuse_lost(client)
-            raise BackendError(f"the workers cannot compute this: {one_line(what)}") from what
-
-
-def _refuse_lost(client: Any) -> None:
-    """Refuse to wait for what does not come.
-
-    Raises
-    ------
-    ClusterLostError
-        The scheduler is gone, or has given up a call: workers died of it, or what it needs is lost.
-    """
-    if client.status != "running":
-        raise ClusterLostError("the connection to the Dask scheduler was lost")
-    states = {state.status for state in list(client.futures.values())}
-    if gone := states & {"error", "lost", "cancelled"}:
-        raise ClusterLostError(f"Dask has given up a part of the work ({gone.pop()}): its workers were lost")
+    try:
+        sent = client.scatter(shared, broadcast=True, hash=False) if shared is not None else None
+        waiting: list[Any] = []
+        while True:
+            if len(waiting) < (threads := pool.jobs):
+                for function, arguments, named in itertools.islice(calls, _AHEAD * threads):
+                    given = [sent if one is shared else one for one in arguments]
+                    waiting.append(client.submit(function, *given, **named, pure=False))
+            if not waiting:
+                return
+            wanted = waiting[:1] if in_order else waiting
+            with suppress(TimeoutError), client.as_current():
+                wait(wanted, timeout=_LOOK_EVERY_S, return_when="FIRST_COMPLETED")
+            if client.status != "running":
+                raise ClusterLostError("the connection to the Dask scheduler was lost")
+            ended = [one for one in wanted if one.done()]
+            waiting = [one for one in waiting if one not in ended]
+            for one in ended:
+                yield one.result()
+    except BoulderSweepError:
+        raise
+    except Exception as problem:  # what a call raises, or Dask instead
+        if type(problem).__module__.startswith("distributed"):
+            raise ClusterLostError(f"Dask has given up a part of the work: {one_line(problem)}") from problem
+        raise BackendError(f"the workers cannot compute this: {one_line(problem)}") from problem
 
 
 @contextmanager

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import time
+
 import pytest
 
 from boulder_sweep.errors import BackendError, ClusterLostError
@@ -59,15 +62,28 @@ def test_a_killed_scheduler_ends_the_run_in_words_and_it_goes_on(tmp_path, whole
     assert nothing_left(out)
 
 
+def test_a_cluster_does_the_work_from_its_first_thread_on_and_threads_that_come_later_help(tmp_path):
+    with Cluster(1, tmp_path) as cluster, pool.pool(None, "dask", cluster.address) as workers:
+        assert list(workers([pool.call(os.getpid)])) == [cluster.workers[0].pid]
+        results = workers(pool.call(_pid, 0.1) for _ in range(60))
+        seen = {next(results)}
+        cluster.start_worker(wait=True)
+        seen.update(results)
+        assert seen == {worker.pid for worker in cluster.workers}
+
+
+def _pid(seconds):
+    time.sleep(seconds)
+    return os.getpid()
+
+
 def test_work_of_which_workers_die_ends_in_words(tmp_path, monkeypatch):
-    """Dask gives it up after three tries; joblib would wait for ever."""
+    """Dask gives it up after three tries."""
     with Cluster(5, tmp_path) as cluster, pytest.raises(ClusterLostError, match="Dask has given up"):
         run(grid_of(100), tmp_path / "out", backend="dask", scheduler=cluster.address, simulate=_dies)
 
 
 def _dies(table, readings, control):
-    import os
-
     if control.horizon > control.h and "TEST_DASK_WORKER" in os.environ:
         os._exit(1)
     return plausible(table, readings, control)
