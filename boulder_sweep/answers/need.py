@@ -34,7 +34,7 @@ from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.judge.robustness import can_be_asked
 from boulder_sweep.locations import Location
-from boulder_sweep.runner.pool import THREADING, call, pool
+from boulder_sweep.runner.pool import Pool, call
 from boulder_sweep.settings.fields import EMBEDMENT
 from boulder_sweep.text import ProgressCallback
 
@@ -132,8 +132,6 @@ def need(
     between: Ends = None,
     robust: bool = False,
     jobs: int | None = None,
-    backend: str = THREADING,
-    scheduler: str | None = None,
     progress: ProgressCallback | None = None,
 ) -> Need:
     """Find the smallest value of an input that passes, for every combination of the others.
@@ -158,11 +156,9 @@ def need(
         none.
     jobs
         Threads; all cores by default. The answers do not depend on it.
-    backend, scheduler
-        Where to search: ``threading``, or ``dask`` and the address of a scheduler, as for `boulder_sweep.run`.
     progress
-        Called as the search progresses, with how many rows of how many are answered; with a probability asked for and
-        no cluster, with how many values of how many are tried, from the threads that try them.
+        Called as the search progresses, with how many rows of how many are answered; with a probability asked for,
+        with how many values of how many are tried, from the threads that try them.
 
     Returns
     -------
@@ -214,14 +210,13 @@ def need(
         )
     asked = _question(sweep, key, between, judges_of(sweep, least_margin, robust=robust), chance, seed)
     asked.judges.final.warm_up()
-    done = _Progress(progress, asked, local=backend == THREADING)
+    done = _Progress(progress, asked)
     pieces = list(ranges(asked.count, asked.rows_at_once))
     tables, simulated = [], 0
-    with pool(jobs, backend, scheduler) as workers:
-        for table, count in workers(call(_table_of, asked, start, stop) for start, stop in pieces):
-            tables.append(table)
-            simulated += count
-            done.answered(len(table))
+    for table, count in Pool(jobs)(call(_table_of, asked, start, stop) for start, stop in pieces):
+        tables.append(table)
+        simulated += count
+        done.answered(len(table))
     question = {"asked": key.answer, "margin": least_margin}
     question |= {} if chance is None else {"probability": chance}
     question |= {"robust": True} if robust else {}
@@ -238,17 +233,15 @@ class _Progress:
         Called with how many of how many are done, first with none; None for no reports.
     asked
         The question.
-    local
-        Whether it is answered in this process.
     """
 
-    def __init__(self, report: ProgressCallback | None, asked: Question | LightestQuestion, *, local: bool):
+    def __init__(self, report: ProgressCallback | None, asked: Question | LightestQuestion):
         self._report, self._rows = report, asked.count
         self._done, self._rows_done, self._total = 0, 0, self._rows
         self._lock = Lock()  # values are tried by several threads
         if report is None:
             return
-        if local and isinstance(asked, Question) and (values := asked.values_to_try()):
+        if isinstance(asked, Question) and (values := asked.values_to_try()):
             self._total = values
             asked.tried = self._tried
         report(0, self._total)

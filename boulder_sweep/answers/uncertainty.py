@@ -27,7 +27,7 @@ from boulder_sweep.designs import block_of
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.locations import Location
-from boulder_sweep.runner.pool import THREADING, Pool, pool
+from boulder_sweep.runner.pool import Pool
 from boulder_sweep.store.provenance import PREFIX
 from boulder_sweep.text import ProgressCallback
 
@@ -105,8 +105,6 @@ def uncertainty(
     seed: int = 0,
     most: int = 1 << 16,
     jobs: int | None = None,
-    backend: str = THREADING,
-    scheduler: str | None = None,
     progress: ProgressCallback | None = None,
 ) -> Uncertainty:
     """Estimate the probability of passing for every design of a sweep with uncertain inputs.
@@ -127,8 +125,6 @@ def uncertainty(
         Most samples of a row; fewer than 512 are not drawn.
     jobs
         Threads; all cores by default.
-    backend, scheduler
-        Where to sample: ``threading``, or ``dask`` and the address of a scheduler, as for `boulder_sweep.run`.
     progress
         Called as the sampling progresses.
 
@@ -150,11 +146,11 @@ def uncertainty(
     asked = _Asked(sweep, Spread(sweep), judges_of(sweep, least_margin), width, sure, most)
     asked.judges.final.warm_up()
     points = Points(len(asked.spread.names), seed)
-    with pool(jobs, backend, scheduler) as workers:
-        pieces = ranges(sweep.n_designs, ROWS_AT_ONCE)
-        parts = (_rows(asked, points, workers, start, stop) for start, stop in pieces)
-        tables = collected(parts, sweep.n_designs, progress)
-        samples = _sample_table(asked, points, workers, sweep.n_designs if sweep.n_designs <= MOST_SAMPLED else 0)
+    threads = Pool(jobs)
+    pieces = ranges(sweep.n_designs, ROWS_AT_ONCE)
+    parts = (_rows(asked, points, threads, start, stop) for start, stop in pieces)
+    tables = collected(parts, sweep.n_designs, progress)
+    samples = _sample_table(asked, points, threads, sweep.n_designs if sweep.n_designs <= MOST_SAMPLED else 0)
     question = {
         "asked": "p_pass",
         "half_width": width,

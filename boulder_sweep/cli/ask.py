@@ -11,7 +11,6 @@ from boulder_sweep.cli.options import (
     OUTPUT,
     Quantity,
     at_option,
-    cluster_options,
     grid_argument,
     jobs_option,
     json_option,
@@ -62,7 +61,6 @@ Examples:
 @click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table of all answers.")
 @click.option("--plot", "picture", type=OUTPUT, metavar="F.png", help="Design chart (.png, .svg or .pdf).")
 @quiet_option
-@cluster_options
 @units_option
 @at_option
 @set_option
@@ -134,7 +132,6 @@ Examples:
 @click.option("--plot", "picture", type=OUTPUT, metavar="F.png", help="Picture (.png, .svg or .pdf) of one design.")
 @click.option("--design", type=click.IntRange(min=0), default=0, metavar="ID", help="The design of --plot [0].")
 @quiet_option
-@cluster_options
 @units_option
 @set_option
 @json_option

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from boulder_sweep.cli.output import say, working, wrap
-from boulder_sweep.runner.pool import BACKENDS, MOST_JOBS
+from boulder_sweep.runner.pool import MOST_JOBS
 from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
@@ -97,26 +97,6 @@ def talk_options(function: Command) -> Command:
         if quiet and verbose:
             raise click.UsageError("--quiet and --verbose cannot be used together")
         return function(*args, quiet=quiet, verbose=verbose, **options)
-
-    return command
-
-
-def cluster_options(function: Command) -> Command:
-    """Add ``--backend`` and ``--scheduler``."""
-
-    @click.option(
-        "--backend",
-        type=click.Choice(BACKENDS),
-        default=BACKENDS[0],
-        show_default=True,
-        help="Threads, or a Dask cluster.",
-    )
-    @click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler, with --backend dask.")
-    @functools.wraps(function)
-    def command(*args: Any, backend: str, scheduler: str | None, **options: Any) -> Any:
-        if scheduler and backend != "dask":
-            raise click.UsageError("--scheduler needs --backend dask")
-        return function(*args, backend=backend, scheduler=scheduler, **options)
 
     return command
 

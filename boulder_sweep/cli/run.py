@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
-from collections.abc import Sequence
 from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -16,7 +14,6 @@ from boulder_sweep.cli.options import (
     OUTPUT,
     Quantity,
     at_option,
-    cluster_options,
     grid_argument,
     json_option,
     load_sweep,
@@ -30,6 +27,7 @@ from boulder_sweep.cli.options import (
 from boulder_sweep.cli.output import Notes, progress, say, show, wrap
 from boulder_sweep.errors import Interrupted
 from boulder_sweep.locations import Location, location_of
+from boulder_sweep.runner.pool import BACKENDS, DASK, THREADING
 from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
@@ -58,7 +56,10 @@ Examples:
 @click.option("--accuracy", type=Quantity("deg"), metavar="NAME", help="fast, balanced, fine, or '0.01 deg'.")
 @second_opinion_option
 @at_option
-@cluster_options
+@click.option(
+    "--backend", type=click.Choice(BACKENDS), default=THREADING, show_default=True, help="Threads, or a Dask cluster."
+)
+@click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler, with --backend dask.")
 @set_option
 @json_option
 @talk_options
@@ -80,6 +81,8 @@ def run(
 
     if options["resume"] and options["overwrite"]:
         raise click.UsageError("--resume and --overwrite cannot be used together")
+    if options["scheduler"] and options["backend"] != DASK:
+        raise click.UsageError("--scheduler needs --backend dask")
     chosen = overrides if accuracy is None else (*overrides, f"--accuracy={accuracy}")
     sweep = take_values(load_sweep(grid, chosen, quiet, second_opinion=second_opinion), at, quiet)
     target = location_of(out or f"{sweep.name.replace(' ', '-')}.sweep")
@@ -96,13 +99,7 @@ def run(
     # Who waits for this command does not act on a signal before it has said how to go on.
     with noted_signals() as signals, signals.deferred(), progress(quiet, notes) as shown:
         try:
-            summary = run_sweep(
-                sweep,
-                target,
-                progress=shown,
-                resume_command=_resume_command(grid, target, overrides, accuracy, second_opinion, at, options),
-                **options,
-            )
+            summary = run_sweep(sweep, target, progress=shown, **options)
         except Interrupted as stop:
             say(str(stop))  # before the bar closes: another signal meanwhile ends the process
             signals.answered = True
@@ -130,28 +127,6 @@ def _dry_run(sweep: Sweep, out: Location, options: dict[str, Any], as_json: bool
     else:
         show(*console.dry_run_lines(sweep, out, effort, objection))
     return 0
-
-
-def _resume_command(
-    grid: str,
-    out: Location,
-    overrides: Sequence[str],
-    accuracy: str | None,
-    second_opinion: bool,
-    at: str | None,
-    options: dict[str, Any],
-) -> str:
-    """Return the command that resumes this run."""
-    words = ["sweep", "run", grid, "-o", str(out)]
-    for name in ("jobs", "backend", "scheduler"):
-        if options[name] is not None and options[name] != "threading":
-            words += [f"--{name}", str(options[name])]
-    words += ["--accuracy", accuracy] if accuracy else []
-    words += ["--second-opinion"] if second_opinion else []
-    words += ["--at", at] if at else []
-    for override in overrides:
-        words += ["--set", override]
-    return shlex.join([*words, "--resume"])
 
 
 COMPARE_EXAMPLES = """\b

@@ -1,8 +1,6 @@
 """Calls of a function on the cores of this machine, by joblib, or on a Dask cluster.
 
-Dask cares for workers that are lost: it makes their calls again, on others. What it gives up ends here in words. The
-calls go to Dask itself: by joblib's backend, a cluster that has one thread to begin with would get nothing to do, and
-calls that Dask has given up would be waited for without end.
+Dask cares for workers that are lost: it makes their calls again, on others. What it gives up ends here in words.
 """
 
 from __future__ import annotations
@@ -36,21 +34,17 @@ _LOOPBACK = "127.0.0.1:0"
 
 
 def call(function: Callable[..., Any], *arguments: Any, **named: Any) -> Call:
-    """Return a call to be made by a `Pool`."""
+    """Return a call to be made by a `Pool` or a `Cluster`."""
     return function, arguments, named
 
 
 class Pool:
-    """Yields the results of calls, with a bounded number of calls in progress.
-
-    What is sent to a worker together with a pool gets one that works in the calling thread.
+    """Yields the results of calls, made by threads of this process, with a bounded number of calls in progress.
 
     Parameters
     ----------
     jobs
         Threads; all cores by default. With one job everything runs in the calling thread.
-    client
-        Of the Dask cluster on which to work instead.
 
     Raises
     ------
@@ -58,18 +52,11 @@ class Pool:
         The number of threads is not a whole number, or out of range.
     """
 
-    def __init__(self, jobs: int | None, client: Any = None):
+    def __init__(self, jobs: int | None):
         check_jobs(jobs)
-        self._jobs, self.client = jobs, client
+        self._jobs = jobs
 
-    @property
-    def jobs(self) -> int:
-        """Threads that work side by side."""
-        if self.client is not None:
-            return max(sum(self.client.ncores().values()), 1)
-        return self._jobs or available_cores()
-
-    def __call__(self, calls: Iterable[Call], *, in_order: bool = True, shared: Any = None) -> Iterator[Any]:
+    def __call__(self, calls: Iterable[Call], *, in_order: bool = True) -> Iterator[Any]:
         """Make the calls.
 
         Parameters
@@ -78,19 +65,13 @@ class Pool:
             What to call.
         in_order
             Whether results come in the order of the calls, or as they are there.
-        shared
-            An argument that calls have in common; it is sent to each worker of a cluster once.
 
         Raises
         ------
         BackendError
-            The system cannot start as many threads, or the workers of a cluster cannot make a call.
-        ClusterLostError
-            The scheduler or the workers are gone.
+            The system cannot start as many threads.
         """
         calls = iter(calls)
-        if self.client is not None:
-            return _from_cluster(self, self.client, calls, in_order, shared)
         first = list(itertools.islice(calls, 2))
         calls = itertools.chain(first, calls)
         if self._jobs == 1 or len(first) < 2:
@@ -103,57 +84,85 @@ class Pool:
             results: Iterator[Any] = threads(calls)
             return results
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Pool, (1,)
 
+class Cluster:
+    """Yields the results of calls, made by the workers of a Dask cluster, as they are there.
 
-def _from_cluster(pool: Pool, client: Any, calls: Iterator[Call], in_order: bool, shared: Any) -> Iterator[Any]:
-    """Yield results from a cluster; some calls for each of its threads wait there, and more where threads come."""
-    from distributed import wait
+    Some calls for each thread wait there, more where threads come. They go to Dask itself: by joblib's backend, a
+    cluster that has one thread to begin with would get nothing to do, and calls that Dask has given up would be waited
+    for without end.
 
-    try:
-        sent = client.scatter(shared, broadcast=True, hash=False) if shared is not None else None
-        waiting: list[Any] = []
+    Parameters
+    ----------
+    client
+        Of the cluster.
+    """
+
+    def __init__(self, client: Any):
+        self._client = client
+
+    @property
+    def jobs(self) -> int:
+        """Threads that work side by side."""
+        return max(sum(self._client.ncores().values()), 1)
+
+    def __call__(self, calls: Iterable[Call], shared: Any = None) -> Iterator[Any]:
+        """Make the calls.
+
+        Parameters
+        ----------
+        calls
+            What to call.
+        shared
+            An argument that calls have in common; it is sent once.
+
+        Raises
+        ------
+        BackendError
+            The workers cannot make a call.
+        ClusterLostError
+            The scheduler or the workers are gone.
+        """
+        try:
+            yield from self._results(iter(calls), shared)
+        except BoulderSweepError:
+            raise
+        except Exception as problem:  # what a call raises, or Dask instead
+            if type(problem).__module__.startswith("distributed"):
+                raise ClusterLostError(f"Dask has given up a part of the work: {one_line(problem)}") from problem
+            raise BackendError(f"the workers cannot compute this: {one_line(problem)}") from problem
+
+    def _results(self, calls: Iterator[Call], shared: Any) -> Iterator[Any]:
+        from distributed import wait
+
+        client, waiting = self._client, list[Any]()
+        sent = client.scatter(shared, broadcast=True, hash=False)
         while True:
-            if len(waiting) < (threads := pool.jobs):
+            if len(waiting) < (threads := self.jobs):
                 for function, arguments, named in itertools.islice(calls, _AHEAD * threads):
                     given = [sent if one is shared else one for one in arguments]
                     waiting.append(client.submit(function, *given, **named, pure=False))
             if not waiting:
                 return
-            wanted = waiting[:1] if in_order else waiting
             with suppress(TimeoutError), client.as_current():
-                wait(wanted, timeout=_LOOK_EVERY_S, return_when="FIRST_COMPLETED")
+                wait(waiting, timeout=_LOOK_EVERY_S, return_when="FIRST_COMPLETED")
             if client.status != "running":
                 raise ClusterLostError("the connection to the Dask scheduler was lost")
-            ended = [one for one in wanted if one.done()]
+            ended = [one for one in waiting if one.done()]
             waiting = [one for one in waiting if one not in ended]
             for one in ended:
                 yield one.result()
-    except BoulderSweepError:
-        raise
-    except Exception as problem:  # what a call raises, or Dask instead
-        if type(problem).__module__.startswith("distributed"):
-            raise ClusterLostError(f"Dask has given up a part of the work: {one_line(problem)}") from problem
-        raise BackendError(f"the workers cannot compute this: {one_line(problem)}") from problem
 
 
 @contextmanager
-def pool(jobs: int | None, backend: str = THREADING, scheduler: str | None = None) -> Iterator[Pool]:
-    """Give a pool on a backend; arguments: see `boulder_sweep.run`.
+def cluster(jobs: int | None, scheduler: str | None) -> Iterator[Cluster]:
+    """Connect to the cluster of a scheduler, or give one of so many threads within this process.
 
     Raises
     ------
     BackendError
         The workers are not available.
-    TypeError, ValueError
-        The number of jobs is not a whole number, or out of range.
     """
-    check_backend(backend, scheduler)
-    check_jobs(jobs)
-    if backend != DASK:
-        yield Pool(jobs)
-        return
     try:
         distributed = import_module("distributed")  # an extra: most users have no cluster
     except ImportError:
@@ -162,16 +171,16 @@ def pool(jobs: int | None, backend: str = THREADING, scheduler: str | None = Non
         ends: list[Callable[..., Any]] = []
         try:
             if scheduler is None:
-                cluster = _local_cluster(distributed, jobs or available_cores())
-                ends += [partial(_end_worker, cluster, worker) for worker in cluster.workers.values()]
-                ends.append(cluster.close)
-                client = distributed.Client(cluster, set_as_default=False)
+                own = _local_cluster(distributed, jobs or available_cores())
+                ends += [partial(_end_worker, own, worker) for worker in own.workers.values()]
+                ends.append(own.close)
+                client = distributed.Client(own, set_as_default=False)
             else:
                 client = _connected(distributed, scheduler)
             ends.insert(0, client.close)
             if scheduler is not None:
                 _check_workers(client, scheduler)
-            yield Pool(jobs, client)
+            yield Cluster(client)
         finally:
             for end in ends:
                 with suppress(Exception):  # a scheduler that died cannot be told

@@ -6,6 +6,7 @@ signals. What the table holds depends on the settings alone, not on workers, spe
 
 from __future__ import annotations
 
+import itertools
 import shlex
 import socket
 import threading
@@ -24,14 +25,15 @@ from boulder_sweep.judge.firmness import firmness_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import Location, location_of, names_in
 from boulder_sweep.runner.pool import (
+    DASK,
     THREADING,
     Pool,
     available_cores,
     call,
     check_backend,
     check_jobs,
+    cluster,
     fingerprint,
-    pool,
     telling_start_failure,
 )
 from boulder_sweep.runner.progress import (
@@ -105,7 +107,6 @@ def run(
     resume: bool = False,
     overwrite: bool = False,
     progress: Report | None = None,
-    resume_command: str | None = None,
     simulate: Simulate = by_kernels,
 ) -> Summary:
     """Simulate every design of a sweep and store the table.
@@ -129,8 +130,6 @@ def run(
         Replace what a sweep wrote into `out` before.
     progress
         Called up to ten times a second, from the calling thread.
-    resume_command
-        The command that resumes the run; built from the arguments by default.
     simulate
         Function that simulates a table of designs; tests inject faults with it.
 
@@ -162,10 +161,10 @@ def run(
         raise failures.StoreError("--resume and --overwrite cannot be used together")
     sweep = at_values(sweep)
     check_backend(backend, scheduler)
-    again = resume_command or resuming(sweep, out, jobs, backend, scheduler)
+    again = resuming(sweep, out, jobs, backend, scheduler)
     jobs = jobs or (1 if sweep.n_designs == 1 else available_cores())
     with noted_signals() as signals, signals.deferred(), _folder(out, signals):
-        whole = _Run(out, signals, sweep.n_designs)
+        whole = _Run(out, signals, sweep.n_designs, jobs, backend, scheduler)
         try:
             with telling_start_failure(jobs):
                 signals.call(lambda: _refuse_taken(out, resume, overwrite))
@@ -175,7 +174,7 @@ def run(
                 plan.there = signals.call(lambda: _there(plan, out, overwrite))
                 whole.done = plan.rows_done
                 firmness = signals.call(lambda: _firmness(plan, out))
-                whole.compute(plan, plan.metadata(firmness), lambda: pool(jobs, backend, scheduler), progress)
+                whole.compute(plan, plan.metadata(firmness), progress)
         except Interrupted as stop:
             raise Interrupted(stop.signum, whole.done, sweep.n_designs, again) from None
         except (ClusterLostError, ComputationError) as problem:
@@ -215,20 +214,21 @@ class _Run:
         Workers.
     """
 
-    def __init__(self, out: Location, signals: Signals, rows: int):
-        self.done, self.written, self.jobs = 0, list[Written](), 1
+    def __init__(
+        self, out: Location, signals: Signals, rows: int, jobs: int, backend: str, scheduler: str | None
+    ) -> None:
+        self.done, self.written, self.jobs = 0, list[Written](), jobs
         self._out, self._signals, self._rows = out, signals, rows
+        self._backend, self._scheduler = backend, scheduler
         self._stopped = threading.Event()
         self._ticked = 0
         self._problem: BaseException | None = None
 
-    def compute(
-        self, plan: _Plan, metadata: dict[bytes, bytes], workers: Callable[[], Any], progress: Report | None
-    ) -> None:
+    def compute(self, plan: _Plan, metadata: dict[bytes, bytes], progress: Report | None) -> None:
         """Compute and write what is missing; raises as `run`."""
         size = max(int(WORK_S / seconds_per_row(plan.sweep, plan.evaluation)), 1)
         work = Work(plan.evaluation, plan.sweep.block, metadata, str(self._out), size)
-        thread = threading.Thread(target=self._work, args=(plan, work, workers), name="run", daemon=True)
+        thread = threading.Thread(target=self._work, args=(plan, work), name="run", daemon=True)
         thread.start()
         before, begun = plan.rows_done, time.monotonic()
         try:
@@ -248,35 +248,44 @@ class _Run:
             raise self._problem
         self._signals.check()
 
-    def _work(self, plan: _Plan, work: Work, workers: Callable[[], Any]) -> None:
+    def _work(self, plan: _Plan, work: Work) -> None:
         """Have everything computed, in a thread that may be left behind."""
         try:
-            if not plan.parts_missing:
-                return
-            plan.evaluation.warm_up()
-            with workers() as some:
-                self.jobs = some.jobs
-                self._ranges(some, work, plan.missing())
+            if plan.parts_missing:
+                plan.evaluation.warm_up()
+                compute = self._by_cluster if self._backend == DASK else self._by_threads
+                compute(work, plan)
         except BaseException as problem:
             self._problem = problem
 
-    def _ranges(self, workers: Pool, work: Work, missing: Iterator[tuple[int, int]]) -> None:
-        more = () if workers.client is not None else (self._tick,)
-        if workers.client is not None:
-            work.made_by = fingerprint()
-            if isinstance(self._out, Path):
-                work.out = str(self._out.absolute())  # workers have working folders of their own
-        calls = (call(_written, work, first, stop, *more) for first, stop in missing if not self._stopped.is_set())
-        for part in workers(calls, in_order=False, shared=work):
-            if isinstance(part, Written):
-                self.written.append(part)
-                self.done += part.rows
-                self._ticked += part.rows if workers.client is not None else 0
-            else:  # what is in hand ends, and nothing more is begun
-                self._problem = self._problem or part
-                self._stopped.set()
-            if self._stopped.is_set() and workers.client is not None:
-                return
+    def _by_threads(self, work: Work, plan: _Plan) -> None:
+        calls = (call(_written, work, *bounds, self._tick) for bounds in self._missing(plan))
+        for part in Pool(self.jobs)(calls, in_order=False):
+            self._note(part)
+
+    def _by_cluster(self, work: Work, plan: _Plan) -> None:
+        work.made_by = fingerprint()
+        if isinstance(self._out, Path):
+            work.out = str(self._out.absolute())  # workers have working folders of their own
+        with cluster(self.jobs, self._scheduler) as workers:
+            self.jobs = workers.jobs
+            for part in workers((call(_written, work, *bounds) for bounds in self._missing(plan)), work):
+                self._note(part)
+                self._ticked = self.done - plan.rows_done
+                if self._stopped.is_set():
+                    return
+
+    def _missing(self, plan: _Plan) -> Iterator[tuple[int, int]]:
+        """Yield the ranges that are not there, until something goes wrong."""
+        return itertools.takewhile(lambda _: not self._stopped.is_set(), plan.missing())
+
+    def _note(self, part: Written | Exception) -> None:
+        if isinstance(part, Written):
+            self.written.append(part)
+            self.done += part.rows
+        else:  # what is in hand ends, and nothing more is begun
+            self._problem = self._problem or part
+            self._stopped.set()
 
     def _tick(self, rows: int) -> None:
         """Count a block; called by the threads of this process."""
@@ -465,17 +474,19 @@ def _check_arguments(sweep: Sweep, jobs: int | None, progress: Report | None) ->
 
 def resuming(sweep: Sweep, out: Location, jobs: int | None, backend: str, scheduler: str | None) -> str:
     """Return the command that resumes a run with the given arguments."""
+    from boulder_sweep.settings.loader import ALL_OPINIONS
+
     if sweep.path is None:
         return f"boulder_sweep.run(sweep, {str(out)!r}, resume=True)"
     words = ["sweep", "run", str(sweep.path), "-o", str(out)]
-    if jobs is not None:
-        words += ["--jobs", str(jobs)]
-    if backend != THREADING:
-        words += ["--backend", backend]
-    if scheduler is not None:
-        words += ["--scheduler", scheduler]
+    for name, value in (("jobs", jobs), ("backend", backend), ("scheduler", scheduler)):
+        if value not in (None, THREADING):
+            words += [f"--{name}", str(value)]
     if sweep.taken_at:
         words += ["--at", next(iter(sweep.taken_at.values())).partition(" ")[0]]
-    for entry in sweep.overrides:  # as they were given
-        words += entry.split("=", 1) if entry.startswith("--") else ["--set", entry]
+    for entry in sweep.overrides:
+        if entry == ALL_OPINIONS:
+            words.append("--second-opinion")
+        else:  # as it was given
+            words += entry.split("=", 1) if entry.startswith("--") else ["--set", entry]
     return shlex.join([*words, "--resume"])

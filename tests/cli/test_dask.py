@@ -38,13 +38,12 @@ def test_a_run_on_a_cluster_that_is_there(sweep, possible_grid, scheduler):
 
 
 def test_the_command_to_go_on_names_the_scheduler(sweep, possible_grid, scheduler, monkeypatch):
-    def lost(client):
+    def lost(*_):
         raise ClusterLostError("the connection to the Dask scheduler was lost")
 
     words = ["-q", "-o", "out", "--backend", "dask", "--scheduler", scheduler]
     with monkeypatch.context() as patch:
-        patch.setattr(pool, "_LOOK_EVERY_S", 1e-6)
-        patch.setattr(pool, "_refuse_lost", lost)
+        patch.setattr(pool.Cluster, "_results", lost)
         code, out, err = sweep("run", possible_grid, *words)
     assert (code, out) == (130, "")
     command = f"sweep run grid.yaml -o out --backend dask --scheduler {scheduler} --resume"

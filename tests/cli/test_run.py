@@ -10,7 +10,9 @@ from pathlib import Path
 import pytest
 
 from boulder_sweep.cli import output
+from boulder_sweep.errors import Interrupted
 from boulder_sweep.runner.progress import progress_of
+from boulder_sweep.runner.run import resuming
 from boulder_sweep.store import folder
 from boulder_sweep.text import duration_text
 
@@ -206,42 +208,25 @@ def test_wrong_use(sweep, grid, words, words_of_error):
     assert "Traceback" not in err
 
 
+def interrupted(signum):
+    def run(settings, out, *, jobs, backend, scheduler, **_):
+        raise Interrupted(signum, 5, 18, resuming(settings, out, jobs, backend, scheduler))
+
+    return run
+
+
 def test_the_command_to_go_on_repeats_every_option(sweep, grid, monkeypatch):
-    seen = {}
-
-    def run(settings, out, **options):
-        seen.update(options)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("boulder_sweep.runner.run.run", run)
-    words = [
-        "-o",
-        "my out",
-        "--jobs",
-        "2",
-        "--backend",
-        "dask",
-        "--accuracy",
-        "0.01 deg",
-        "--set",
-        "vehicle.speed=20 mph",
-    ]
-    code, _, _ = sweep("run", grid, *words)
+    monkeypatch.setattr("boulder_sweep.runner.run.run", interrupted(2))
+    words = ["-o", "my out", "--jobs", "2", "--backend", "dask", "--set", "vehicle.speed=20 mph"]
+    words += ["--accuracy", "0.01 deg", "--second-opinion"]
+    code, _, err = sweep("run", grid, *words)
     assert code == 130
-    assert shlex.split(seen["resume_command"]) == [
-        "sweep", "run", "grid.yaml", "-o", "my out", "--jobs", "2", "--backend", "dask",
-        "--accuracy", "0.01 deg", "--set", "vehicle.speed=20 mph", "--resume",
-    ]  # fmt: skip
+    assert shlex.split(err.partition("Resume with: ")[2]) == ["sweep", "run", "grid.yaml", *words, "--resume"]
 
 
 @pytest.mark.parametrize("signum", [2, 15])
 def test_an_interrupted_run_tells_how_to_go_on(sweep, grid, monkeypatch, signum):
-    from boulder_sweep.errors import Interrupted
-
-    def run(*_, **options):
-        raise Interrupted(signum, 5, 18, options["resume_command"])
-
-    monkeypatch.setattr("boulder_sweep.runner.run.run", run)
+    monkeypatch.setattr("boulder_sweep.runner.run.run", interrupted(signum))
     code, out, err = sweep("run", grid)
     assert (code, out) == (128 + signum, "")
     assert "sweep run grid.yaml -o small-grid.sweep --resume" in err

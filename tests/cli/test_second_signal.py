@@ -7,13 +7,14 @@ import sys
 import threading
 from collections.abc import Callable
 from types import SimpleNamespace
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import pytest
 from rich.progress import Progress as Bars
 
 from boulder_sweep.errors import Interrupted
 from boulder_sweep.runner import signals
+from boulder_sweep.runner.run import resuming
 from tests.conftest import Command
 from tests.waiting import wait_until
 
@@ -24,10 +25,10 @@ LINE = "interrupted by SIGINT; 5 of 18 rows are safe. Resume with: sweep run gri
 def closing(grid: object, monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[], None]], None]:
     """Interrupt a run that shows a bar; return a function that sets what happens while the bar closes."""
 
-    def run(*_: object, **options: str) -> NoReturn:
+    def run(settings: Any, out: Any, *, jobs: Any, backend: Any, scheduler: Any, **_: object) -> NoReturn:
         signal.raise_signal(signal.SIGINT)
         wait_until(lambda: signals._installed.caught == signal.SIGINT, "the signal was noted")
-        raise Interrupted(signal.SIGINT, 5, 18, options["resume_command"])
+        raise Interrupted(signal.SIGINT, 5, 18, resuming(settings, out, jobs, backend, scheduler))
 
     monkeypatch.setattr("boulder_sweep.runner.run.run", run)
     monkeypatch.setenv("COLUMNS", "200")

@@ -63,7 +63,7 @@ def test_a_killed_scheduler_ends_the_run_in_words_and_it_goes_on(tmp_path, whole
 
 
 def test_a_cluster_does_the_work_from_its_first_thread_on_and_threads_that_come_later_help(tmp_path):
-    with Cluster(1, tmp_path) as cluster, pool.pool(None, "dask", cluster.address) as workers:
+    with Cluster(1, tmp_path) as cluster, pool.cluster(None, cluster.address) as workers:
         assert list(workers([pool.call(os.getpid)])) == [cluster.workers[0].pid]
         results = workers(pool.call(_pid, 0.1) for _ in range(60))
         seen = {next(results)}
