@@ -303,17 +303,12 @@ def check_jobs(jobs: int | None) -> None:
     TypeError, ValueError
         Says what is allowed.
     """
-    check_count("jobs", 1 if jobs is None else jobs)
-    if jobs is not None and jobs > MOST_JOBS:
-        raise ValueError(f"jobs must be at most {MOST_JOBS:,}, not {jobs:,}")
-
-
-def check_count(name: str, count: int) -> None:
-    """Refuse a count that is not a whole number, or below one; raises as `check_jobs`."""
-    if not isinstance(count, int) or isinstance(count, bool):
-        raise TypeError(f"{name} must be a whole number, not {type(count).__name__}")
-    if count < 1:
-        raise ValueError(f"{name} must be at least 1, not {count}")
+    if jobs is None:
+        return
+    if not isinstance(jobs, int) or isinstance(jobs, bool):
+        raise TypeError(f"jobs must be a whole number, not {type(jobs).__name__}")
+    if not 1 <= jobs <= MOST_JOBS:
+        raise ValueError(f"jobs must be at {'least 1' if jobs < 1 else f'most {MOST_JOBS:,}'}, not {jobs:,}")
 
 
 @contextmanager

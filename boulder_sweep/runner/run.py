@@ -51,7 +51,7 @@ from boulder_sweep.runner.signals import Signals, noted_signals
 from boulder_sweep.store import failures
 from boulder_sweep.store.folder import Ranges, check_writable, clear, locked, make, part_file, part_files, remove_parts
 from boulder_sweep.store.provenance import differences, file_metadata, identity
-from boulder_sweep.store.reading import Contents, FinishedRows, Table, contents, refuse_no_result, refuse_two
+from boulder_sweep.store.reading import Contents, FinishedRows, Table, contents, refuse_two
 from boulder_sweep.text import why
 
 if TYPE_CHECKING:
@@ -332,8 +332,6 @@ def _refuse_taken(out: Location, resume: bool, overwrite: bool) -> None:
     parts = part_files(names)
     strange = [name for name in names if not part_file(name) and not name.startswith(".")]
     if strange and not parts:
-        with suppress(failures.NotASweepError):
-            refuse_no_result(out)
         raise failures.ForeignFilesError(out, strange)
     if strange := [name for name in strange if name.endswith(".parquet")]:
         raise failures.ForeignFilesError(out, strange)  # readers would take them for rows

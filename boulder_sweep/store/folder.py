@@ -33,7 +33,6 @@ TOGETHER = 4
 """The number of ranges is a multiple of this, so that few workers end at the same time."""
 _DIGITS = 12
 _NAME = re.compile(rf"rows-([0-9]{{{_DIGITS},20}})-([0-9]{{{_DIGITS},20}})-([0-9a-f]{{16}})\.parquet")
-_EARLIER_NAME = re.compile(r"_manifest.*\.parquet|rows-[0-9]+-[0-9]+\.parquet")
 WRITING = ".writing"
 """Ending of what is not finished."""
 _UNFINISHED_NAME = re.compile(rf"\.?([0-9a-f]{{8}})-([0-9]{{1,10}})-[0-9a-f]{{16}}{re.escape(WRITING)}")
@@ -109,11 +108,6 @@ def part_file(name: str) -> PartFile | None:
 def part_files(names: Sequence[str]) -> list[PartFile]:
     """Return the parts among some names, in the order of their rows."""
     return sorted(part for name in names if (part := part_file(name)))
-
-
-def earlier_files(names: Sequence[str]) -> list[str]:
-    """Return the names that earlier versions gave the files of a table, parts first."""
-    return sorted((name for name in names if _EARLIER_NAME.fullmatch(name)), reverse=True)
 
 
 def put_part(out: Location, first: int, stop: int, content: bytes | memoryview) -> PartFile:

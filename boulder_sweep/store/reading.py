@@ -21,7 +21,7 @@ from boulder_sweep.errors import OlderRulesWarning
 from boulder_sweep.locations import Location, is_folder, location_of, names_in, opened, read_bytes
 from boulder_sweep.parquet import ParquetError, ParquetLimitError, TableFile
 from boulder_sweep.store import failures
-from boulder_sweep.store.folder import PartFile, Ranges, earlier_files, hash_of, part_file, part_files
+from boulder_sweep.store.folder import PartFile, Ranges, hash_of, part_file, part_files
 from boulder_sweep.store.provenance import (
     check_identity,
     common_in,
@@ -215,20 +215,15 @@ def refuse_no_result(folder: Location) -> None:
 
     Raises
     ------
-    OtherVersionError
-        An earlier version wrote what is there.
     NotASweepError
-        There is nothing that any wrote.
+        There is none.
     StoreError
         It cannot be read.
     """
     try:
         is_there = is_folder(folder)
-        earlier = earlier_files(names_in(folder)) if is_there else []
     except OSError as problem:
         raise failures.StoreError(f"{folder} cannot be read: {why(problem)}") from None
-    if earlier:
-        raise failures.OtherVersionError(folder, other_version(_said_by(folder / earlier[0])))
     if is_there:
         raise failures.NotASweepError(f"{folder} is not the result of a sweep: no rows of it are finished")
     if not isinstance(folder, Path) or not folder.exists():
@@ -243,15 +238,6 @@ def refuse_no_result(folder: Location) -> None:
     elif folder.suffix.lower() != ".parquet":
         advice = ""
     raise failures.NotASweepError(f"{folder} is a file; the result of a run is a folder{advice}")
-
-
-def _said_by(path: Location) -> Mapping[str, Any]:
-    """Return what a file of an earlier version says of itself; nothing where it cannot be read."""
-    try:
-        with opened(path) as file:
-            return identity_in(TableFile(file).schema.metadata) | {"format": 0}
-    except (OSError, ParquetError, ValueError, RecursionError):
-        return {}
 
 
 class FinishedRows:

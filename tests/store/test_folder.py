@@ -85,14 +85,13 @@ def test_names_sort_as_the_rows_do_and_say_them():
 @pytest.mark.parametrize(
     "name",
     [
-        "rows-000000000000-000000000100.parquet",  # of an earlier version
+        "rows-000000000000-000000000100.parquet",
         "rows-0-100-0123456789abcdef.parquet",
         "rows-0000000000000-0000000000100-0123456789abcdef.parquet",  # more digits would sort otherwise
         "rows-000000000000-000000000100-0123456789ABCDEF.parquet",
         "rows-000000000000-000000000100-0123456789abcdef.parquet\n",
         "../rows-000000000000-000000000100-0123456789abcdef.parquet",
         "rows-" + 12 * "\u0660" + "-000000000100-0123456789abcdef.parquet",
-        "_manifest.parquet",
     ],
 )
 def test_other_names_are_those_of_no_part(name):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import warnings
 
 import duckdb
@@ -276,23 +275,6 @@ def test_a_table_of_another_version_is_refused_and_left_alone(out, version):
         assert said.isprintable()
         assert len(said) < 500
     assert parts_of(out) == before
-
-
-@pytest.mark.parametrize(
-    "names", [["_manifest.parquet"], ["_manifest.parquet", "rows-000000000000-000000000110.parquet"]]
-)
-def test_a_table_of_a_version_with_other_names_is_refused_and_left_alone(out, tmp_path, names):
-    earlier = tmp_path / "earlier"
-    earlier.mkdir()
-    for name in names:
-        shutil.copy(out / part_of(out).name, earlier / name)
-    for act in (
-        read,
-        *(lambda folder, how=how: run(grid(), folder, simulate=plausible, **how) for how in ({}, {"overwrite": True})),
-    ):
-        with pytest.raises(OtherVersionError, match="in another format than this version"):
-            act(earlier)
-    assert sorted(path.name for path in earlier.iterdir()) == names
 
 
 def test_nothing_is_said_of_a_table_of_this_version(out):
