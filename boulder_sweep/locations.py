@@ -32,8 +32,10 @@ _URL = re.compile(r"([A-Za-z][A-Za-z0-9+.\-]*)://([^/?#]*)([^?#]*)(.*)", re.DOTA
 _SECRET_IN_URL = re.compile(r"""://([^/\s'"]*@)|(?<=[^\s'"])\?[^\s'"]+=[^\s'"]*""")
 _SECRET_NAME = re.compile("KEY|SECRET|TOKEN|PASSW|CREDENTIAL|CONNECTION_STRING")
 _SHORTEST_SECRET = 8
-_WITHIN_S = 45
-"""Time for an answer of a store, further tries of its library included [s]."""
+_S3 = ("s3", "s3a")
+_WITHIN_S, _SILENT_S = 45, 30
+"""Time for all tries of a call to a store, and for one of S3's without a byte [s]; that begins when the system has what
+is sent, so two parts of 1.5 MB share a line of 1 Mbit/s."""
 _SHOWN = 40
 """Characters of a name that are repeated in a temporary one: four bytes each, and 255 bytes are a name's limit."""
 
@@ -79,13 +81,17 @@ def location_of(text: str | Location) -> Location:
 
 def _opened(scheme: str, shown: str) -> UPath:
     """Return the path of a file system that remembers no lists of folders: others write, too."""
+    options: dict[str, Any] = {"use_listings_cache": False}
     try:
-        from upath import UPath  # an extra: most users keep their results on a disk
+        from fsspec.config import conf  # an extra: most users keep their results on a disk
+        from upath import UPath
 
-        path = UPath(shown, use_listings_cache=False)
+        if scheme in _S3:
+            options["config_kwargs"] = {"read_timeout": _SILENT_S, **conf.get(scheme, {}).get("config_kwargs", {})}
+        path = UPath(shown, **options)
         _ = path.fs  # imports what the scheme needs
     except ImportError as missing:
-        extra = "pip install 'boulder-sweep[s3]'" if scheme in ("s3", "s3a", "memory") else one_line(missing)
+        extra = "pip install 'boulder-sweep[s3]'" if scheme in _S3 or missing.name else one_line(missing)
         raise LocationError(f"{shown}: {scheme}:// needs another package: {extra}") from None
     except ValueError as unknown:
         raise LocationError(f"{shown} cannot be opened: {one_line(unknown)}") from None
@@ -102,17 +108,10 @@ def harmless(problem: BaseException) -> str:
 
 
 def _asked(location: UPath, what: str, *arguments: Any, **more: Any) -> Any:
-    """Call a method of the file system of a path by URL, for as long as a store may take to answer.
-
-    Raises
-    ------
-    OSError
-        Says what the library of the file system raises, without what that may quote of credentials.
-    """
-    fs = location.fs
-    limits = {"timeout": _WITHIN_S} if fs.async_impl else {}
+    """Call a method of a file system; what its library raises becomes `OSError`, without what it quotes of secrets."""
+    limits = {"timeout": _WITHIN_S} if location.fs.async_impl else {}
     try:
-        return getattr(fs, what)(location.path, *arguments, **more, **limits)
+        return getattr(location.fs, what)(location.path, *arguments, **more, **limits)
     except (FileNotFoundError, NotADirectoryError):
         raise
     except Exception as problem:  # they raise whatever their libraries raise

@@ -6,6 +6,7 @@ import asyncio
 import os
 import pickle
 import re
+import sys
 from contextlib import nullcontext
 from pathlib import Path
 from unittest.mock import Mock
@@ -121,6 +122,20 @@ def test_files_made_from_a_result_lie_beside_it_or_here():
     assert beside(location_of("memory://x/m30.sweep"), ".html") == Path("m30.html")
 
 
+def test_options_of_the_user_stay_and_win(monkeypatch):
+    monkeypatch.setitem(fsspec.config.conf, "s3", {"config_kwargs": {"signature_version": "s3v4"}})
+    assert location_of("s3://bucket/out").fs.config_kwargs == {"read_timeout": 30, "signature_version": "s3v4"}
+    monkeypatch.setitem(fsspec.config.conf, "s3", {"config_kwargs": {"read_timeout": 9}})
+    assert location_of("s3://bucket/out").fs.config_kwargs == {"read_timeout": 9}
+
+
+@pytest.mark.parametrize("package", ["upath", "fsspec.config"])
+def test_without_the_extra_every_url_is_refused_by_its_name(monkeypatch, package):
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(LocationError, match=r"gs:// needs another package: pip install 'boulder-sweep\[s3\]'"):
+        location_of("gs://bucket/out")
+
+
 class Silent(AsyncFileSystem):
     """A store that never answers, whatever it is asked."""
 
@@ -147,7 +162,7 @@ def test_a_file_is_not_named_in_a_store_that_fails_but_in_one_that_lets_nobody_r
     target = location_of("memory://places/answers.parquet")
     for problem, allowed in [(PermissionError(13, "denied"), True), (OSError(5, "not now"), False)]:
         monkeypatch.setattr(type(target.fs), "ls", Mock(side_effect=problem))
-        with nullcontext() if allowed else pytest.raises(PictureError, match="cannot be written: .*not now"):
+        with nullcontext() if allowed else pytest.raises(PictureError, match=r"cannot be written: .*not now"):
             check_target(target, PictureError)
 
 
