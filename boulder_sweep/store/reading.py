@@ -11,9 +11,9 @@ import warnings
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from itertools import islice
+from multiprocessing.pool import ThreadPool
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeVar
 
@@ -101,16 +101,17 @@ def contents(folder: Location) -> Contents:
 
 
 def _ahead(read: Callable[[PartFile], Found], parts: Iterable[PartFile]) -> Iterator[Found]:
-    """Yield what is read of each part, in their order, a few at a time; nothing is begun after a failure.
+    """Yield what is read of each part, in their order, a few at a time.
 
-    A store that is silent is waited for once, therefore.
+    Nothing is begun after a failure, and neither an error nor the end of the process waits for these threads: a store
+    may be silent.
     """
     left = iter(parts)
-    with ThreadPoolExecutor(_THREADS) as pool:  # hashes are computed without the interpreter's lock
-        ahead = deque(pool.submit(read, part) for part in islice(left, _THREADS))
+    with ThreadPool(_THREADS) as pool:  # hashes are computed without the interpreter's lock
+        ahead = deque(pool.apply_async(read, (part,)) for part in islice(left, _THREADS))
         while ahead:
-            found = ahead.popleft().result()
-            ahead.extend(pool.submit(read, part) for part in islice(left, 1))
+            found = ahead.popleft().get()
+            ahead.extend(pool.apply_async(read, (part,)) for part in islice(left, 1))
             yield found
 
 
