@@ -115,8 +115,8 @@ def _asked(location: UPath, what: str, *arguments: Any, **more: Any) -> Any:
     except (FileNotFoundError, NotADirectoryError):
         raise
     except Exception as problem:  # they raise whatever their libraries raise
-        said = harmless(problem) if str(problem) else f"no answer within {_WITHIN_S} s"
-        raise OSError(getattr(problem, "errno", None) or errno.EIO, said) from None
+        said = harmless(problem) if str(problem) else f"no answer, or failures only, for {_WITHIN_S} s"
+        raise OSError(errno.EACCES if isinstance(problem, PermissionError) else errno.EIO, said) from None
 
 
 def opened(location: Location) -> IO[bytes]:
