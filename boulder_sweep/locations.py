@@ -15,7 +15,8 @@ import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from stat import S_ISREG
+from stat import S_IFDIR, S_IFREG, S_ISREG
+from types import SimpleNamespace
 from typing import IO, TYPE_CHECKING, Any, BinaryIO, TypeAlias
 from urllib.parse import unquote
 
@@ -32,8 +33,9 @@ _SECRET_IN_URL = re.compile(r"""://([^/\s'"]*@)|(?<=[^\s'"])\?[^\s'"]+=[^\s'"]*"
 _SECRET_NAME = re.compile("KEY|SECRET|TOKEN|PASSW|CREDENTIAL|CONNECTION_STRING")
 _SHORTEST_SECRET = 8
 _S3 = ("s3", "s3a")
-_LIMITS = {"connect_timeout": 3, "read_timeout": 4, "retries": {"total_max_attempts": 2}}
-"""As botocore names them [s]; s3fs tries five times as often. A silent store ends in an error within a minute."""
+_WITHIN_S, _SILENT_S = 45, 30
+"""Time for all tries of a call to a store, and for one of S3's without a byte [s]; that begins when the system has what
+is sent, so two parts of 1.5 MB share a line of 1 Mbit/s."""
 _SHOWN = 40
 """Characters of a name that are repeated in a temporary one: four bytes each, and 255 bytes are a name's limit."""
 
@@ -81,15 +83,15 @@ def _opened(scheme: str, shown: str) -> UPath:
     """Return the path of a file system that remembers no lists of folders: others write, too."""
     options: dict[str, Any] = {"use_listings_cache": False}
     try:
-        import fsspec  # an extra: most users keep their results on a disk
+        from fsspec.config import conf  # an extra: most users keep their results on a disk
         from upath import UPath
 
         if scheme in _S3:
-            options["config_kwargs"] = {**_LIMITS, **fsspec.config.conf.get(scheme, {}).get("config_kwargs", {})}
+            options["config_kwargs"] = {"read_timeout": _SILENT_S, **conf.get(scheme, {}).get("config_kwargs", {})}
         path = UPath(shown, **options)
         _ = path.fs  # imports what the scheme needs
     except ImportError as missing:
-        extra = "pip install 'boulder-sweep[s3]'" if scheme in (*_S3, "memory") else one_line(missing)
+        extra = "pip install 'boulder-sweep[s3]'" if scheme in _S3 or missing.name else one_line(missing)
         raise LocationError(f"{shown}: {scheme}:// needs another package: {extra}") from None
     except ValueError as unknown:
         raise LocationError(f"{shown} cannot be opened: {one_line(unknown)}") from None
@@ -105,18 +107,16 @@ def harmless(problem: BaseException) -> str:
     return _SECRET_IN_URL.sub(lambda match: "://" if match[1] else "?***", text)
 
 
-@contextmanager
-def asking(location: Location) -> Iterator[None]:
-    """Raise what the library of a file system raises as `OSError`, without what it may quote of credentials."""
-    if isinstance(location, Path):
-        yield
-        return
+def _asked(location: UPath, what: str, *arguments: Any, **more: Any) -> Any:
+    """Call a method of a file system; what its library raises becomes `OSError`, without what it quotes of secrets."""
+    limits = {"timeout": _WITHIN_S} if location.fs.async_impl else {}
     try:
-        yield
-    except (FileNotFoundError, NotADirectoryError, BoulderSweepError):
+        return getattr(location.fs, what)(location.path, *arguments, **more, **limits)
+    except (FileNotFoundError, NotADirectoryError):
         raise
     except Exception as problem:  # they raise whatever their libraries raise
-        raise OSError(getattr(problem, "errno", None) or errno.EIO, harmless(problem)) from None
+        said = harmless(problem) if str(problem) else f"no answer, or failures only, for {_WITHIN_S} s"
+        raise OSError(errno.EACCES if isinstance(problem, PermissionError) else errno.EIO, said) from None
 
 
 def opened(location: Location) -> IO[bytes]:
@@ -132,44 +132,42 @@ def read_bytes(location: Location) -> bytes:
     if isinstance(location, Path):
         with opened(location) as file:
             return file.read()
-    with asking(location):
-        return bytes(location.fs.cat_file(location.path))
+    return bytes(_asked(location, "cat_file"))
 
 
-def stat_of(location: Location) -> Any:
-    """Return size and kind of a file, as `os.stat` does; raises OSError."""
-    with asking(location):
+def stat_of(location: Location) -> os.stat_result | SimpleNamespace:
+    """Return ``st_size`` and ``st_mode`` of a file; raises OSError."""
+    if isinstance(location, Path):
         return location.stat()
+    said = _asked(location, "info")
+    return SimpleNamespace(st_size=said["size"], st_mode=S_IFDIR if said["type"] == "directory" else S_IFREG)
 
 
 def is_folder(location: Location) -> bool:
     """Whether there is a folder; on an object store, whether there is a file below this name. Raises OSError."""
-    with asking(location):
-        return location.is_dir()
+    return location.is_dir() if isinstance(location, Path) else bool(_asked(location, "isdir"))
 
 
 def names_in(folder: Location) -> list[str]:
     """Return the names in a folder, none if there is no folder; raises OSError."""
     try:
-        with asking(folder):
-            if isinstance(folder, Path):
-                return sorted(path.name for path in folder.iterdir())
-            found = folder.fs.ls(folder.path, detail=False)
-            return sorted(name for one in found if (name := one.rstrip("/").rpartition("/")[2]))
+        if isinstance(folder, Path):
+            return sorted(path.name for path in folder.iterdir())
+        found = _asked(folder, "ls", detail=False)
+        return sorted(name for one in found if (name := one.rstrip("/").rpartition("/")[2]))
     except FileNotFoundError:
         return []
 
 
-def put(location: Location, content: bytes | memoryview) -> None:
+def put(location: UPath, content: bytes | memoryview) -> None:
     """Write a file of a file system by URL in one request; raises OSError."""
-    with asking(location):
-        location.fs.pipe_file(location.path, bytes(content))  # type: ignore[union-attr]
+    _asked(location, "pipe_file", bytes(content))
 
 
 def remove(location: Location) -> None:
     """Remove a file that may exist; raises OSError."""
-    with suppress(FileNotFoundError), asking(location):
-        location.unlink()
+    with suppress(FileNotFoundError):
+        location.unlink() if isinstance(location, Path) else _asked(location, "rm_file")
 
 
 def source_of(location: Location) -> Any:

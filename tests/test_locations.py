@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import pickle
 import re
+import sys
+from contextlib import nullcontext
 from pathlib import Path
+from unittest.mock import Mock
 
 import fsspec
 import pytest
+from fsspec.asyn import AsyncFileSystem
 
 import boulder_sweep
+from boulder_sweep import locations
 from boulder_sweep.errors import LinkError, PictureError
 from boulder_sweep.locations import (
     LocationError,
@@ -66,6 +72,8 @@ def test_a_url_with_credentials_is_refused_without_repeating_them(url):
     [
         ("file://host/out", "another machine"),
         ("nosuch://x/out", "cannot be opened.*nosuch"),
+        ("gs://bucket/out", "gs:// needs another package: .*gcsfs"),
+        ("abfs://bucket/out", "abfs:// needs another package: .*adlfs"),
         ("a b://x", "not the beginning of a URL"),
     ],
 )
@@ -114,16 +122,48 @@ def test_files_made_from_a_result_lie_beside_it_or_here():
     assert beside(location_of("memory://x/m30.sweep"), ".html") == Path("m30.html")
 
 
-def test_a_try_at_a_store_has_limits_of_its_own_and_other_options_stay(monkeypatch):
-    """Without them botocore tries for minutes by itself."""
-    monkeypatch.setitem(fsspec.config.conf, "s3", {"config_kwargs": {"signature_version": "s3v4", "read_timeout": 9}})
-    config = location_of("s3://bucket/out").fs.config_kwargs
-    assert config == {
-        "connect_timeout": 3,
-        "read_timeout": 9,
-        "retries": {"total_max_attempts": 2},
-        "signature_version": "s3v4",
-    }
+def test_options_of_the_user_stay_and_win(monkeypatch):
+    monkeypatch.setitem(fsspec.config.conf, "s3", {"config_kwargs": {"signature_version": "s3v4"}})
+    assert location_of("s3://bucket/out").fs.config_kwargs == {"read_timeout": 30, "signature_version": "s3v4"}
+    monkeypatch.setitem(fsspec.config.conf, "s3", {"config_kwargs": {"read_timeout": 9}})
+    assert location_of("s3://bucket/out").fs.config_kwargs == {"read_timeout": 9}
+
+
+@pytest.mark.parametrize("package", ["upath", "fsspec.config"])
+def test_without_the_extra_every_url_is_refused_by_its_name(monkeypatch, package):
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(LocationError, match=r"gs:// needs another package: pip install 'boulder-sweep\[s3\]'"):
+        location_of("gs://bucket/out")
+
+
+class Silent(AsyncFileSystem):
+    """A store that never answers, whatever it is asked."""
+
+    protocol = "silent"
+    cachable = False
+
+    async def _for_ever(self, *_, **__):
+        await asyncio.Event().wait()
+
+    _cat_file = _info = _isdir = _ls = _pipe_file = _rm_file = _for_ever
+
+
+@pytest.mark.filterwarnings("ignore:UPath")
+@pytest.mark.parametrize("act", [read_bytes, stat_of, is_folder, names_in, lambda place: put(place, b""), remove])
+def test_a_store_that_never_answers_is_given_up(monkeypatch, act):
+    monkeypatch.setattr(locations, "_WITHIN_S", 0.01)
+    fsspec.register_implementation("silent", Silent, clobber=True)
+    with pytest.raises(OSError, match="no answer, or failures only, for"):
+        act(location_of("silent://bucket/out"))
+
+
+def test_a_file_is_not_named_in_a_store_that_fails_but_in_one_that_lets_nobody_read(monkeypatch):
+    """Computing first and then failing to write helps nobody."""
+    target = location_of("memory://places/answers.parquet")
+    for problem, allowed in [(PermissionError(13, "denied"), True), (OSError(5, "not now"), False)]:
+        monkeypatch.setattr(type(target.fs), "ls", Mock(side_effect=problem))
+        with nullcontext() if allowed else pytest.raises(PictureError, match=r"cannot be written: .*not now"):
+            check_target(target, PictureError)
 
 
 def test_no_output_is_written_through_a_link(tmp_path):

@@ -175,6 +175,7 @@ def run(
                 whole.done = plan.rows_done
                 firmness = signals.call(lambda: _firmness(plan, out))
                 whole.compute(plan, plan.metadata(firmness), progress)
+                signals.call(lambda: _check_whole(out, plan, whole.written))
         except Interrupted as stop:
             raise Interrupted(stop.signum, whole.done, sweep.n_designs, again) from None
         except (ClusterLostError, ComputationError) as problem:
@@ -182,7 +183,6 @@ def run(
             raise type(problem)(f"{problem}. {safe}. Resume with: {again}") from problem
         except failures.WriteError as problem:
             raise failures.WriteError(f"{problem}. Finished rows are safe. Resume with: {again}") from problem
-        _check_whole(out, plan, whole.written)
     parts = [(part.bytes, part.verdicts) for part in plan.there.intact.values()]
     parts += [(part.bytes, part.verdicts) for part in whole.written]
     return summary_of(
@@ -317,6 +317,20 @@ def _folder(out: Location, signals: Signals) -> Iterator[None]:
                     out.rmdir()
 
 
+def _names_in(out: Location) -> list[str]:
+    """Return the names in a folder of parts.
+
+    Raises
+    ------
+    WriteError
+        It cannot be read.
+    """
+    try:
+        return names_in(out)
+    except OSError as problem:
+        raise failures.WriteError(f"cannot write into {out}: {why(problem)}") from problem
+
+
 def _refuse_taken(out: Location, resume: bool, overwrite: bool) -> None:
     """Refuse a folder that holds something else, or a result that is neither continued nor replaced.
 
@@ -325,10 +339,7 @@ def _refuse_taken(out: Location, resume: bool, overwrite: bool) -> None:
     StoreError
         Says what it holds.
     """
-    try:
-        names = names_in(out)
-    except OSError as problem:
-        raise failures.WriteError(f"cannot write into {out}: {why(problem)}") from problem
+    names = _names_in(out)
     parts = part_files(names)
     strange = [name for name in names if not part_file(name) and not name.startswith(".")]
     if strange and not parts:
@@ -352,7 +363,7 @@ def _planned(sweep: Sweep, simulate: Simulate) -> _Plan:
 def _there(plan: _Plan, out: Location, overwrite: bool) -> Contents:
     """Return what a folder holds of a table; what is damaged or to be replaced is removed."""
     if overwrite:
-        remove_parts(out, [part.name for part in part_files(names_in(out))])
+        remove_parts(out, [part.name for part in part_files(_names_in(out))])
         return Contents()
     found = _same(plan, out)
     remove_parts(out, list(found.damaged))
@@ -398,7 +409,7 @@ def _check_whole(out: Location, plan: _Plan, written: list[Written]) -> None:
     TwoResultsError
         Somebody else wrote other rows.
     """
-    names = names_in(out)
+    names = _names_in(out)
     refuse_two(out, part_files(names))
     if missing := {part.name for part in written} - {*names}:
         raise BackendError(

@@ -335,9 +335,13 @@ def check_target(target: Location, refusal: type[BoulderSweepError]) -> None:
     folder = target.absolute().parent if isinstance(target, Path) else target.parent
     if isinstance(target, Path) and not folder.is_dir():
         raise refusal(f"{target}: the folder {folder} does not exist")
-    with suppress(OSError):  # a store that does not answer, or lets nobody read: writing will tell
+    try:
         if part_files(names_in(folder)):
             raise refusal(f"{target}: the folder {folder} holds the result of a run; name a file outside it")
+    except PermissionError:
+        pass  # who may write there need not be allowed to read
+    except OSError as problem:
+        raise refusal(f"{target} cannot be written: {why(problem)}") from problem
     if not (isinstance(target, Path) and isinstance(folder, Path)):
         return
     if target.is_dir():

@@ -10,11 +10,12 @@ import os
 import warnings
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
+from multiprocessing.pool import ThreadPool
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, NamedTuple
+from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from boulder_sweep.columns import COLUMNS, OPTIONAL_COLUMNS, OUTCOMES, column_spec
 from boulder_sweep.errors import OlderRulesWarning
@@ -34,11 +35,10 @@ from boulder_sweep.store.provenance import (
 from boulder_sweep.text import counted, why
 
 if TYPE_CHECKING:
-    from concurrent.futures import Future
-
     import pandas as pd
     import pyarrow as pa
 
+Found = TypeVar("Found")
 _THREADS = min(8, os.cpu_count() or 1)
 _MOST_PART_ROWS, _MOST_PART_BYTES = 100_000, 50_000_000
 """Most rows of a part, and bytes unpacked: three times as many as a full one has; several are read at once."""
@@ -91,14 +91,28 @@ def contents(folder: Location) -> Contents:
     """
     found, known = Contents(), dict[frozenset[Any], Table]()
     parts = _parts_in(folder)
-    with ThreadPoolExecutor(_THREADS) as pool:  # hashes are computed without the interpreter's lock
-        for part, described in zip(parts, pool.map(lambda part: _described(folder, part, known), parts), strict=True):
-            if isinstance(described, str):
-                found.damaged[part.name] = described
-            else:
-                found.intact[part] = described
+    for part, described in zip(parts, _ahead(lambda part: _described(folder, part, known), parts), strict=True):
+        if isinstance(described, str):
+            found.damaged[part.name] = described
+        else:
+            found.intact[part] = described
     refuse_two(folder, list(found.intact))
     return found
+
+
+def _ahead(read: Callable[[PartFile], Found], parts: Iterable[PartFile]) -> Iterator[Found]:
+    """Yield what is read of each part, in their order, a few at a time.
+
+    Nothing is begun after a failure, and neither an error nor the end of the process waits for these threads: a store
+    may be silent.
+    """
+    left = iter(parts)
+    with ThreadPool(_THREADS) as pool:  # hashes are computed without the interpreter's lock
+        ahead = deque(pool.apply_async(read, (part,)) for part in islice(left, _THREADS))
+        while ahead:
+            found = ahead.popleft().get()
+            ahead.extend(pool.apply_async(read, (part,)) for part in islice(left, 1))
+            yield found
 
 
 def _described(folder: Location, part: PartFile, known: dict[frozenset[Any], Table]) -> Described | str:
@@ -320,18 +334,7 @@ class FinishedRows:
             A part is truncated, changed or of another run.
         """
         wanted = list(columns) if columns is not None else None
-        ahead: deque[Future[pa.Table]] = deque()
-        with ThreadPoolExecutor(_THREADS) as pool:
-            try:
-                for part in self._parts:
-                    ahead.append(pool.submit(self._read, part, wanted, verify))
-                    if len(ahead) > _THREADS:
-                        yield ahead.popleft().result()
-                while ahead:
-                    yield ahead.popleft().result()
-            finally:
-                for waiting in ahead:
-                    waiting.cancel()
+        return _ahead(lambda part: self._read(part, wanted, verify), self._parts)
 
     def row(self, number: int) -> pa.Table | None:
         """Return one row; None where it is not finished.

@@ -65,6 +65,21 @@ def test_a_store_that_does_not_answer_ends_the_run_in_words(monkeypatch):
         run(grid(), OUT, **HOW)
 
 
+@pytest.mark.parametrize("last", [0, 1, 2], ids=["before", "to replace", "at the end"])
+def test_a_store_that_lists_nothing_any_more_ends_the_run_in_words(monkeypatch, last):
+    run(grid(), OUT, **HOW)
+    left, ls = iter(range(last)), MemoryFileSystem.ls
+
+    def refuse(self, path, **more):
+        if next(left, None) is None:
+            raise ConnectionResetError("not now")
+        return ls(self, path, **more)
+
+    monkeypatch.setattr(MemoryFileSystem, "ls", refuse)
+    with pytest.raises(WriteError, match=f"cannot write into {OUT}: .*not now. Finished rows are safe. Resume with: "):
+        run(grid(), OUT, overwrite=True, **HOW)
+
+
 def test_a_row_in_a_store_is_explained():
     run(grid(), OUT, jobs=2)
     found = recompute(OUT, 7)

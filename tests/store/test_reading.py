@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import warnings
 
 import duckdb
@@ -13,7 +14,7 @@ import pytest
 from boulder_sweep.errors import OlderRulesWarning
 from boulder_sweep.locations import location_of
 from boulder_sweep.runner.run import run
-from boulder_sweep.store import read
+from boulder_sweep.store import read, reading
 from boulder_sweep.store.failures import (
     DamagedError,
     ImpossibleRecordsError,
@@ -37,6 +38,7 @@ from tests.store.folders import (
     put,
     rewrite,
 )
+from tests.waiting import HANG_GUARD_S
 
 
 @pytest.fixture
@@ -318,3 +320,25 @@ def test_a_part_that_goes_while_it_is_read_is_told(out):
     (out / part_of(out, 3).name).unlink()
     with pytest.raises(StoreError, match=r"was changed while it was read: rows-.* is gone"):
         list(finished.tables())
+
+
+def test_no_part_is_asked_for_after_one_that_a_store_did_not_give(out, monkeypatch):
+    """Each would take as long to fail as the first, and nobody waits for the others."""
+    asked, given_up = [], threading.Event()
+    store = location_of("memory://silent/out")
+    for name, content in parts_of(out).items():
+        (store / name).write_bytes(content)
+
+    def silent(self, path, **_):
+        asked.append(path)
+        if len(asked) == 1:
+            raise TimeoutError
+        given_up.wait(HANG_GUARD_S)  # hang guard
+        raise TimeoutError
+
+    monkeypatch.setattr(reading, "_THREADS", 2)
+    monkeypatch.setattr(type(store.fs), "cat_file", silent)
+    with pytest.raises(StoreError, match="no answer, or failures only, for"):
+        contents(store)
+    given_up.set()
+    assert len(asked) <= 2
