@@ -48,6 +48,7 @@ from boulder_sweep.runner.progress import (
 )
 from boulder_sweep.runner.ranges import WORK_S, Stopped, Work, Written, planned, seconds_per_row
 from boulder_sweep.runner.signals import Signals, noted_signals
+from boulder_sweep.settings.sweep import SECTION
 from boulder_sweep.store import failures
 from boulder_sweep.store.folder import Ranges, check_writable, clear, locked, make, part_file, part_files, remove_parts
 from boulder_sweep.store.provenance import differences, file_metadata, identity
@@ -367,6 +368,8 @@ def _there(plan: _Plan, out: Location, overwrite: bool) -> Contents:
         return Contents()
     found = _same(plan, out)
     remove_parts(out, list(found.damaged))
+    if found.intact:  # the heading may be another, and all parts keep one
+        plan.identity = plan.identity | {"settings": next(iter(found.intact.values())).table.identity["settings"]}
     return found
 
 
@@ -419,7 +422,10 @@ def _check_whole(out: Location, plan: _Plan, written: list[Written]) -> None:
 
 
 def _notes(plan: _Plan) -> list[str]:
-    return [f"{name} was damaged ({what}) and is computed again" for name, what in plan.there.damaged.items()]
+    notes = [f"{name} was damaged ({what}) and is computed again" for name, what in plan.there.damaged.items()]
+    if plan.identity["settings"].get(SECTION, {}) != plan.sweep.heading.given():
+        notes.append("the table keeps the heading of its first run; `sweep report` takes another by its options")
+    return notes
 
 
 def estimate(

@@ -142,7 +142,7 @@ SAID = {
     repeated: "column (stone|verdict) has a word of 100,000 characters; a word may have 1,000",
     million: "column (stone|verdict) has a word of 1,000,000 characters; a word may have 1,000",
     nested: "column (stone|verdict) holds list<element: int8>; a table has plain columns",
-    different: "MB once unpacked, up to column ",
+    different: "(MB once unpacked, up to column |has [0-9,]+ rows; at most 100,000)",
     prefixes: "column (stone|verdict) is text in an encoding that is not read; write it again",
     constant: "(has [0-9,]+ rows; at most (20,000|100),000|has more than [0-9]+ MB once unpacked, up to column )",
     declared: "is damaged: ",

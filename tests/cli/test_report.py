@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-import boulder_sweep
+from tests.store.folders import parts_of
 from tests.waiting import wait_until
 
 
@@ -198,14 +198,19 @@ def test_the_heading_is_that_of_the_file_unless_an_option_says_otherwise(sweep, 
     assert "--date is empty; write one line of text, or leave it out" in err
 
 
-def test_another_client_neither_refuses_a_resume_nor_changes_a_row(sweep, headed):
-    assert sweep("run", headed, "-q")[0] == 0
-    before = boulder_sweep.read("small-grid.sweep")
+def test_another_client_neither_refuses_a_resume_nor_changes_a_byte(sweep, headed):
+    more = ("--set", "site.embedment_depth={from: 0.8 m, to: 1.5 m, count: 50}")
+    assert sweep("run", headed, "-q", *more)[0] == 0
+    before = parts_of(Path("small-grid.sweep"))
+    next(Path("small-grid.sweep").iterdir()).unlink()
     headed.write_text(headed.read_text().replace("City", "County"))
-    code, _, err = sweep("run", headed, "-q", "--resume")
+    code, _, err = sweep("run", headed, "--resume", *more)
     assert code == 0, err
-    assert boulder_sweep.read("small-grid.sweep").equals(before)
+    assert "note: the table keeps the heading of its first run; `sweep report` takes another by its options" in err
+    assert parts_of(Path("small-grid.sweep")) == before
     assert sweep("report", "small-grid.sweep")[0] == 0
+    assert ("client", "City") in heading_of("small-grid.html")
+    assert sweep("report", "small-grid.sweep", "--client", "County")[0] == 0
     assert ("client", "County") in heading_of("small-grid.html")
 
 

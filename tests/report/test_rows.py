@@ -281,10 +281,11 @@ def test_a_boulder_of_a_list_passes_in_all_of_its_rows(tmp_path):
 
 
 def test_every_row_of_several_parts_has_its_own_margin(tmp_path):
-    depths = "site.embedment_depth={from: 2.1 m, to: 2.6 m, count: 12}"
+    depths = "site.embedment_depth={from: 2.1 m, to: 2.6 m, count: 256}"
     sweep = boulder_sweep.load("configs/site.yaml", [depths, "boulder.height=3.6 m", "soil.friction_angle=40 deg"])
-    boulder_sweep.run(sweep, tmp_path / "out", rows_per_part=5)
+    boulder_sweep.run(sweep, tmp_path / "out")
+    assert len(list((tmp_path / "out").iterdir())) == 4
     margins = boulder_sweep.read(tmp_path / "out")["margin"].to_numpy(float)
-    assert len(set(margins)) == 12
+    assert len(set(margins)) == 256
     numbers = np.arange(len(margins))[::2]
     assert np.array_equal(read_rows(tmp_path / "out").margins(numbers), margins[::2], equal_nan=True)

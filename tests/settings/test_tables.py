@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from boulder_sweep.locations import location_of
+from boulder_sweep.locations import location_of, put
 from boulder_sweep.settings import SettingsError, load
 from boulder_sweep.settings.fields import INPUTS
 
@@ -580,7 +580,7 @@ def test_a_table_may_be_named_by_a_url(load_table, tmp_path, suffix):
             book.active.append(row)
         book.save(local)
     url = f"memory://tables/designs.{suffix}"
-    location_of(url).put(local.read_bytes())
+    put(location_of(url), local.read_bytes())
     sweep, same = load_table(None, url), load_table(None, local.name)
     assert _column(sweep, "boulder_height_m") == [2.2, 3.44]
     assert sweep.resolved() == same.resolved()
