@@ -34,7 +34,8 @@ from boulder_sweep.errors import (
     Interrupted,
     OlderRulesWarning,
 )
-from boulder_sweep.runner.signals import noted_signals
+from boulder_sweep.locations import gather_temporary_files
+from boulder_sweep.signals import install, noted_signals
 from boulder_sweep.text import why
 
 THREADS_OF_OPENBLAS = "OPENBLAS_NUM_THREADS"
@@ -135,9 +136,11 @@ for heading, commands in GROUPS.items():
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and end the process with its exit code."""
+    install()  # for the rest of the process
     start_light()
     ready_streams()
     _have_home()
+    gather_temporary_files()
     sys.exit(execute(arguments))
 
 

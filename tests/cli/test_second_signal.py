@@ -12,8 +12,8 @@ from typing import NoReturn
 import pytest
 from rich.progress import Progress as Bars
 
+from boulder_sweep import signals
 from boulder_sweep.errors import Interrupted
-from boulder_sweep.runner import signals
 from tests.conftest import Command
 from tests.waiting import wait_until
 

@@ -11,7 +11,7 @@ import pytest
 
 from boulder_sweep.errors import Interrupted
 from boulder_sweep.runner.run import run
-from boulder_sweep.runner.signals import Signals, noted_signals
+from boulder_sweep.signals import Signals, noted_signals
 from boulder_sweep.store.failures import FolderInUseError
 from boulder_sweep.store.reading import finished_table
 from tests.faults.faulty import Bar, held, slowly
