@@ -121,12 +121,12 @@ def test_a_call_waits_for_what_acts_on_signals_itself():
     closed = []
 
     def orderly():
-        with signals.deferred():
-            signals.caught = signal.SIGINT
-            for _ in range(3):
-                assert signals.looks.acquire(timeout=HANG_GUARD_S)  # hang guard
-            closed.append(True)
-            signals.check()
+        signals.defer()
+        signals.caught = signal.SIGINT
+        for _ in range(3):
+            assert signals.looks.acquire(timeout=HANG_GUARD_S)  # hang guard
+        closed.append(True)
+        signals.check()
 
     with pytest.raises(Interrupted):
         signals.call(orderly)
