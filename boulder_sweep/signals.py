@@ -8,18 +8,21 @@ behind.
 
 from __future__ import annotations
 
+# The command line imports this first, and no more than it needs: until then, signals do what they did.
 import atexit
 import os
 import signal
-import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from types import FrameType
-from typing import Any, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from boulder_sweep.errors import Interrupted
+
+if TYPE_CHECKING:
+    import subprocess
+    from types import FrameType
 
 Returned = TypeVar("Returned")
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)

@@ -136,12 +136,14 @@ for heading, commands in GROUPS.items():
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and end the process with its exit code."""
-    install()  # for the rest of the process
+    signals = install()  # for the rest of the process
     start_light()
     ready_streams()
     _have_home()
     gather_temporary_files()
-    sys.exit(execute(arguments))
+    code = execute(arguments)
+    signals.at_exit()  # before the libraries' own, which stumble over what still runs
+    sys.exit(code)
 
 
 def _have_home() -> None:

@@ -25,6 +25,7 @@ def closing(grid: object, monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable
     """Interrupt a run that shows a bar; return a function that sets what happens while the bar closes."""
 
     def run(*_: object, **options: str) -> NoReturn:
+        signals._installed.defer()
         signal.raise_signal(signal.SIGINT)
         wait_until(lambda: signals._installed.caught == signal.SIGINT, "the signal was noted")
         raise Interrupted(signal.SIGINT, 5, 18, options["resume_command"])
