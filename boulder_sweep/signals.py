@@ -16,7 +16,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from boulder_sweep.errors import Interrupted
 
@@ -161,22 +161,19 @@ class Signals:
         if self.caught is None:
             self.caught = signum
             return
-        for number in _SIGNALS:  # another one need not wait for a disk that hangs
-            signal.signal(number, signal.SIG_DFL)
-        self._end()
+        for number in _SIGNALS:  # Ctrl-C that is held down changes nothing
+            signal.signal(number, lambda *_: None)
+        undo_all()
+        os._exit(128 + self.caught)
 
     def at_exit(self) -> None:
         """Leave nothing behind; end at once if abandoned work could crash while the interpreter shuts down."""
         undo_all()
-        if any(thread.is_alive() for thread in self._abandoned):
-            self._end()
-
-    def _end(self) -> NoReturn:
-        undo_all()
-        for stream in (sys.stdout, sys.stderr):
-            with suppress(OSError, ValueError, RuntimeError):  # it may be in the middle of writing
-                stream.flush()
-        os._exit(128 + (self.caught or 0))
+        if self.caught is not None and any(thread.is_alive() for thread in self._abandoned):
+            for stream in (sys.stdout, sys.stderr):
+                with suppress(OSError, ValueError):
+                    stream.flush()
+            os._exit(128 + self.caught)
 
 
 _installed: Signals | None = None

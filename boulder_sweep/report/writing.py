@@ -55,6 +55,8 @@ HELP = "write the page as .html and print it from a browser"
 MOST_SECONDS = 300
 """After so long a browser that has not printed the page hangs and is ended; it works for five seconds, of which a busy
 machine makes minutes."""
+WATCHED = 'exec 3<&0; (read _ <&3; kill -9 0) & exec "$@" 3<&- </dev/null'
+"""Runs a browser that ends with this process, even if that is killed: its end of a pipe is then closed."""
 _LAST_WORDS = 300
 """Characters of what a browser said last that are shown."""
 SETTLED_MS = 30_000
@@ -362,10 +364,14 @@ def _ended(program: str, words: Sequence[str], said: Path) -> tuple[int, str]:
 
     def start() -> subprocess.Popen[bytes]:
         # In a group of its own: a browser is many processes, which outlive the first where that alone is ended.
-        return subprocess.Popen(words, stdout=file, stderr=file, env=environment, start_new_session=True)
+        watched = ["/bin/sh", "-c", WATCHED, program, *words]
+        pipe = subprocess.PIPE
+        return subprocess.Popen(
+            watched, stdin=pipe, stdout=said_in, stderr=said_in, env=environment, start_new_session=True
+        )
 
     try:
-        with said.open("wb") as file, undone(start, end_group) as running:
+        with said.open("wb") as said_in, undone(start, end_group) as running:
             code = running.wait(MOST_SECONDS)
     except OSError as problem:
         raise ReportError(f"{program} does not start ({why(problem)}); {HELP}") from problem

@@ -25,9 +25,10 @@ def closing(grid: object, monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable
     """Interrupt a run that shows a bar; return a function that sets what happens while the bar closes."""
 
     def run(*_: object, **options: str) -> NoReturn:
-        signals._installed.defer()
+        noted = signals.install()
+        noted.defer()
         signal.raise_signal(signal.SIGINT)
-        wait_until(lambda: signals._installed.caught == signal.SIGINT, "the signal was noted")
+        wait_until(lambda: noted.caught == signal.SIGINT, "the signal was noted")
         raise Interrupted(signal.SIGINT, 5, 18, options["resume_command"])
 
     monkeypatch.setattr("boulder_sweep.runner.run.run", run)
@@ -67,7 +68,7 @@ def test_it_is_said_where_the_bar_takes_its_time(
     sweep: Command, closing: Callable[[Callable[[], None]], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The thread that waits for the command looks for signals meanwhile."""
-    looks, waited = [], []
+    looks, waited = list[None](), list[bool]()
 
     class Watched(threading.Thread):
         def is_alive(self) -> bool:

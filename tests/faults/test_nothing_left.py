@@ -138,6 +138,7 @@ def test_what_a_killed_command_left_goes_with_the_next(place, command):
     process.kill()
     process.communicate()
     assert here.names() > before
+    wait_until(lambda: not here.child_is_running(), "the browser has ended, too")
     if command == "pdf":
         (here.root / "bin" / "chromium").write_text("#!/bin/sh\nexit 1\n")
     again = here.start(*COMMANDS[command], held=False)
