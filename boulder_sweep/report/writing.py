@@ -360,7 +360,8 @@ def _ended(program: str, words: Sequence[str], said: Path) -> tuple[int, str]:
     ReportError
         It does not start, or not end in time.
     """
-    environment = {**os.environ, "GSETTINGS_BACKEND": "memory"}  # else it leaves a file in the user's runtime folder
+    # Otherwise it leaves a socket among the user's temporary files, and settings in the runtime folder.
+    environment = {**os.environ, "TMPDIR": tempfile.gettempdir(), "GSETTINGS_BACKEND": "memory"}
 
     def start() -> subprocess.Popen[bytes]:
         # In a group of its own: a browser is many processes, which outlive the first where that alone is ended.
