@@ -48,6 +48,7 @@ _PASSING_NAME = re.compile(
 )
 _ABANDONED_S = 3600.0
 """Age of an unfinished file of another machine at which nobody writes it any more [s]."""
+_TRIES = 10
 _SHOWN = 40
 """Characters of a name that are repeated in a temporary one: four bytes each, and 255 bytes are a name's limit."""
 
@@ -250,7 +251,11 @@ def _is_abandoned(path: Path, machine: str, pid: int) -> bool:
 
 def _remove(path: Path) -> None:
     with suppress(OSError):
-        shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
+        if not path.is_dir():
+            path.unlink(missing_ok=True)
+    for _ in range(_TRIES):  # another thread may be removing the same
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
 
 
 @contextmanager

@@ -75,7 +75,12 @@ def undone(make: Callable[[], Returned], undo: Callable[[Returned], object]) -> 
 
 
 def undo_all() -> None:
-    """Undo what this process must not leave, the latest first. Threads that would make more wait until it has ended."""
+    """Undo what this process must not leave, the latest first, in the main thread of a process that ends.
+
+    Threads that would make more wait until it has ended, and further signals change nothing.
+    """
+    for number in _SIGNALS:
+        signal.signal(number, lambda *_: None)
     _making.acquire(timeout=_PATIENCE_S)
     for key in reversed(list(_undo)):
         with suppress(Exception):
@@ -161,8 +166,6 @@ class Signals:
         if self.caught is None:
             self.caught = signum
             return
-        for number in _SIGNALS:  # Ctrl-C that is held down changes nothing
-            signal.signal(number, lambda *_: None)
         undo_all()
         os._exit(128 + self.caught)
 

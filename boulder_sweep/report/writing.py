@@ -360,15 +360,19 @@ def _ended(program: str, words: Sequence[str], said: Path) -> tuple[int, str]:
     ReportError
         It does not start, or not end in time.
     """
-    # Otherwise it leaves a socket among the user's temporary files, and settings in the runtime folder.
-    environment = {**os.environ, "TMPDIR": tempfile.gettempdir(), "GSETTINGS_BACKEND": "memory"}
+    # Otherwise it leaves a socket among the user's temporary files, whose path must be short, and settings elsewhere.
+    environment = {**os.environ, "TMPDIR": ".", "GSETTINGS_BACKEND": "memory"}
 
     def start() -> subprocess.Popen[bytes]:
         # In a group of its own: a browser is many processes, which outlive the first where that alone is ended.
-        watched = ["/bin/sh", "-c", WATCHED, program, *words]
-        pipe = subprocess.PIPE
         return subprocess.Popen(
-            watched, stdin=pipe, stdout=said_in, stderr=said_in, env=environment, start_new_session=True
+            ["/bin/sh", "-c", WATCHED, program, *words],
+            cwd=said.parent,
+            env=environment,
+            stdin=subprocess.PIPE,
+            stdout=said_in,
+            stderr=said_in,
+            start_new_session=True,
         )
 
     try:
