@@ -8,10 +8,15 @@ refused, so that none can get into a log or a message.
 from __future__ import annotations
 
 import errno
+import hashlib
 import io
 import os
 import re
 import secrets
+import shutil
+import socket
+import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -21,6 +26,7 @@ from typing import IO, TYPE_CHECKING, Any, BinaryIO, TypeAlias
 from urllib.parse import unquote
 
 from boulder_sweep.errors import BoulderSweepError, LinkError
+from boulder_sweep.signals import undone, until_end
 from boulder_sweep.text import one_line
 
 if TYPE_CHECKING:
@@ -36,6 +42,15 @@ _S3 = ("s3", "s3a")
 _WITHIN_S, _SILENT_S = 45, 30
 """Time for all tries of a call to a store, and for one of S3's without a byte [s]; that begins when the system has what
 is sent, so two parts of 1.5 MB share a line of 1 Mbit/s."""
+WRITING = ".writing"
+"""Ending of what is not finished."""
+_TEMPORARY = "sweep-"
+_PASSING_NAME = re.compile(
+    rf"(?:\..*\.|\.|{_TEMPORARY})?([0-9a-f]{{8}})-([0-9]{{1,10}})-[0-9a-f]{{16}}{re.escape(WRITING)}", re.DOTALL
+)
+_ABANDONED_S = 3600.0
+"""Age of an unfinished file of another machine at which nobody writes it any more [s]."""
+_TRIES = 10
 _SHOWN = 40
 """Characters of a name that are repeated in a temporary one: four bytes each, and 255 bytes are a name's limit."""
 
@@ -199,28 +214,84 @@ def is_file(path: Path) -> bool:
     return True
 
 
-_unfinished: set[Path] = set()
+def _machine() -> str:
+    """Return a short name of this machine, fit for the name of a file."""
+    return hashlib.sha256(socket.gethostname().encode()).hexdigest()[:8]
+
+
+def _passing_name(before: str) -> str:
+    """Return a name that nothing else has, and that says which process gave it."""
+    return f"{before}{_machine()}-{os.getpid()}-{secrets.token_hex(8)}{WRITING}"
+
+
+def remove_abandoned(folder: Path) -> None:
+    """Remove what processes that were killed had in a folder; never fails."""
+    with suppress(OSError):
+        for path in folder.iterdir():
+            match = _PASSING_NAME.fullmatch(path.name)
+            with suppress(OSError):
+                if match and _is_abandoned(path, match[1], int(match[2])):
+                    _remove(path)
+
+
+def _is_abandoned(path: Path, machine: str, pid: int) -> bool:
+    """Whether the process that made a file has ended."""
+    if machine != _machine():
+        return time.time() - path.lstat().st_mtime > _ABANDONED_S
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return True
+    except (OSError, OverflowError):
+        pass  # another user's
+    return False
+
+
+def _remove(path: Path) -> None:
+    with suppress(OSError):
+        if not path.is_dir():
+            path.unlink(missing_ok=True)
+    for _ in range(_TRIES):  # another thread may be removing the same
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
 
 
 @contextmanager
-def unfinished(path: Path) -> Iterator[Path]:
-    """Remove a file that is being written where that fails, and where the process is ended meanwhile."""
-    _unfinished.add(path)
-    try:
-        yield path
-    except BaseException:
-        with suppress(OSError):
-            path.unlink(missing_ok=True)
-        raise
-    finally:
-        _unfinished.discard(path)
+def created(folder: Path, before: str = "", at: int | None = None) -> Iterator[tuple[Path, BinaryIO]]:
+    """Create a file that is gone at the end of the block or of the process, unless it was renamed.
+
+    Parameters
+    ----------
+    folder
+        Where.
+    before
+        What its name begins with.
+    at
+        Descriptor of the folder.
+
+    Raises
+    ------
+    OSError
+        It cannot be created.
+    """
+    path = folder / _passing_name(before)
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+    name = path if at is None else path.name
+    with undone(lambda: os.fdopen(os.open(name, flags, 0o666, dir_fd=at), "wb"), lambda _: _remove(path)) as file, file:
+        yield path, file
 
 
-def remove_unfinished() -> None:
-    """Remove the files that this process is writing; it is about to end."""
-    for path in list(_unfinished):
-        with suppress(OSError):
-            path.unlink(missing_ok=True)
+def gather_temporary_files() -> None:
+    """Have all temporary files of this process in one folder, which is removed when it ends.
+
+    Libraries keep a user's data in such files. Where there is no place for them, nothing changes.
+    """
+    with suppress(OSError):
+        place = Path(tempfile.gettempdir())
+        remove_abandoned(place)
+        folder = place / _passing_name(_TEMPORARY)
+        until_end(lambda: folder.mkdir(mode=0o700), lambda _: _remove(folder))
+        tempfile.tempdir = str(folder)
 
 
 @contextmanager
@@ -235,10 +306,8 @@ def replacing(target: Path) -> Iterator[BinaryIO]:
         It cannot be written; an old file is untouched.
     """
     is_file(target)
-    # No other process that writes the same file has this name.
-    passing = target.with_name(f".{target.name[:_SHOWN]}.{secrets.token_hex(8)}.part")
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
-    with unfinished(passing), open(passing, "wb", opener=lambda path, _: os.open(path, flags, 0o666)) as file:
+    remove_abandoned(target.parent)
+    with created(target.parent, f".{target.name[:_SHOWN]}.") as (passing, file):
         yield file
         file.flush()
         os.fsync(file.fileno())

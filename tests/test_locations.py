@@ -6,6 +6,7 @@ import asyncio
 import os
 import pickle
 import re
+import subprocess
 import sys
 from contextlib import nullcontext
 from pathlib import Path
@@ -20,6 +21,7 @@ from boulder_sweep import locations
 from boulder_sweep.errors import LinkError, PictureError
 from boulder_sweep.locations import (
     LocationError,
+    _machine,
     beside,
     is_folder,
     location_of,
@@ -28,7 +30,6 @@ from boulder_sweep.locations import (
     put,
     read_bytes,
     remove,
-    remove_unfinished,
     replacing,
     stat_of,
 )
@@ -177,17 +178,6 @@ def test_no_output_is_written_through_a_link(tmp_path):
     assert outside.read_text() == "precious"
 
 
-def test_a_process_that_ends_removes_what_it_is_writing(tmp_path):
-    def ended():
-        with replacing(tmp_path / "map.png") as file:
-            file.write(b"half")
-            remove_unfinished()
-
-    with pytest.raises(FileNotFoundError):
-        ended()
-    assert names_in(tmp_path) == []
-
-
 @pytest.mark.parametrize("dangling", [True, False])
 def test_a_pipe_or_a_dangling_link_is_refused_too(tmp_path, dangling):
     target = tmp_path / "map.png"
@@ -197,13 +187,23 @@ def test_a_pipe_or_a_dangling_link_is_refused_too(tmp_path, dangling):
     assert not (tmp_path / "nowhere").exists()
 
 
-def test_what_a_killed_process_left_of_an_output_does_not_matter(tmp_path):
-    """It stays: another process may be writing it."""
-    left = tmp_path / ".map.png.0123456789abcdef.part"
-    left.write_bytes(b"half of a longer one")
+def test_what_killed_processes_left_is_removed_and_the_rest_stays(tmp_path):
+    child = subprocess.Popen([sys.executable, "-c", ""])
+    child.wait()
+    dead, alive = (f"{_machine()}-{pid}-{'0' * 16}.writing" for pid in (child.pid, os.getpid()))
+    old, young = f"00000000-1-{'0' * 16}.writing", f"00000000-1-{'1' * 16}.writing"  # of another machine
+    names = [before + one for before in (".map.png.", ".other.csv.", "") for one in (dead, alive, old, young)]
+    for name in (*names, "mine", f"x{dead}"):
+        (tmp_path / name).write_text("x")
+    for name in (dead, alive):
+        (tmp_path / f"sweep-{name}" / "inside").mkdir(parents=True)
+    for name in names:
+        if name.endswith(old):
+            os.utime(tmp_path / name, (0, 0))
     with replacing(tmp_path / "map.png") as file:
         file.write(b"whole")
-    assert names_in(tmp_path) == [left.name, "map.png"]
+    kept = [name for name in names if name.endswith((alive, young))]
+    assert names_in(tmp_path) == sorted([*kept, "map.png", "mine", f"x{dead}", f"sweep-{alive}"])
     assert (tmp_path / "map.png").read_bytes() == b"whole"
 
 
@@ -236,7 +236,6 @@ def test_an_output_that_cannot_be_completed_changes_nothing(tmp_path):
 WRITES = re.compile(r"""O_TRUNC|O_CREAT|write_(text|bytes)\(|open\([^)]*["'][wax]b?\+?["']""")
 BY_ITSELF = {
     "locations.py": "creates files",
-    "store/folder.py": "creates parts",
     "cli/settings_files.py": "only a new file",
     "cli/output.py": "nowhere, and its own cache",
     "report/build.py": "for developers",

@@ -34,7 +34,8 @@ from boulder_sweep.errors import (
     Interrupted,
     OlderRulesWarning,
 )
-from boulder_sweep.runner.signals import noted_signals
+from boulder_sweep.locations import gather_temporary_files
+from boulder_sweep.signals import install, noted_signals
 from boulder_sweep.text import why
 
 THREADS_OF_OPENBLAS = "OPENBLAS_NUM_THREADS"
@@ -135,10 +136,14 @@ for heading, commands in GROUPS.items():
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and end the process with its exit code."""
+    signals = install()  # for the rest of the process
     start_light()
     ready_streams()
     _have_home()
-    sys.exit(execute(arguments))
+    gather_temporary_files()
+    code = execute(arguments)
+    signals.at_exit()  # before the libraries' own, which stumble over what still runs
+    sys.exit(code)
 
 
 def _have_home() -> None:

@@ -93,16 +93,13 @@ def run(
     if not quiet:
         say(f"{sweep.name}: {counted(sweep.n_designs, 'design')} into {target}")
     from boulder_sweep.runner.run import run as run_sweep
-    from boulder_sweep.runner.signals import noted_signals
 
     notes = Notes()
-    # Who waits for this command does not act on a signal before it has said how to go on.
-    with noted_signals() as signals, signals.deferred(), progress(quiet, notes) as shown:
+    with progress(quiet, notes) as shown:
         try:
             summary = run_sweep(sweep, target, progress=shown, **options)
         except Interrupted as stop:
             say(str(stop))  # before the bar closes: another signal meanwhile ends the process
-            signals.answered = True
             return stop.exit_code
     for note in notes.new(summary.notes):
         say(f"note: {note}")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import os
 import shutil
-import signal
 import subprocess
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -27,6 +26,7 @@ from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import FOOT_WORDS, SolverSettings
 from boulder_sweep.settings.shown_units import check_system, quantity_text
 from boulder_sweep.settings.sweep import NO_HEADING, SECTION, Heading, derived_words, wrong_with
+from boulder_sweep.signals import end_group, undone
 from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.store.folder import check_target
 from boulder_sweep.store.provenance import identity as identity_of
@@ -55,6 +55,8 @@ HELP = "write the page as .html and print it from a browser"
 MOST_SECONDS = 300
 """After so long a browser that has not printed the page hangs and is ended; it works for five seconds, of which a busy
 machine makes minutes."""
+WATCHED = 'exec 3<&0; (read _ <&3; kill -9 0) & exec "$@" 3<&- </dev/null'
+"""Runs a browser that ends with this process, even if that is killed: its end of a pipe is then closed."""
 _LAST_WORDS = 300
 """Characters of what a browser said last that are shown."""
 SETTLED_MS = 30_000
@@ -319,7 +321,7 @@ def printed(html: str) -> bytes:
         There is no Chromium, or it does not print the page.
     """
     program = browser()
-    with tempfile.TemporaryDirectory(prefix="boulder-sweep-", ignore_cleanup_errors=True) as folder:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         page, target = Path(folder, "page.html"), Path(folder, "page.pdf")
         page.write_text(html, encoding="utf-8")
         # As root, as in a container, Chromium does not start with its sandbox.
@@ -358,20 +360,28 @@ def _ended(program: str, words: Sequence[str], said: Path) -> tuple[int, str]:
     ReportError
         It does not start, or not end in time.
     """
-    with said.open("wb") as file:
-        try:
-            # In a group of its own: a browser is many processes, which outlive the first where that alone is ended.
-            running = subprocess.Popen(words, stdout=file, stderr=file, start_new_session=True)
-        except OSError as problem:
-            raise ReportError(f"{program} does not start ({why(problem)}); {HELP}") from problem
-        try:
+    # Otherwise it leaves a socket among the user's temporary files, whose path must be short, and settings elsewhere.
+    environment = {**os.environ, "TMPDIR": ".", "GSETTINGS_BACKEND": "memory"}
+
+    def start() -> subprocess.Popen[bytes]:
+        # In a group of its own: a browser is many processes, which outlive the first where that alone is ended.
+        return subprocess.Popen(
+            ["/bin/sh", "-c", WATCHED, program, *words],
+            cwd=said.parent,
+            env=environment,
+            stdin=subprocess.PIPE,
+            stdout=said_in,
+            stderr=said_in,
+            start_new_session=True,
+        )
+
+    try:
+        with said.open("wb") as said_in, undone(start, end_group) as running:
             code = running.wait(MOST_SECONDS)
-        except subprocess.TimeoutExpired:
-            raise ReportError(f"{program} did not print the page within {MOST_SECONDS} s; {HELP}") from None
-        finally:
-            with suppress(OSError):
-                os.killpg(running.pid, signal.SIGKILL) if hasattr(os, "killpg") else running.kill()
-            running.wait()
+    except OSError as problem:
+        raise ReportError(f"{program} does not start ({why(problem)}); {HELP}") from problem
+    except subprocess.TimeoutExpired:
+        raise ReportError(f"{program} did not print the page within {MOST_SECONDS} s; {HELP}") from None
     with said.open("rb") as file:
         file.seek(max(said.stat().st_size - 4 * _LAST_WORDS, 0))
         last = " ".join(file.read(4 * _LAST_WORDS).decode(errors="replace").split())

@@ -47,8 +47,8 @@ from boulder_sweep.runner.progress import (
     too_large,
 )
 from boulder_sweep.runner.ranges import WORK_S, Stopped, Work, Written, planned, seconds_per_row
-from boulder_sweep.runner.signals import Signals, noted_signals
 from boulder_sweep.settings.sweep import SECTION
+from boulder_sweep.signals import Signals, noted_signals, undone
 from boulder_sweep.store import failures
 from boulder_sweep.store.folder import Ranges, check_writable, clear, locked, make, part_file, part_files, remove_parts
 from boulder_sweep.store.provenance import differences, file_metadata, identity
@@ -164,7 +164,8 @@ def run(
     check_backend(backend, scheduler)
     again = resuming(sweep, out, jobs, backend, scheduler)
     jobs = jobs or (1 if sweep.n_designs == 1 else available_cores())
-    with noted_signals() as signals, signals.deferred(), _folder(out, signals):
+    with noted_signals() as signals, _folder(out):
+        signals.defer()
         whole = _Run(out, signals, sweep.n_designs, jobs, backend, scheduler)
         try:
             with telling_start_failure(jobs):
@@ -304,18 +305,18 @@ def _written(work: Work, first: int, stop: int, *tick: Callable[[int], None]) ->
 
 
 @contextmanager
-def _folder(out: Location, signals: Signals) -> Iterator[None]:
+def _folder(out: Location) -> Iterator[None]:
     """Make and lock the folder; leave nothing behind but parts."""
-    with locked(out):
-        is_new = make(out)
-        try:
-            clear(out)
-            yield
-        finally:
-            clear(out)
-            if is_new and isinstance(out, Path):
-                with suppress(OSError):  # parts are in it
-                    out.rmdir()
+
+    def leave(is_new: bool) -> None:
+        clear(out)
+        if is_new and isinstance(out, Path):
+            with suppress(OSError):  # parts are in it
+                out.rmdir()
+
+    with locked(out), undone(lambda: make(out), leave):
+        clear(out)
+        yield
 
 
 def _names_in(out: Location) -> list[str]:

@@ -12,18 +12,15 @@ import errno
 import hashlib
 import os
 import re
-import secrets
-import socket
-import tempfile
-import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import BinaryIO, NamedTuple
 
 from boulder_sweep.errors import BoulderSweepError
-from boulder_sweep.locations import Location, is_file, names_in, put, remove, unfinished
+from boulder_sweep.locations import WRITING, Location, created, is_file, names_in, put, remove, remove_abandoned
+from boulder_sweep.signals import undone
 from boulder_sweep.store import failures
 from boulder_sweep.text import why
 
@@ -33,11 +30,6 @@ TOGETHER = 4
 """The number of ranges is a multiple of this, so that few workers end at the same time."""
 _DIGITS = 12
 _NAME = re.compile(rf"rows-([0-9]{{{_DIGITS},20}})-([0-9]{{{_DIGITS},20}})-([0-9a-f]{{16}})\.parquet")
-WRITING = ".writing"
-"""Ending of what is not finished."""
-_UNFINISHED_NAME = re.compile(rf"\.?([0-9a-f]{{8}})-([0-9]{{1,10}})-[0-9a-f]{{16}}{re.escape(WRITING)}")
-_ABANDONED_S = 3600.0
-"""Age of an unfinished file of another machine at which nobody writes it any more [s]."""
 _TRIES = 20
 
 
@@ -139,9 +131,8 @@ def check_writable(out: Location) -> None:
     """
     if isinstance(out, Path):
         try:
-            with _passing(out) as (passing, at):
-                os.close(_created(passing.name, at))
-                passing.unlink()
+            with _passing(out):
+                pass
         except OSError as problem:
             raise failures.WriteError(f"cannot write into {out}: {why(problem)}") from problem
 
@@ -149,11 +140,10 @@ def check_writable(out: Location) -> None:
 def _put_on_disk(out: Path, name: str, content: bytes | memoryview) -> None:
     for left in range(_TRIES, 0, -1):
         try:
-            with _passing(out) as (passing, at):
-                with open(passing.name, "wb", opener=lambda path, _: _created(path, at)) as file:
-                    file.write(content)
-                    file.flush()
-                    os.fsync(file.fileno())
+            with _passing(out) as (passing, file, at):
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
                 os.rename(passing.name, out / name, src_dir_fd=at)
             break
         except FileNotFoundError:  # another worker that is done has removed the hidden folder
@@ -166,32 +156,34 @@ def _put_on_disk(out: Path, name: str, content: bytes | memoryview) -> None:
         os.close(folder)
 
 
-def _created(name: str, at: int) -> int:
-    return os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666, dir_fd=at)
-
-
 @contextmanager
-def _passing(out: Path) -> Iterator[tuple[Path, int]]:
-    """Give the path at which a file of a table may be written, and a descriptor of its folder."""
-    name, flags = f"{_machine()}-{os.getpid()}-{secrets.token_hex(8)}{WRITING}", os.O_RDONLY | os.O_DIRECTORY
-    hidden, device = hidden_folder(out), out.stat().st_dev
-    try:
-        with suppress(FileExistsError):
-            hidden.mkdir()
-        at = os.open(hidden, flags | os.O_NOFOLLOW)
-        if os.fstat(at).st_dev != device or not os.access(hidden, os.W_OK):
+def _passing(out: Path) -> Iterator[tuple[Path, BinaryIO, int]]:
+    """Give a file in which a part may be written: its path, open, and a descriptor of its folder."""
+    hidden, device, flags = hidden_folder(out), out.stat().st_dev, os.O_RDONLY | os.O_DIRECTORY
+
+    def folder() -> tuple[Path, str, int]:
+        try:
+            with suppress(FileExistsError):
+                hidden.mkdir()
+            at = os.open(hidden, flags | os.O_NOFOLLOW)
+            if os.fstat(at).st_dev == device and os.access(hidden, os.W_OK):
+                return hidden, "", at
             os.close(at)
-            raise OSError(errno.EXDEV, os.strerror(errno.EXDEV))
-    except OSError:
-        hidden, name, at = out, f".{name}", os.open(out, flags)
-    try:
-        with unfinished(hidden / name) as passing:
-            yield passing, at
-    finally:
-        os.close(at)
-        if hidden != out:
-            with suppress(OSError):  # others write there, too
-                hidden.rmdir()
+        except OSError:
+            pass
+        return out, ".", os.open(out, flags)
+
+    with undone(folder, lambda _: _remove_empty(hidden)) as (place, before, at):
+        try:
+            with created(place, before, at) as (passing, file):
+                yield passing, file, at
+        finally:
+            os.close(at)
+
+
+def _remove_empty(folder: Path) -> None:
+    with suppress(OSError):  # others write there, too
+        folder.rmdir()
 
 
 def hidden_folder(out: Path) -> Path:
@@ -200,36 +192,14 @@ def hidden_folder(out: Path) -> Path:
     return whole.with_name(f".{whole.name}{WRITING}")
 
 
-def _machine() -> str:
-    """Return a short name of this machine, fit for the name of a file."""
-    return hashlib.sha256(socket.gethostname().encode()).hexdigest()[:8]
-
-
 def clear(out: Location) -> None:
     """Remove unfinished files that nobody writes any more, and the hidden folder if it is empty; never fails."""
     if not isinstance(out, Path):
         return
     hidden = hidden_folder(out)
     for folder in (hidden, out):
-        with suppress(OSError):
-            for path in folder.iterdir():
-                if (match := _UNFINISHED_NAME.fullmatch(path.name)) and _is_abandoned(path, match[1], int(match[2])):
-                    path.unlink(missing_ok=True)
-    with suppress(OSError):
-        hidden.rmdir()
-
-
-def _is_abandoned(path: Path, machine: str, pid: int) -> bool:
-    """Whether the process that wrote a file has ended."""
-    if machine != _machine():
-        return time.time() - path.lstat().st_mtime > _ABANDONED_S
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return True
-    except (OSError, OverflowError):
-        pass  # another user's
-    return False
+        remove_abandoned(folder)
+    _remove_empty(hidden)
 
 
 def make(out: Location) -> bool:
@@ -308,7 +278,8 @@ def _runtime_folder() -> Path:
         There is none that is the user's own.
     """
     given = os.environ.get("XDG_RUNTIME_DIR")
-    folder = Path(given or tempfile.gettempdir()) / ("boulder-sweep" if given else f"boulder-sweep-{os.getuid()}")
+    place = given or os.environ.get("TMPDIR") or "/tmp"
+    folder = Path(place) / ("boulder-sweep" if given else f"boulder-sweep-{os.getuid()}")
     folder.mkdir(mode=0o700, exist_ok=True)
     if folder.is_symlink() or folder.stat().st_uid != os.getuid():
         raise OSError(errno.EPERM, f"{folder} is another user's")

@@ -12,8 +12,8 @@ from typing import Any, NoReturn
 import pytest
 from rich.progress import Progress as Bars
 
+from boulder_sweep import signals
 from boulder_sweep.errors import Interrupted
-from boulder_sweep.runner import signals
 from boulder_sweep.runner.run import resuming
 from tests.conftest import Command
 from tests.waiting import wait_until
@@ -26,8 +26,10 @@ def closing(grid: object, monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable
     """Interrupt a run that shows a bar; return a function that sets what happens while the bar closes."""
 
     def run(settings: Any, out: Any, *, jobs: Any, backend: Any, scheduler: Any, **_: object) -> NoReturn:
+        noted = signals.install()
+        noted.defer()
         signal.raise_signal(signal.SIGINT)
-        wait_until(lambda: signals._installed.caught == signal.SIGINT, "the signal was noted")
+        wait_until(lambda: noted.caught == signal.SIGINT, "the signal was noted")
         raise Interrupted(signal.SIGINT, 5, 18, resuming(settings, out, jobs, backend, scheduler))
 
     monkeypatch.setattr("boulder_sweep.runner.run.run", run)
@@ -67,7 +69,7 @@ def test_it_is_said_where_the_bar_takes_its_time(
     sweep: Command, closing: Callable[[Callable[[], None]], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The thread that waits for the command looks for signals meanwhile."""
-    looks, waited = [], []
+    looks, waited = list[None](), list[bool]()
 
     class Watched(threading.Thread):
         def is_alive(self) -> bool:

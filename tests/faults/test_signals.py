@@ -9,7 +9,7 @@ import pytest
 from boulder_sweep.runner.run import run
 from boulder_sweep.store.reading import finished_table
 from tests.faults.faulty import Bar
-from tests.faults.processes import Driver
+from tests.faults.processes import Driver, signalled
 from tests.runner.grids import grid_of, plausible
 from tests.store.folders import nothing_left, parts_of, rows_done
 from tests.waiting import wait_until
@@ -81,13 +81,11 @@ def test_the_second_signal_ends_it_at_once(tmp_path, bar, backend):
     """The first one is noted, and nobody is there to act on it."""
     driver = Driver(tmp_path / "out", *HELD, "--backend", backend, "--stuck", **bar.environment)
     driver.wait_for_rows()
-    driver.signal(signal.SIGINT)
-    driver.wait_until_caught(signal.SIGINT)
-    assert driver.process.poll() is None
-    driver.signal(signal.SIGINT)
-    returned, _, _ = driver.end()
-    assert returned == -signal.SIGINT
+    wait_until(lambda: signalled(driver.process, signal.SIGINT), "the process has ended")
+    returned, _, complaints = driver.end()
+    assert (returned, complaints) == (130, "")
     driver.leaves_nothing_behind()
+    assert nothing_left(tmp_path / "out")
     assert rows_done(tmp_path / "out") <= REACHED
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from boulder_sweep.errors import Interrupted
 from boulder_sweep.runner.run import run
-from boulder_sweep.runner.signals import Signals, noted_signals
+from boulder_sweep.signals import Signals, noted_signals
 from boulder_sweep.store.failures import FolderInUseError
 from boulder_sweep.store.reading import finished_table
 from tests.faults.faulty import Bar, held, slowly
@@ -121,12 +121,12 @@ def test_a_call_waits_for_what_acts_on_signals_itself():
     closed = []
 
     def orderly():
-        with signals.deferred():
-            signals.caught = signal.SIGINT
-            for _ in range(3):
-                assert signals.looks.acquire(timeout=HANG_GUARD_S)  # hang guard
-            closed.append(True)
-            signals.check()
+        signals.defer()
+        signals.caught = signal.SIGINT
+        for _ in range(3):
+            assert signals.looks.acquire(timeout=HANG_GUARD_S)  # hang guard
+        closed.append(True)
+        signals.check()
 
     with pytest.raises(Interrupted):
         signals.call(orderly)

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from boulder_sweep.errors import PictureError, QuestionError
-from boulder_sweep.locations import location_of
+from boulder_sweep.locations import _machine, location_of
 from boulder_sweep.store import folder
 from boulder_sweep.store.failures import FolderInUseError, StoreError, WriteError
 from boulder_sweep.store.folder import (
@@ -175,7 +175,7 @@ def test_unfinished_files_of_dead_processes_are_removed_and_others_stay(tmp_path
     hidden_folder(out).mkdir()
     child = subprocess.Popen([sys.executable, "-c", ""])
     child.wait()
-    dead, alive = (f"{folder._machine()}-{pid}-{'0' * 16}.writing" for pid in (child.pid, os.getpid()))
+    dead, alive = (f"{_machine()}-{pid}-{'0' * 16}.writing" for pid in (child.pid, os.getpid()))
     old, young = f"00000000-1-{'0' * 16}.writing", f"00000000-1-{'1' * 16}.writing"  # of another machine
     for name in (dead, alive, old, young, "mine"):
         (hidden_folder(out) / name).write_text("x")
