@@ -42,6 +42,8 @@ Found = TypeVar("Found")
 _THREADS = min(8, os.cpu_count() or 1)
 _MOST_PART_ROWS, _MOST_PART_BYTES = 100_000, 50_000_000
 """Most rows of a part, and bytes unpacked: three times as many as a full one has; several are read at once."""
+_TOGETHER = 8
+"""Parts whose rows become one piece of memory: pandas takes longer for many small ones, and they waste some."""
 _MOST_ROWS = 2**63 - 1
 CHANGED = "changed: its bytes do not have the hash in its name"
 
@@ -433,7 +435,10 @@ def _read(folder: Location, columns: Sequence[str] | None, verify: bool) -> tupl
     finished = FinishedRows(folder)
     if unknown := [name for name in columns or () if name not in finished.columns]:
         raise ValueError(f"{folder} has no column {unknown[0]!r}; its columns are {', '.join(finished.columns)}")
-    return pa.concat_tables(finished.tables(columns, verify=verify)), finished
+    parts, pieces = finished.tables(columns, verify=verify), []
+    while some := list(islice(parts, _TOGETHER)):
+        pieces.append(pa.concat_tables(some).combine_chunks())
+    return pa.concat_tables(pieces), finished
 
 
 def read(out: str | Location, columns: Sequence[str] | None = None, *, verify: bool = True) -> pd.DataFrame:

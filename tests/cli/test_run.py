@@ -294,7 +294,7 @@ def test_a_folder_that_the_system_refuses_to_write_is_for_the_user_to_mend(
     def refused(*_, **__):
         raise OSError(number, os.strerror(number))
 
-    monkeypatch.setattr(*{"opened": (folder, "_created"), "written": (os, "rename")}[when], refused)
+    monkeypatch.setattr(*{"opened": (folder, "created"), "written": (os, "rename")}[when], refused)
     code, out, err = sweep("run", possible_grid, "-q", "-o", "out")
     assert (code, out) == (2, "")
     assert err.startswith(f"error: cannot write into out: {os.strerror(number)}")

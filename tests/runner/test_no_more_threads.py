@@ -55,9 +55,10 @@ def test_rows_that_were_there_stay(no_more_threads: Callable[[int], None], tmp_p
     run(grid_of(1000), out, jobs=1, simulate=plausible)
     for part in sorted(out.iterdir())[:2]:
         part.unlink()
-    no_more_threads(2)
+    no_more_threads(10)
     with pytest.raises(BackendError, match=ONE_LINE):
         run(grid_of(1000), out, jobs=64, resume=True, simulate=plausible)
+    no_more_threads(100)
     assert rows_done(out) == 500
     run(grid_of(1000), out, jobs=1, resume=True, simulate=plausible)
     assert rows_done(out) == 1000
