@@ -13,8 +13,10 @@ import pytest
 def no_more_threads(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
     """Return a function after which pools can start only so many threads."""
 
+    start = DummyProcess.start
+
     def allow(most: int) -> None:
-        start, count = DummyProcess.start, itertools.count()
+        count = itertools.count()
 
         def refuse(process: DummyProcess) -> None:
             if next(count) >= most:
