@@ -15,9 +15,9 @@ from boulder_kernels import Control, Readings
 from boulder_sweep.columns import BY_NAME, INPUT_COLUMNS, OPTIONAL_COLUMNS, OUTCOMES, OutcomeColumn
 from boulder_sweep.designs import embedment_of_ratio
 from boulder_sweep.impact.simulation import history_of
+from boulder_sweep.judge.accuracy import reported_step_s
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.judged import worst_of
-from boulder_sweep.judge.refinement import reported_step_s
 from boulder_sweep.judge.robustness import can_be_asked
 from boulder_sweep.judge.verdict import limits_of
 from boulder_sweep.locations import Location, location_of

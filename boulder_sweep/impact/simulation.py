@@ -12,18 +12,20 @@ import numpy as np
 
 from boulder_kernels import SIMULATED, Control, Outcome, Readings, Record, Status, no_record
 from boulder_kernels import simulate as simulate_impact
+from boulder_kernels._jit import plain
+from boulder_kernels.control import control_for
 from boulder_kernels.impact import simulate_last_resort
+from boulder_kernels.outcomes import FINER, NONE_NEEDED
 from boulder_kernels.soil_laws import constants_in
-from boulder_kernels.table import halved, is_layered, is_paired, problem_at, step_of_solution
+from boulder_kernels.table import is_layered, is_paired, problem_at, step_of_solution
 from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.impact.history import Motion
 from boulder_sweep.impact.trajectory import Trajectory
-from boulder_sweep.judge.accuracy import accuracy_of
+from boulder_sweep.judge.accuracy import accuracy_of, finer_controls, reported_step_s
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import Judged, worst_case, worst_of
 from boulder_sweep.judge.quantiles import at_values
-from boulder_sweep.judge.refinement import finer_controls, reported_step_s
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.fields import FIELDS
 from boulder_sweep.settings.model import Model, ReadingChoice, SolverSettings
@@ -200,9 +202,9 @@ def _deciding(control: Control, how: Readings, step_s: float | None, *, layered:
     for finer in finer_controls(control):
         if reported_step_s(finer) == step_s:
             control = finer
-    control = control._replace(refined=control.error_estimate)
+    first, finer = (plain(control_for)(solution, control) for solution in (NONE_NEEDED, FINER))
     checked = control.error_estimate and not is_paired(how, control, layered=layered)
-    return halved(control) if checked and step_s not in (None, step_of_solution(control)) else control
+    return finer if checked and step_s not in (None, step_of_solution(first)) else first
 
 
 def _decided(designs: Designs, how: Readings, control: Control) -> Outcome:

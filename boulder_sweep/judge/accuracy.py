@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -11,6 +12,8 @@ import numpy as np
 
 from boulder_kernels import Control, OutcomeTable, Readings, Status, simulate_table
 from boulder_kernels._jit import plain
+from boulder_kernels.control import EVENT_TOLERANCE
+from boulder_kernels.rules import AGREEING, FIRST_FACTOR
 from boulder_kernels.settling import proof_is_possible
 from boulder_kernels.table import finer_step, is_paired
 from boulder_sweep.judge.inputs import Designs, sampled_designs
@@ -46,6 +49,13 @@ ELEMENTS_AS_FAST = 16
 OUTLINES_IN_LANES = 100_000
 """Below so many designs boulders of several pieces are simulated one after another: lanes are twice as fast, but take a
 minute and a half longer to compile for eight pieces, and are mostly idle where few rows are late."""
+FACTOR = 0.25
+"""The step of open rows is shortened by `FIRST_FACTOR` `AGREEING` times, which confirms nearly all late rows, then by
+this factor. With this one alone late rows take twice as long, and no verdict of 90,000 shallow boulders changes."""
+LAST_RESORT_STEPS = 2_000
+"""Steps to the horizon of the last attempt, where nothing asks for shorter ones."""
+MOST_STEPS = 20_000
+"""It ends with at least so many steps to the horizon, with the soil in closed form; fewer with many soil elements."""
 LONGEST_HORIZON = 10.0
 """A design without proof of its verdict at the horizon is simulated for up to this many horizons."""
 DESIGNS = 4096
@@ -140,6 +150,39 @@ def control_of(sweep: Sweep, accuracy: Accuracy) -> Control:
     )
 
 
+def finer_controls(control: Control) -> Iterator[Control]:
+    """Yield the controls by which open rows are simulated again, each finer than the one before.
+
+    Parameters
+    ----------
+    control
+        How they were simulated first.
+
+    Notes
+    -----
+    The budget of a row is the last of these controls; sums over soil elements are too slow for it. It
+    depends on the settings alone, so a row is the same whatever rows are simulated beside it. Where errors are
+    estimated there are enough of them to confirm a late row, however slow.
+    """
+    finest = control.horizon / MOST_STEPS * max(1.0, control.elements / ELEMENTS_AS_FAST)
+    h = control.h
+    finer = control._replace(locate_yield=True, paired=True, event_tolerance=EVENT_TOLERANCE)
+    confirming = AGREEING if control.error_estimate else 0
+    while h > finest or confirming > 0:
+        h *= FIRST_FACTOR if confirming > 0 else FACTOR
+        confirming -= 1
+        yield finer._replace(h=h)
+    if control.elements == 0:
+        h = min(control.h, control.horizon / LAST_RESORT_STEPS)
+        for times in range(1 + AGREEING if control.error_estimate else 1):
+            yield finer._replace(h=h * FACTOR**times, last_resort=True)
+
+
+def reported_step_s(control: Control) -> float:
+    """Return the step of the solution that is reported [s]; of a doubtful design it is half of that."""
+    return finer_step(control.h) if control.error_estimate else control.h
+
+
 def accuracy_of(sweep: Sweep) -> Accuracy:
     """Return how accurately a sweep is computed.
 
@@ -219,7 +262,7 @@ def estimated_error_deg(designs: Designs, readings: Readings, control: Control) 
     """Quantile of the estimated errors of the rotation [deg]; 0 where no error could be estimated.
 
     A boulder that overturns has no error of its largest rotation, but its other errors stand for one: those of the
-    displacements, over the embedment depth or half the height of the boulder, as `estimate_errors` compares them.
+    displacements, over the embedment depth or half the height of the boulder, as `estimate_error` compares them.
     """
     outcomes = simulated(designs, readings, control)
     arm = np.maximum(designs.table.d, 0.5 * designs.table.H)

@@ -15,15 +15,22 @@ import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, simulate_table
 from boulder_kernels._jit import plain
-from boulder_kernels.rules import SLOWER_SPEEDS, after_slower, is_asked_slower
+from boulder_kernels.rules import (
+    ASKED_SLOWER,
+    RULE,
+    RULES,
+    SLOWER_SPEEDS,
+    WANTED,
+    Rows,
+    consider_rows,
+    rule_by_slower,
+)
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
-from boulder_kernels.table import some_rows
-from boulder_sweep.judge.accuracy import LONGEST_HORIZON, Accuracy, control_of, readings_of
+from boulder_sweep.judge.accuracy import LONGEST_HORIZON, Accuracy, control_of, finer_controls, readings_of
 from boulder_sweep.judge.inputs import Designs, designs_of
-from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed, with_rows, worst_of
-from boulder_sweep.judge.refinement import RowStates, finer_controls
+from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed, worst_of
 from boulder_sweep.judge.robustness import can_be_asked, with_second_opinions
-from boulder_sweep.judge.verdict import JudgedOnce, Limits, judge_once, limits_of
+from boulder_sweep.judge.verdict import Limits, judged_rows, limits_of, rows_of
 from boulder_sweep.settings.model import SECOND_OPINIONS, Model
 from boulder_sweep.soils import with_soil
 
@@ -33,6 +40,8 @@ if TYPE_CHECKING:
 
 SLOWER_AT_ONCE = 150
 """Designs that are simulated at once with all their slower trucks: an interruption waits for the current call."""
+BY_SLOWER = np.array([plain(rule_by_slower)(rule) for rule in range(len(RULES))])
+"""The worst rule that may decide a row, by that which decides a slower truck."""
 Simulate = Callable[..., OutcomeTable]
 """Function that simulates a table of designs, with the arguments of `by_kernels`, which it always is outside tests."""
 
@@ -126,8 +135,8 @@ class Evaluation:
         """Simulate and judge designs that can be computed.
 
         Rows that are refused for their time steps, undecided for their numerical error, or late are simulated again
-        by finer steps until they are decided or `finer_controls` ends, see `refinement`. Shallow boulders that would
-        pass and slide are simulated with slower trucks, too. A row depends on nothing but its own design.
+        by finer steps until they are decided or `finer_controls` ends, see `boulder_kernels.rules`. Shallow boulders
+        that would pass and slide are simulated with slower trucks, too. A row depends on nothing but its own design.
 
         Parameters
         ----------
@@ -146,8 +155,10 @@ class Evaluation:
         reduced by it. Those that do not pass so, too, keep their verdict and get a margin just below the one asked for.
         Second opinions are asked with the reduced limit.
         """
-        decided = self._decided(designs)
-        judged = joined([self._holding_slower(decided, designs) if self.against_slower else decided.judged])
+        rows = self._decided(designs)
+        if self.against_slower:
+            self._hold_slower(rows, designs)
+        judged = joined([judged_rows(rows, designs, self.limits, self.only)])
         if self.least_margin > 0.0:
             judged = self._margins_proved(judged, designs)
         if not self.second_opinion or (self.only and "robustness" not in self.only):
@@ -156,43 +167,30 @@ class Evaluation:
         passes = designs.rows(judged.verdict == PASS)
         return with_second_opinions(judged, passes, self.second_opinion, self.model.resistance, limits, self.longest_s)
 
-    def _decided(self, designs: Designs) -> JudgedOnce:
-        """Simulate and judge designs until each is decided at its own speed."""
-        rows = RowStates(designs, self.control, self._once(designs, self.control))
-        for control in finer_controls(self.control):
-            again = rows.wanted(control)
-            if len(again):
-                rows.update(again, control, self._once(designs.rows(again), control))
-            elif not len(rows.unconfirmed):
-                break
-        judged, rule = rows.judged, rows.rule
-        if len(rows.unconfirmed):
-            doubted = self._doubted(rows.unconfirmed, designs, rows.outcomes)
-            judged = with_rows(judged, rows.unconfirmed, doubted.judged)
-            rule[rows.unconfirmed] = doubted.rule
-        return JudgedOnce(judged, rows.outcomes, rule)
+    def _decided(self, designs: Designs) -> Rows:
+        """Simulate designs until each is decided at its own speed."""
+        controls, limits = [self.control, *finer_controls(self.control)], self.limits.of_rules
+        rows, every = rows_of(designs, self.limits), np.array(controls, dtype=float)
+        number, some = 0, np.arange(designs.size)
+        while number < len(controls):
+            again = designs.rows(some) if number else designs
+            found = self.simulate(again.table, self.readings, controls[number])
+            consider_rows(rows, some, np.stack(found), number, every, limits)
+            wanted = rows.courses[WANTED]
+            number = int(wanted.min(initial=len(controls)))
+            some = np.flatnonzero(wanted == number)
+        return rows
 
-    def _holding_slower(self, decided: JudgedOnce, designs: Designs) -> Judged:
-        """Return decided rows, those of shallow boulders that slide judged by slower trucks as well."""
-        judged, outcomes, rule = decided
-        table = designs.table
-        asked = np.flatnonzero(plain(is_asked_slower)(rule, table.d / table.H, outcomes.x_b_max))
-        if not len(asked):
-            return judged
-        alone, steps = replace(self, only=("verdict", "reason")), len(SLOWER_SPEEDS)
-        ruled = rule[asked]
+    def _hold_slower(self, rows: Rows, designs: Designs) -> None:
+        """Let slower trucks decide the rows of shallow boulders that slide, too."""
+        asked, steps, rule = np.flatnonzero(rows.courses[ASKED_SLOWER]), len(SLOWER_SPEEDS), rows.courses[RULE]
         for at in range(0, len(asked), SLOWER_AT_ONCE):
             some = asked[at : at + SLOWER_AT_ONCE]
             trucks = designs.rows(np.repeat(some, steps))
             v_0 = trucks.table.v_0 * np.tile(SLOWER_SPEEDS, len(some))
-            slower = alone._decided(trucks._replace(table=trucks.table._replace(v_0=v_0))).rule
-            for each in slower.reshape(-1, steps).T:
-                ruled[at : at + SLOWER_AT_ONCE] = plain(after_slower)(ruled[at : at + SLOWER_AT_ONCE], each)
-        changed = asked[ruled != rule[asked]]
-        if not len(changed):
-            return judged
-        again = some_rows(outcomes, changed), designs.rows(changed), self.limits, self.only, ruled[ruled != rule[asked]]
-        return with_rows(judged, changed, judge_once(*again).judged)
+            slower = self._decided(trucks._replace(table=trucks.table._replace(v_0=v_0))).courses[RULE]
+            worst = BY_SLOWER.take(slower.astype(np.intp)).reshape(-1, steps).min(axis=1)
+            rule[some] = np.minimum(rule[some], worst)
 
     def asked(self) -> Evaluation:
         """Return the same with every second opinion, where they can be asked."""
@@ -228,17 +226,6 @@ class Evaluation:
         margin = judged["margin"].copy()
         margin[there[reduced.judged(designs.rows(there)).verdict != PASS]] = np.nextafter(self.least_margin, 0.0)
         return replace(judged, columns=judged.columns | {"margin": margin})
-
-    def _once(self, designs: Designs, control: Control) -> JudgedOnce:
-        """Simulate and judge designs once."""
-        outcomes = self.simulate(designs.table, self.readings, control)
-        return judge_once(outcomes, designs, self.limits, self.only)
-
-    def _doubted(self, rows: np.ndarray, designs: Designs, outcomes: OutcomeTable) -> JudgedOnce:
-        """Judge late rows, on which no two solutions agree, with an unknown error."""
-        unknown = np.full(len(rows), np.inf)
-        doubted = some_rows(outcomes, rows)._replace(theta_error=unknown, x_error=unknown)
-        return judge_once(doubted, designs.rows(rows), self.limits, self.only)
 
     def settings(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """Return readings and control as plain data, for the record."""

@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_kernels import DesignTable, Readings, as_printed, corrected
-from boulder_sweep.judge.accuracy import QUANTILE, STEPS, STEPS_PRINTED, accuracy_of, simulated
+from boulder_sweep.judge.accuracy import QUANTILE, STEPS, STEPS_PRINTED, accuracy_of, reported_step_s, simulated
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.inputs import plain_designs, sampled_designs, sampled_rows
 from boulder_sweep.judge.judged import CHANGES_SIDE, FAIL, PASS
-from boulder_sweep.judge.refinement import reported_step_s
 from boulder_sweep.judge.validity import SEPARATOR, flag_counts
 from boulder_sweep.judge.verdict import judge
 from boulder_sweep.settings.model import RESISTANCES

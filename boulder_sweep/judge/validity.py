@@ -15,9 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from boulder_kernels._jit import plain
 from boulder_kernels.rules import FLAGS as RAISED
-from boulder_kernels.rules import ISLAND_SLIDE, UNSTUDIED, FlagInputs, Tested, flags_of
+from boulder_kernels.rules import ISLAND_SLIDE, UNSTUDIED, Tested, write_flags
 from boulder_sweep.investigation import FAMILY_FACTOR, family_bounds
 from boulder_sweep.judge.judged import CHANGES_SIDE
 from boulder_sweep.settings.fields import BY_NAME
@@ -217,16 +216,17 @@ def run_by_run(function: Callable[[np.ndarray], np.ndarray], column: np.ndarray)
 
 
 def _bits(designs: Any, limits: Any, reached: tuple[Any, Any, Any, Any]) -> np.ndarray:
-    """Return the flags of n designs as bits, from what they reach: the first four of `FlagInputs`."""
+    """Return the flags of n designs as bits, from what they reach: the fields of `boulder_kernels.rules.Reached`."""
     table = designs.table
     rocks = table.rho_b if designs.rocks is None else designs.rocks
     least_beta, most_beta = run_by_run(lambda phi: family_bounds(np.degrees(phi)), table.phi)
     vehicle = (table.m_v, table.v_0, table.k_v, table.c_v)
     sizes = (table.L, table.W, table.H, table.d, rocks, table.beta, least_beta, most_beta)
     soil = (np.degrees(table.phi), table.rho_s, designs.given_factors)
-    rows = FlagInputs(*reached, *sizes, *vehicle, *soil)
     tested = tested_of(limits.calibrated_crush, limits.tested_rotation, odd_layers=limits.odd_layers)
-    return plain(flags_of)(rows, tested)
+    bits = np.empty(designs.size, dtype=np.int64)
+    write_flags(np.stack(np.broadcast_arrays(*reached, bits)[:-1]), np.stack([*sizes, *vehicle, *soil]), tested, bits)
+    return bits
 
 
 def are_studied(designs: Any, limits: Any) -> np.ndarray:

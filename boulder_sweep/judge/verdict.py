@@ -36,8 +36,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 import boulder_kernels.rules as verdicts
-from boulder_kernels import SIMULATED, OutcomeTable, Status
-from boulder_kernels.rules import OF_CRITERION, RULES, RULINGS, VerdictLimits, write_rulings
+from boulder_kernels import SIMULATED, Control, OutcomeTable, Status
+from boulder_kernels.outcomes import empty_outcomes, outcome_table
+from boulder_kernels.rules import OF_CRITERION, RULES, Course, Rows, VerdictLimits, consider_rows
 from boulder_sweep.columns import OUTCOMES, RATINGS, REASONS, VERDICTS, RowKind
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import ERROR, NUMERICAL_ERROR, PASS, UNDECIDED, Judged
@@ -95,14 +96,11 @@ class Limits(NamedTuple):
         """Largest penetration of the required rating [m]."""
         return PENETRATION_LIMITS_M[self.rating]
 
-
-class JudgedOnce(NamedTuple):
-    """What one solution of n rows gives."""
-
-    judged: Judged
-    outcomes: OutcomeTable
-    rule: np.ndarray
-    """The rule that decides each row, one of `boulder_kernels.rules.RULES`, shape (n,)."""
+    @property
+    def of_rules(self) -> VerdictLimits:
+        """Those that decide a verdict, as the kernels take them."""
+        further = (getattr(self.criterion, name) for name in OF_CRITERION)
+        return VerdictLimits(self.rotation, self.penetration, self.guarded, *further)
 
 
 class Facts(NamedTuple):
@@ -163,26 +161,34 @@ def judge(
     Judged
         One verdict a row; no row is dropped.
     """
-    return judge_once(outcomes, designs, limits, only).judged
+    rows = rows_of(designs, limits)
+    consider_rows(rows, np.arange(designs.size), np.stack(outcomes), 0, UNCONFIRMED, limits.of_rules)
+    return judged_rows(rows, designs, limits, only)
 
 
-def judge_once(
-    outcomes: OutcomeTable,
-    designs: Designs,
-    limits: Limits,
-    only: tuple[str, ...] = (),
-    rule: np.ndarray | None = None,
-) -> JudgedOnce:
-    """Apply the rules of this module to n rows, and tell which one decides each; see `judge`.
+UNCONFIRMED = np.zeros((1, len(Control._fields)))
+"""Of a single solution: a control as `consider_rows` takes it that confirms nothing."""
+
+
+def rows_of(designs: Designs, limits: Limits) -> Rows:
+    """Return rows of which no solution is known yet."""
+    table, n = designs.table, designs.size
+    flat, known = np.full(n, float(limits.flat_foot)), designs.has_known_shape.astype(float)
+    sizes = (designs.length, table.H, table.d, table.e_bumper, designs.bed_offset, table.v_0, flat, known)
+    return Rows(empty_outcomes(n), np.zeros((len(Course._fields), n)), np.stack(sizes))
+
+
+def judged_rows(rows: Rows, designs: Designs, limits: Limits, only: tuple[str, ...] = ()) -> Judged:
+    """Return the columns of n rows as their solutions and courses have them.
 
     Parameters
     ----------
-    outcomes, designs, limits, only
+    rows
+        The rows, after `boulder_kernels.rules.consider_rows`.
+    designs, limits, only
         As of `judge`.
-    rule
-        The rule that decides each row, shape (n,), where other simulations decide it than that of `outcomes`.
     """
-    facts = facts_of(outcomes, designs, limits, rule)
+    facts = facts_of(rows, designs, limits)
     columns, words = {}, {}
     for spec in OUTCOMES:
         if only and spec.name not in only:
@@ -199,26 +205,13 @@ def judge_once(
             none = -1 if spec.type == "dictionary" else np.nan
             values = np.where(facts.rows[spec.rows], values, none).astype(values.dtype, copy=False)
         columns[spec.name] = values
-    return JudgedOnce(Judged(columns, words), outcomes, facts.rule)
+    return Judged(columns, words)
 
 
-def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits, rule: np.ndarray | None = None) -> Facts:
-    """Apply the rules; see `judge_once`."""
-    status = np.asarray(outcomes.status)
-    table = designs.table
-    flat = np.full(designs.size, float(limits.flat_foot))
-    known = designs.has_known_shape.astype(float)
-    sizes = np.stack([designs.length, table.H, table.d, table.e_bumper, designs.bed_offset, flat, known])
-    rulings = np.empty((len(RULINGS), len(status)))
-    given = OutcomeTable(status.astype(np.int8), *map(np.ascontiguousarray, outcomes[1:]))
-    if not limits.guarded:
-        unknown = np.full(len(status), np.nan)
-        given = given._replace(theta_error=unknown, x_error=unknown)
-    further = (getattr(limits.criterion, name) for name in OF_CRITERION)
-    held = VerdictLimits(limits.rotation, limits.penetration, *further)
-    write_rulings(given, sizes, held, rulings)
-    rule = rulings[0].astype(np.intp) if rule is None else rule
-    overlap, penetration, margin = rulings[1:]
+def facts_of(rows: Rows, designs: Designs, limits: Limits) -> Facts:
+    """Return what is known of n rows; see `judged_rows`."""
+    outcomes, courses = outcome_table(rows.counted), Course(*rows.courses)
+    status, rule, penetration = outcomes.status, courses.rule.astype(np.intp), courses.penetration
     verdict, reason = _VERDICTS.take(rule), _REASONS.take(rule)
     failed = rule == verdicts.NOT_COMPUTED
     reasons: tuple[str, ...] = REASONS
@@ -239,9 +232,9 @@ def facts_of(outcomes: OutcomeTable, designs: Designs, limits: Limits, rule: np.
             "overturned": overturned,
             "passing": verdict == PASS,
         },
-        overlap=overlap,
+        overlap=courses.overlap,
         penetration=penetration,
-        margin=margin,
+        margin=courses.margin,
         rule=rule,
         verdict=verdict,
         reason=reason,

@@ -18,8 +18,8 @@ from boulder_kernels.table import is_paired
 from boulder_sweep.columns import INPUTS, OPTIONAL_INPUTS, OUTCOMES, TO_BUILD
 from boulder_sweep.designs import LEAST_SOLIDITY, MOST_SOLIDITY, REASONS
 from boulder_sweep.investigation import family_bounds
+from boulder_sweep.judge.accuracy import finer_controls, reported_step_s
 from boulder_sweep.judge.inputs import SOURCES
-from boulder_sweep.judge.refinement import finer_controls, reported_step_s
 from boulder_sweep.judge.validity import FLAGS, has_odd_layers, largest_tested_rotation, tested_of
 from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, STATUS_REASONS
 from boulder_sweep.report import page_records
@@ -262,10 +262,10 @@ def _layout() -> dict[str, Any]:
         "outcome": page_records.OUTCOME,
         "history": page_records.HISTORY,
         "sizes": [
-            *((SOURCES | OF_THE_PAGE).get(name, name) for name in rules.SIZES),
-            *((SOURCES | OF_FLAGS).get(name, name) for name in page_records.FLAG_SIZES),
+            *((SOURCES | OF_THE_PAGE).get(name, name) for name in rules.Sizes._fields),
+            *((SOURCES | OF_FLAGS).get(name, name) for name in rules.FlagInputs._fields),
         ],
-        "rulings": [*rules.RULINGS, "flags", "decided_by"],
+        "rulings": page_records.RULINGS,
         "layer": PRESSURE_SLOPE + 1,  # the last of its columns
         "layer_room": page_records.LAYER_ROOM,
         "piece_room": page_records.PIECE_ROOM,
@@ -280,7 +280,7 @@ def _rules(rotation: float, settings: Mapping[str, Any]) -> dict[str, Any]:
     least, most = family_bounds(ANGLES)
     odd = has_odd_layers(Ground.of_dict(model.get("ground", {})))
     tested = tested_of(model["calibrated_crush_m"], largest_tested_rotation(model["preset"]), odd_layers=odd)
-    limits = [rotation, PENETRATION_LIMITS_M[rating], *(criterion[name] for name in OF_CRITERION)]
+    limits = [rotation, PENETRATION_LIMITS_M[rating], 1.0, *(criterion[name] for name in OF_CRITERION)]
     return {
         "rotation": rotation,
         "rating": rating,

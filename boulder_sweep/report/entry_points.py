@@ -6,70 +6,54 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from boulder_kernels import Control, Design, Outcome, Problem, Readings, Record, simulate
 from boulder_kernels._jit import array_kernel, inlined, when_compiling
-from boulder_kernels.control import STEP_RATIO
+from boulder_kernels.control import STEP_RATIO, control_for, control_in
 from boulder_kernels.design import design_in
-from boulder_kernels.error_estimates import (
-    SAFETY,
-    SAFETY_CONFIRMED,
-    SAFETY_PRINTED,
-    confirm_error,
-    estimate_error,
-    step_errors,
-)
+from boulder_kernels.error_estimates import safety_of, step_errors, take_second
 from boulder_kernels.ground import Ground, put_soil
 from boulder_kernels.impact import simulate_last_resort
-from boulder_kernels.outcomes import COARSER, FINER, NONE_NEEDED, SECOND, STEP, THETA_MAX, write_outcome
+from boulder_kernels.outcomes import NONE_NEEDED, PAIR, SECOND, STEP, outcome_in, write_outcome
 from boulder_kernels.rules import (
+    ASKED_SLOWER,
+    RULE,
     SLOWER_SPEEDS,
-    Confirmation,
-    Ruling,
+    WANTED,
+    Reached,
+    Rows,
     VerdictLimits,
-    after_finer,
-    after_slower,
-    agree,
-    confirmations,
+    consider,
+    course_in,
+    flag_inputs_in,
     flags_of,
-    is_asked_slower,
-    is_wanted,
     limits_in,
-    put_ruling,
-    ruling_of,
+    rule_by_slower,
 )
 from boulder_kernels.soil_laws import SoilProfile, constants_in
 from boulder_kernels.time_history import sample_of, state_of
 from boulder_sweep.report.page_records import (
     BELOW,
-    CHECKED,
     DESIGN_COUNT,
     ELEMENT_ROOM,
     GROUND_COUNT,
     HISTORY_COUNT,
     LAYER_ROOM,
     LIMITS_COUNT,
-    ONCE,
-    PAIRED_AT,
+    OUTCOME_COUNT,
     PIECE_ROOM,
+    READINGS_COUNT,
+    RULE_SIZES,
     RULINGS_COUNT,
     SETTINGS_COUNT,
     SIZES_COUNT,
+    SIZES_V_0,
     V_0,
-    D,
-    H,
-    copy_row,
     elements_from,
-    first_control,
-    flag_inputs_at,
-    given_control,
-    halved_control,
     layers_from,
-    outcome_at,
-    outcomes_from,
     outlined_elements_from,
     pieces_from,
     readings_from,
@@ -206,109 +190,54 @@ def simulate_in_soil(
     return simulate_recorded(by_elements, design, readings, control, record, out, centre)
 
 
+class Given(NamedTuple):
+    """Designs, their soil, and room for that of one of them."""
+
+    designs: np.ndarray
+    layers: np.ndarray
+    outlines: np.ndarray
+    soil_at: Any
+
+
 @array_kernel
-def solve(
-    out: np.ndarray,
-    row: int,
-    designs: np.ndarray,
-    layers: np.ndarray,
-    outlines: np.ndarray,
-    soil_at: Any,
-    readings: Readings,
-    control: Control,
-    record: Record,
-) -> int:
+def solve(out: np.ndarray, row: int, given: Given, readings: Readings, control: Control) -> int:
     """Simulate one design, write its outcome with the error of its steps, and return which second one it needs."""
-    design = design_in(designs, row)
+    design, soil_at = design_in(given.designs, row), given.soil_at
     nothing, nowhere = carray(soil_at, (HISTORY_COUNT, 0)), carray(soil_at, (0,))
-    soil = layers[row], outlines[row], soil_at
+    record = Record(nowhere, carray(soil_at, (0, 6)), nowhere, nowhere, carray(soil_at, (0, 4)))
+    soil = given.layers[row], given.outlines[row], soil_at
     outcome = simulate_in_soil(*soil, design, readings, control, record, nothing, nowhere)
     out[:, row] = np.nan
     write_outcome(out, row, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
-    second_solution = int(out[SECOND, row])  # stands where the step is written
+    second = int(out[SECOND, row])  # stands where the step is written
     out[STEP, row] = control.h / STEP_RATIO if control.refined else control.h
-    return second_solution
+    return second
 
 
 @array_kernel
-def solve_for_error(
-    finer: np.ndarray,
-    coarser: np.ndarray,
-    row: int,
-    designs: np.ndarray,
-    layers: np.ndarray,
-    outlines: np.ndarray,
-    soil_at: Any,
-    settings: np.ndarray,
+def solve_with_error(
+    out: np.ndarray, other: np.ndarray, row: int, given: Given, readings: Readings, control: Control
 ) -> None:
-    """Simulate one design, and estimate its error as its settings, shape (len(SETTINGS),), ask for it; see `solve`.
-
-    The result goes into `finer`, and `coarser` has room for a second solution, both of shape (len(OUTCOME), n).
-    """
-    readings, given, way = readings_from(settings), given_control(settings), int(settings[PAIRED_AT])
-    estimated = given.error_estimate
-    nothing = carray(soil_at, (0,))
-    record = Record(nothing, carray(soil_at, (0, 6)), nothing, nothing, carray(soil_at, (0, 4)))
-    first = first_control(given, estimated)
-    second = solve(finer, row, designs, layers, outlines, soil_at, readings, first, record)
-    if not estimated or way == ONCE or (way == CHECKED and second == NONE_NEEDED):
+    """Simulate one design as `boulder_kernels.table.simulate_table` does; `other` has room for a second solution."""
+    second = solve(out, row, given, readings, control_for(NONE_NEEDED, control))
+    if not control.error_estimate:
         return
-    table, fine, coarse = table_from(designs), outcomes_from(finer), outcomes_from(coarser)
-    if way == CHECKED and second == FINER:
-        solve(coarser, row, designs, layers, outlines, soil_at, readings, halved_control(first), record)
-        if not np.isnan(coarser[THETA_MAX, row]):
-            confirm_error(fine, coarse, table, SAFETY_CONFIRMED, row)
-            copy_row(coarser, finer, row)
-            return
-    solve(coarser, row, designs, layers, outlines, soil_at, readings, first_control(given, False), record)
-    safety = SAFETY if readings.restoring_gravity else SAFETY_PRINTED
-    if way == CHECKED and second == COARSER:
-        confirm_error(coarse, fine, table, safety, row)
-    else:
-        estimate_error(coarse, fine, table, safety, row)
-    # The status of a simulation that continues beyond the limit does not say that it reached it.
-    if np.isnan(coarse.t_limit[row]) != np.isnan(fine.t_limit[row]):
-        fine.theta_error[row] = fine.x_error[row] = np.inf
+    if control.paired:
+        second = PAIR
+    while second != NONE_NEEDED:
+        solve(other, row, given, readings, control_for(second, control))
+        second = take_second(out, row, other, row, second, design_in(given.designs, row), safety_of(readings))
 
 
 @array_kernel
-def decide(
-    counted: np.ndarray,
-    room: np.ndarray,
-    row: int,
-    designs: np.ndarray,
-    layers: np.ndarray,
-    outlines: np.ndarray,
-    soil_at: Any,
-    controls: np.ndarray,
-    sizes: np.ndarray,
-    limits: VerdictLimits,
-) -> tuple[int, int]:
-    """Simulate one design until it is decided; return the rule that decides it, and by which controls; see `rows`.
-
-    The result goes into `counted`, and `room` has room for two more, of shape (2, len(OUTCOME), n).
-    """
-    count, best, tried, coarser = len(controls), outcomes_from(counted), room[0], room[1]
-    solve_for_error(counted, coarser, row, designs, layers, outlines, soil_at, controls[0])
-    rule, decided_by, control = ruling_of(best, sizes, row, limits).rule, 0, given_control(controls[0])
-    confirmation = Confirmation(confirmations(rule, best.t_end[row], control), control.h, False)
-    for k in range(1, count):
-        control = given_control(controls[k])
-        if not is_wanted(confirmation, rule, best.status[row], control):
-            continue
-        solve_for_error(tried, coarser, row, designs, layers, outlines, soil_at, controls[k])
-        finer = outcome_at(tried, row)
-        after = ruling_of(outcomes_from(tried), sizes, row, limits).rule
-        needed = confirmations(after, finer.t_end, control)
-        alike = agree(outcome_at(counted, row), finer, designs[V_0, row])
-        confirmation, replaces = after_finer(confirmation, rule, after, alike, needed, control)
-        if replaces:
-            copy_row(tried, counted, row)
-            rule, decided_by = after, k
-    if confirmation.unconfirmed > 0 and count > 1:
-        best.theta_error[row] = best.x_error[row] = np.inf
-        rule = ruling_of(best, sizes, row, limits).rule
-    return rule, decided_by
+def decide(rows: Rows, room: np.ndarray, row: int, given: Given, settings: np.ndarray, limits: VerdictLimits) -> None:
+    """Simulate one design until it is decided; `room` has room for two solutions, shape (2, len(OUTCOME), n)."""
+    number, controls = 0, settings[:, READINGS_COUNT:]
+    while number < len(settings):
+        readings, control = readings_from(settings[number]), control_in(controls[number])
+        solve_with_error(room[0], room[1], row, given, readings, control)
+        consider(rows, row, room[0], row, number, controls, limits)
+        number = int(rows.courses[WANTED, row])
 
 
 @array_kernel
@@ -354,39 +283,37 @@ def rows(
         PIECE_ROOM (m + points - 2), or for N soil elements ELEMENT_ROOM N + 1.
     controls_at, count
         Settings, shape (count, len(SETTINGS)): the first, and finer ones in the order of
-        `boulder_sweep.judge.refinement.finer_controls`. With one alone a late row counts as it is, and slower trucks
-        are not asked about.
+        `boulder_sweep.judge.accuracy.finer_controls`.
     sizes_at
-        Inputs of the rules and flags, shape (len(SIZES) + len(FLAG_SIZES), n).
+        Inputs of the rules and flags, shape (len(SIZES), n).
     limits_at
         Limits of the criterion, and what the model was tested on, shape (len(LIMITS),).
     outcomes_at, room_at
         Where the results go, shape (len(OUTCOME), n), and room for three times as many.
     rulings_at
-        Where the rulings go, shape (len(RULINGS) + 2, n); below them the flags, and which settings decided.
+        Where the rulings go, shape (len(RULINGS), n), and room for as many.
     """
-    controls, numbers = carray(controls_at, (count, SETTINGS_COUNT)), carray(limits_at, (LIMITS_COUNT,))
+    settings, numbers = carray(controls_at, (count, SETTINGS_COUNT)), carray(limits_at, (LIMITS_COUNT,))
     limits, tested = limits_in(numbers), tested_from(numbers)
     designs, sizes = carray(designs_at, (DESIGN_COUNT, n)), carray(sizes_at, (SIZES_COUNT, n))
     layers, outlines = carray(layers_at, (n, m, 6)), carray(outlines_at, (n, points, 4))
     put_soils(designs, ground_at, below_at, deeper, carray(profile_at, (points, 4)), layers, outlines)
-    room = carray(room_at, (3, 11, n))
-    counted, slower = carray(outcomes_at, (11, n)), room[2]
-    best, rulings = outcomes_from(counted), carray(rulings_at, (RULINGS_COUNT + 2, n))
+    given, flag_inputs = Given(designs, layers, outlines, soil_at), sizes[RULE_SIZES:]
+    room, rulings = carray(room_at, (3, OUTCOME_COUNT, n)), carray(rulings_at, (2, RULINGS_COUNT, n))
+    own = Rows(carray(outcomes_at, (OUTCOME_COUNT, n)), rulings[0, :-1], sizes)
+    slower = Rows(room[2], rulings[1, :-1], sizes)
     for row in range(n):
-        rule, decided_by = decide(counted, room, row, designs, layers, outlines, soil_at, controls, sizes, limits)
-        ratio, v_0 = designs[D, row] / designs[H, row], designs[V_0, row]
-        if count > 1 and is_asked_slower(rule, ratio, best.x_b_max[row]):
+        decide(own, room, row, given, settings, limits)
+        o, v_0 = outcome_in(own.counted, row), designs[V_0, row]
+        if own.courses[ASKED_SLOWER, row] > 0.0:
             for share in SLOWER_SPEEDS:
-                designs[V_0, row] = share * v_0
-                by_slower, _ = decide(slower, room, row, designs, layers, outlines, soil_at, controls, sizes, limits)
-                rule = after_slower(rule, by_slower)
-            designs[V_0, row] = v_0
-        _, overlap, penetration, margin = ruling_of(best, sizes, row, limits)
-        ruling = Ruling(rule, overlap, penetration, margin)
-        put_ruling(ruling, rulings, row)
-        rulings[-2, row] = flags_of(flag_inputs_at(outcome_at(counted, row), ruling.overlap, sizes, row), tested)
-        rulings[-1, row] = decided_by
+                designs[V_0, row] = sizes[SIZES_V_0, row] = share * v_0
+                decide(slower, room, row, given, settings, limits)
+                worst = rule_by_slower(slower.courses[RULE, row])
+                own.courses[RULE, row] = min(own.courses[RULE, row], worst)
+            designs[V_0, row] = sizes[SIZES_V_0, row] = v_0
+        reached = Reached(o.x_b_max, o.crush_max, o.theta_max, course_in(own.courses, row).overlap)
+        rulings[0, -1, row] = flags_of(reached, flag_inputs_in(flag_inputs, row), tested)
 
 
 @array_kernel
@@ -430,8 +357,7 @@ def history(
         Where c_x and c_y go, the common centre of mass of boulder and soil (Eqs 3, 4).
     """
     s = carray(settings_at, (SETTINGS_COUNT,))
-    readings, control = readings_from(s), given_control(s)
-    control = first_control(control, control.error_estimate)
+    readings, control = readings_from(s), control_for(NONE_NEEDED, control_in(s[READINGS_COUNT:]))
     designs = carray(design_from, (DESIGN_COUNT, 1))
     layers, outlines = carray(layers_at, (1, m, 6)), carray(outline_at, (1, points, 4))
     put_soils(designs, ground_at, below_at, deeper, carray(profile_at, (points, 4)), layers, outlines)

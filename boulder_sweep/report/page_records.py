@@ -12,30 +12,31 @@ import numpy as np
 
 from boulder_kernels import Control, Design, DesignTable, OutcomeTable, Readings
 from boulder_kernels._jit import function_of, inlined
-from boulder_kernels.control import EVENT_TOLERANCE
 from boulder_kernels.ground import Ground
 from boulder_kernels.layered import SoilElements, SoilLayers, SoilSums
 from boulder_kernels.outlined import OutlinedElements, OutlinedPieces
-from boulder_kernels.rules import RULINGS, SIZES, FlagInputs, Tested, VerdictLimits
+from boulder_kernels.rules import Course, FlagInputs, Sizes, Tested, VerdictLimits
 
 DESIGN = Design._fields
 """Inputs of a design, in this order; SI, phi in rad, beta in MN/m^3."""
 DESIGN_COUNT = len(DESIGN)
-V_0, D, H = (DESIGN.index(name) for name in ("v_0", "d", "H"))
+V_0 = DESIGN.index("v_0")
+READINGS_COUNT = len(Readings._fields)
 SETTINGS = (*Readings._fields, *Control._fields)
-"""Settings of the simulation, in this order; booleans are 0 or 1."""
+"""Settings of the simulation, in this order; booleans are 0 or 1. Where errors are estimated, ``paired`` says whether
+two solutions are computed of all designs, and not only where they are needed."""
 SETTINGS_COUNT = len(SETTINGS)
-PAIRED_AT = SETTINGS.index("paired")
-CHECKED, PAIRED, ONCE = range(3)
-"""What the setting ``paired`` may be in the page, where errors are estimated: two solutions where they are needed, of
-all designs, or of none."""
 OUTCOME = OutcomeTable._fields
 """Results of a design, in this order; SI, rad."""
+OUTCOME_COUNT = len(OUTCOME)
 LIMITS = (*VerdictLimits._fields, *Tested._fields)
 """Limits of the criterion, and what the model was tested on, in this order; rad, m, kg/m^3."""
-FLAG_SIZES = FlagInputs._fields[FlagInputs._fields.index("L") :]
-"""Inputs of the flags, behind those of the rules."""
-LIMITS_COUNT, SIZES_COUNT, RULINGS_COUNT = len(LIMITS), len(SIZES) + len(FLAG_SIZES), len(RULINGS)
+SIZES = (*Sizes._fields, *FlagInputs._fields)
+"""Inputs of the rules, and behind them those of the flags; SI, the friction angle of the flags in degrees."""
+RULE_SIZES, SIZES_V_0 = len(Sizes._fields), SIZES.index("v_0")
+RULINGS = (*Course._fields, "flags")
+"""What the rules make of a design."""
+LIMITS_COUNT, SIZES_COUNT, RULINGS_COUNT = len(LIMITS), len(SIZES), len(RULINGS)
 HISTORY = (
     *("x_b", "v_b", "theta_b", "omega_b", "x_v", "v_v"),
     *("touching", "F_v"),
@@ -54,54 +55,17 @@ BELOW = 5
 """Numbers of a deeper layer."""
 
 
-def written_out(source: str, **names: Any) -> Callable[..., Any]:
-    """Return a kernel of this module by its source text, with the names it refers to."""
-    function = function_of(source, **names)
+def taking(record: Any, first: int = 0) -> Callable[[np.ndarray], Any]:
+    """Return a kernel that takes a record out of the rows of an array, from one on; a boolean is any other than 0."""
+    kinds = get_type_hints(record).values()
+    fields = [f"s[{first + k}]{' > 0.0' if kind is bool else ''}" for k, kind in enumerate(kinds)]
+    function = function_of(f"def take(s):\n return Record({', '.join(fields)})", Record=record)
     function.__module__ = __name__
     return inlined(function)
 
 
-def taking(record: Any, first: int = 0) -> Callable[[np.ndarray], Any]:
-    """Return a kernel that takes a record out of the rows of an array, from one on; a boolean is any other than 0."""
-    forms = {bool: "s[{}] > 0.0", int: "int(s[{}])"}
-    fields = [forms.get(kind, "s[{}]").format(first + k) for k, kind in enumerate(get_type_hints(record).values())]
-    return written_out(f"def take(s):\n return Record({', '.join(fields)})", Record=record)
-
-
-def changing_control(arguments: str, **changed: str) -> Callable[..., Control]:
-    """Return a kernel that takes a control c and other arguments, and changes fields to expressions of them."""
-    fields = [changed.get(name, f"c.{name}") for name in Control._fields]
-    source = f"def change({arguments}):\n return Control({', '.join(fields)})"
-    return written_out(source, Control=Control)
-
-
-readings_from, given_control = taking(Readings), taking(Control, len(Readings._fields))
-table_from, outcomes_from = taking(DesignTable), taking(OutcomeTable)
+readings_from, table_from = taking(Readings), taking(DesignTable)
 tested_from = taking(Tested, len(VerdictLimits._fields))
-outcome_at = written_out(
-    f"def take(s, row):\n return OutcomeTable({', '.join(f's[{k}, row]' for k in range(len(OUTCOME)))})",
-    OutcomeTable=OutcomeTable,
-)
-"""The results of one design, numbers in place of columns."""
-flag_inputs_at = written_out(
-    "def take(o, overlap, s, row):\n return FlagInputs(o.x_b_max, o.crush_max, o.theta_max, overlap, "
-    f"{', '.join(f's[{k}, row]' for k in range(len(SIZES), len(SIZES) + len(FLAG_SIZES)))})",
-    FlagInputs=FlagInputs,
-)
-"""What the flags of one design depend on."""
-first_control = changing_control("c, refined", refined="refined", paired="False")
-"""Control of a solution, with its step or a third of it."""
-halved_control = changing_control("c", h="0.5 * c.h", locate_yield="True", event_tolerance=repr(EVENT_TOLERANCE))
-"""Control of a second solution, `boulder_kernels.table.halved`."""
-
-
-@inlined
-def copy_row(outcomes: np.ndarray, to: np.ndarray, row: int) -> None:
-    """Copy the results of one design, columns of arrays of shape (len(OUTCOME), n)."""
-    for column in range(outcomes.shape[0]):
-        to[column, row] = outcomes[column, row]
-
-
 LAYER_ROOM = len(SoilLayers._fields) - 1 + len(SoilSums._fields)
 """Numbers for each layer of the soil of a design: enough for the layers, and once for their sums."""
 

@@ -19,6 +19,8 @@ from numba.np import arrayobj
 from .design import Constants, Design, design_in
 from .layered import LayeredConstants
 from .numerics import WIDTH, field, partial_sums, put
+from .outcomes import OutcomeTable, outcome_in
+from .rules import Course, FlagInputs, Reached, Sizes, course_in, flag_inputs_in, reached_in, sizes_in
 from .workspace import (
     CONSTANTS,
     KNOWN,
@@ -288,16 +290,28 @@ def _rows_of(context: Any, builder: Any, kinds: Any, values: Any, first: int, co
     return numbers
 
 
-@type_callable(design_in)
-def _type_design_in(context: Any) -> Callable[..., Any]:
-    def result(designs: Any, row: Any) -> Any:
+def _row_of(function: Any, record: Any) -> None:
+    """Tell Numba of a function that returns a column of an array, from its first row on, as a record."""
+
+    def result(array: Any, row: Any) -> Any:
         """Return the type of the result, or None where a column is not one piece of memory."""
-        return types.NamedUniTuple(designs.dtype, len(Design._fields), Design) if designs.layout == "C" else None
+        return types.NamedUniTuple(array.dtype, len(record._fields), record) if array.layout == "C" else None
 
-    return result
+    def loads(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        """Load its numbers."""
+        numbers = _rows_of(context, builder, sig.args, args, 0, len(record._fields))
+        return context.make_tuple(builder, sig.return_type, numbers)
+
+    type_callable(function)(lambda context: result)
+    lower_builtin(function, types.Array, types.Any)(loads)
 
 
-@lower_builtin(design_in, types.Array, types.Any)
-def _lower_design_in(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    numbers = _rows_of(context, builder, sig.args, args, 0, len(Design._fields))
-    return context.make_tuple(builder, sig.return_type, numbers)
+for _function, _record_of_rows in (
+    (design_in, Design),
+    (outcome_in, OutcomeTable),
+    (course_in, Course),
+    (sizes_in, Sizes),
+    (flag_inputs_in, FlagInputs),
+    (reached_in, Reached),
+):
+    _row_of(_function, _record_of_rows)

@@ -25,7 +25,7 @@ from ._jit import exact_inlined, inlined, kernel
 from .design import Constants
 from .modes import AT_END, TOLERANCE, GapFactors, needs_moment
 from .numerics import sine_versine
-from .outcomes import Status
+from .outcomes import FINER, NONE_NEEDED, Status
 from .soil import Kinematics
 from .soil_laws import soil_reaction
 
@@ -101,6 +101,33 @@ SMALL = 1e-5
 its stiffness: soil with cohesion may be said to yield nowhere, or far away."""
 BEHIND = 1.0 + 0.3 * AT_END * TOLERANCE
 """The step is to end where the net moment is over the couple by this factor."""
+
+
+@inlined
+def control_in(c: np.ndarray) -> Control:
+    """Return the control that an array holds, shape (13,), in the order of its fields; booleans are 0 or 1."""
+    stops, located, refined = c[5] > 0.0, c[6] > 0.0, c[7] > 0.0
+    return Control(
+        c[0], c[1], c[2], int(c[3]), c[4] > 0.0, stops, located, refined, c[8], c[9] > 0.0, c[10] > 0.0, c[11],
+        c[12] > 0.0,
+    )  # fmt: skip
+
+
+@inlined
+def control_for(solution: int, c: Control) -> Control:
+    """Return how a design is solved, first (`NONE_NEEDED`) or for a second solution (`FINER` to `PAIR`).
+
+    Where errors are estimated, first by a third of the step; a doubtful design again by half of that, and by steps that
+    end close to events; any other that has a second solution by the step itself.
+    """
+    finer = solution == FINER
+    h = 0.5 * c.h if finer else c.h
+    refined = finer or solution == NONE_NEEDED if c.error_estimate else c.refined
+    located, tolerance = c.locate_yield or finer, EVENT_TOLERANCE if finer else c.event_tolerance
+    return Control(
+        h, c.horizon, c.theta_limit, c.elements, c.error_estimate, c.stop_at_limit, located, refined,
+        c.longest_horizon, c.last_resort, c.paired, tolerance, c.side_by_side,
+    )  # fmt: skip
 
 
 class Rates(NamedTuple):

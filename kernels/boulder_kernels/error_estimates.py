@@ -9,8 +9,8 @@ The sum cannot see that a motion took a wrong branch, as that of a rocking bould
 adds. Designs to which this may happen are *doubtful* and are solved a second time by half the step. Where it may hardly
 happen but a verdict depends on it, near the limit, a coarser solution confirms the first. Beyond the horizon the
 difference of the two is the error: the sum would grow without end, and further solutions are compared there anyway,
-see `boulder_sweep.judge.refinement`. The numbers below were chosen with one set of random designs and tested with
-others, see `docs/studies/wild.py`. Which design is solved twice, and how, is said in `boulder_kernels.table`.
+see `boulder_kernels.rules`. The numbers below were chosen with one set of random designs and tested with others, see
+`docs/studies/wild.py`.
 """
 
 from __future__ import annotations
@@ -18,8 +18,22 @@ from __future__ import annotations
 import numpy as np
 
 from ._jit import kernel
-from .design import Design, DesignTable
-from .outcomes import COARSER, FINER, LEAST_ROTATION, NONE_NEEDED, PAIR, Outcome, OutcomeTable, Status, StepErrors
+from .design import Design, Readings, design_in
+from .outcomes import (
+    COARSER,
+    FINER,
+    LEAST_ROTATION,
+    NONE_NEEDED,
+    PAIR,
+    THETA_ERROR,
+    X_ERROR,
+    Outcome,
+    OutcomeTable,
+    Status,
+    StepErrors,
+    copy_outcome,
+    outcome_in,
+)
 
 YIELD_PASSED = 1.2e-3
 """Error time, times the length of the steps, where steps pass the instant at which the soil yields [s^2]."""
@@ -138,40 +152,28 @@ def step_errors(o: Outcome, design: Design, theta_limit: float, horizon: float) 
 
 
 @kernel
-def estimate_error(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable, safety: float, row: int) -> None:
-    """Estimate the numerical error of one design; see `estimate_errors`."""
-    limit = Status.LIMIT.value
-    if np.isnan(fine.theta_max[row]):
-        return
-    if np.isnan(coarse.theta_max[row]) or (coarse.status[row] == limit) != (fine.status[row] == limit):
-        fine.theta_error[row] = fine.x_error[row] = np.inf
-        return
-    arm = max(table.d[row], 0.5 * table.H[row])
-    turn = abs(coarse.theta_max[row] - fine.theta_max[row])
-    x = max(abs(coarse.x_b_max[row] - fine.x_b_max[row]), abs(coarse.x_v_max[row] - fine.x_v_max[row]))
-    x = max(x, arm * turn)
-    if fine.status[row] == limit:
-        x = max(x, table.v_0[row] * abs(coarse.t_limit[row] - fine.t_limit[row]))
-        fine.theta_error[row] = 0.0
-    else:
-        fine.theta_error[row] = safety * max(turn, min(x / arm, max(fine.theta_max[row], LEAST_ROTATION)))
-    least = LEAST_LATE_M if fine.t_end[row] > LONG and fine.status[row] != limit else 0.0
-    x = max(x, abs(coarse.crush_max[row] - fine.crush_max[row]))
-    fine.x_error[row] = max(safety * x, least)
+def safety_of(readings: Readings) -> float:
+    """Factor from the difference of two solutions to the error that is reported."""
+    return SAFETY if readings.restoring_gravity else SAFETY_PRINTED
 
 
 @kernel
-def estimate_errors(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable, safety: float) -> None:
-    """Estimate the numerical errors of a table from a coarser solution of it.
+def estimate_error(coarse: OutcomeTable, fine: OutcomeTable, design: Design, safety: float) -> tuple[float, float]:
+    """Estimate the numerical errors of a solution of one design from a coarser one.
 
     Parameters
     ----------
     coarse, fine
-        Solutions with a step and with a third of it; the estimates go into the finer.
-    table
-        The designs.
+        Solutions with a step and with a third of it, or half: numbers in place of columns.
+    design
+        The design.
     safety
         Factor from the difference of the two to the estimate.
+
+    Returns
+    -------
+    theta, x
+        Errors of the rotation [rad] and of the displacements [m] of the finer solution; its own where it failed.
 
     Notes
     -----
@@ -184,31 +186,77 @@ def estimate_errors(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable
     Where only one of the two reached the limit of rotation, or failed, no estimate could be trusted: the error is
     infinite. Where both did, the rotation is the limit itself.
     """
-    for row in range(fine.status.size):
-        estimate_error(coarse, fine, table, safety, row)
+    if np.isnan(fine.theta_max):
+        return fine.theta_error, fine.x_error
+    stopped = fine.status == Status.LIMIT.value
+    if np.isnan(coarse.theta_max) or (coarse.status == Status.LIMIT.value) != stopped:
+        return np.inf, np.inf
+    arm = max(design.d, 0.5 * design.H)
+    turn = abs(coarse.theta_max - fine.theta_max)
+    x = max(abs(coarse.x_b_max - fine.x_b_max), abs(coarse.x_v_max - fine.x_v_max))
+    x = max(x, arm * turn)
+    theta, least = 0.0, 0.0
+    if stopped:
+        x = max(x, design.v_0 * abs(coarse.t_limit - fine.t_limit))
+    else:
+        theta = safety * max(turn, min(x / arm, max(fine.theta_max, LEAST_ROTATION)))
+        if fine.t_end > LONG:
+            least = LEAST_LATE_M
+    x = max(x, abs(coarse.crush_max - fine.crush_max))
+    return theta, max(safety * x, least)
 
 
 @kernel
-def confirm_error(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable, safety: float, row: int) -> None:
-    """Estimate the numerical error of one design that needs two solutions; see `confirm_errors`."""
-    if np.isnan(fine.theta_max[row]):
-        return
-    theta, x = fine.theta_error[row], fine.x_error[row]
-    estimate_error(coarse, fine, table, safety, row)
-    fine.theta_error[row] = max(fine.theta_error[row], theta, LEAST_CONFIRMED_RAD)
-    fine.x_error[row] = max(fine.x_error[row], x, LEAST_CONFIRMED_M)
-
-
-@kernel
-def confirm_errors(coarse: OutcomeTable, fine: OutcomeTable, table: DesignTable, safety: float) -> None:
-    """Estimate the numerical errors of designs that need two solutions: that of the steps, or the difference if larger.
+def take_second(
+    out: np.ndarray, row: int, found: np.ndarray, at: int, solution: int, design: Design, safety: float
+) -> int:
+    """Take a second solution of one design into account, and return which further one is needed.
 
     Parameters
     ----------
-    coarse, fine
-        The solutions, with the errors of their steps; the estimates go into the finer.
-    table, safety
-        As of `estimate_errors`.
+    out, row
+        The solution that counts so far, with the errors of its steps, in an array of `empty_outcomes`. A finer one
+        takes its place, and the errors are those that two solutions have: that of the steps of the finer, or the
+        difference if larger.
+    found, at
+        The second solution, the same way.
+    solution
+        Which one it is, `FINER` to `PAIR`.
+    design, safety
+        As of `estimate_error`.
     """
-    for row in range(fine.status.size):
-        confirm_error(coarse, fine, table, safety, row)
+    first, second = outcome_in(out, row), outcome_in(found, at)
+    finer = solution == FINER
+    if finer and np.isnan(second.theta_max):
+        return PAIR
+    if finer:
+        copy_outcome(found, at, out, row)
+    coarse, fine = (first, second) if finer else (second, first)
+    theta, x = estimate_error(coarse, fine, design, SAFETY_CONFIRMED if finer else safety)
+    if solution != PAIR and not np.isnan(fine.theta_max):
+        theta = max(theta, fine.theta_error, LEAST_CONFIRMED_RAD)
+        x = max(x, fine.x_error, LEAST_CONFIRMED_M)
+    out[THETA_ERROR, row], out[X_ERROR, row] = theta, x
+    return NONE_NEEDED
+
+
+@kernel
+def take_seconds(
+    out: np.ndarray, rows: np.ndarray, found: np.ndarray, needed: np.ndarray, designs: np.ndarray, safety: float
+) -> None:
+    """Take second solutions of some rows of a table into account.
+
+    Parameters
+    ----------
+    out, needed
+        Solutions of n designs, and which second one each needs, shapes (11, n) and (n,); both are written over.
+    rows
+        Numbers of m rows.
+    found, designs
+        Their second solutions and designs, shapes (11, m) and (15, m).
+    safety
+        As of `estimate_error`.
+    """
+    for at in range(rows.size):
+        row = rows[at]
+        needed[row] = take_second(out, row, found, at, int(needed[row]), design_in(designs, at), safety)

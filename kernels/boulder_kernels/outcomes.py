@@ -158,17 +158,27 @@ SECOND = STEP
 
 
 def empty_outcomes(n: int) -> np.ndarray:
-    """Return an array for n outcomes, see `write_outcome`: INVALID and NaN until written."""
+    """Return an array for n outcomes, shape (len(OUTCOME_FIELDS), n): INVALID and NaN until written."""
     out = np.full((ROWS, n), np.nan)
     out[STATUS] = Status.INVALID.value
     return out
 
 
-def outcome_table(out: np.ndarray, step: float) -> OutcomeTable:
-    """Return an array of outcomes as a table, by its step [s]."""
-    steps = np.where(np.isnan(out[T_END]), np.nan, step)
-    columns = (out[STATUS].astype(np.int8), *out[THETA_MAX:STEP], steps)
-    return OutcomeTable(*columns)
+def outcome_table(out: np.ndarray) -> OutcomeTable:
+    """Return an array of outcomes as a table."""
+    return OutcomeTable(out[STATUS].astype(np.int8), *out[THETA_MAX:])
+
+
+def outcome_in(out: np.ndarray, row: int) -> OutcomeTable:
+    """Return one outcome of an array, numbers in place of columns."""
+    return OutcomeTable(*out[:, row])
+
+
+@kernel
+def copy_outcome(found: np.ndarray, at: int, out: np.ndarray, row: int) -> None:
+    """Copy one outcome of an array into another."""
+    for k in range(ROWS):
+        out[k, row] = found[k, at]
 
 
 @kernel

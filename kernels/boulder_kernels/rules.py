@@ -1,21 +1,30 @@
 """Which rule decides a row, which flags it has, and whether another solution has to decide it: for tables and pages.
 
 The rules are in order, the worst first; the first that applies decides the row. `boulder_sweep.judge.verdict` says what
-each means, `boulder_sweep.judge.validity` what the flags mean, and `boulder_sweep.judge.refinement` which rows are
-simulated again, and why. What tells flags and such rows takes arrays of shape (n,) in a table, which calls it as plain
-Python, and numbers of one row in the page of a report, into which it is compiled.
+each means, and `boulder_sweep.judge.validity` what the flags mean. Every function here answers one question about one
+row; `consider` puts them together, and is called after each solution of a row.
+
+**Finer steps** decide rows that were refused for their time steps or are undecided for their error, and confirm late
+ones. A row is *late* if its motion goes on past the horizon. A shallow boulder may rock for seconds, and rocking
+amplifies every error: both solutions from which the error is estimated can follow the same wrong branch, where the
+estimate does not see it. So a late row passes or overturns only if `AGREEING` others agree with it, and fails by how
+far the truck gets only if one does, each with steps at most half as long as those before over the whole motion; until
+they do it is simulated again by finer steps, and is undecided where even the finest differ.
+
+What is still refused by the finest steps is simulated by `boulder_kernels.impact.simulate_last_resort`, whose late rows
+need finer solutions of the same kind.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ._jit import exact_inlined, exact_kernel
-from .control import VALID_ROTATION, Control
+from .control import VALID_ROTATION, Control, control_in
 from .error_estimates import LEAST_LATE_M
-from .outcomes import OutcomeTable, Status
+from .outcomes import THETA_ERROR, X_ERROR, OutcomeTable, Status, copy_outcome, outcome_in
 
 RULES = (
     ("error", ""),  # which has a reason of its own
@@ -45,27 +54,64 @@ class VerdictLimits(NamedTuple):
     """Largest rotation [rad]."""
     penetration: float
     """Largest penetration [m]."""
+    guarded: bool
+    """Whether a row nearer to a limit than its error is undecided."""
     min_overlap_m: float
     """Least overlap of boulder and bumper [m]. It and what follows have the names that they have among the settings."""
 
 
-class Ruling(NamedTuple):
-    """What the rules make of one row; NaN where it was not computed."""
+class Sizes(NamedTuple):
+    """Inputs of a row that the rules take."""
 
-    rule: int
-    """The rule that decides it."""
+    L: float
+    """Distance from where the vehicle strikes the boulder to its far face [m]."""
+    H: float
+    """Height of the boulder [m]."""
+    d: float
+    """Embedment depth [m]."""
+    e_bumper: float
+    """Height of the underside of the bumper [m]."""
+    bed_offset: float
+    """Distance from the front bumper to the leading edge of the cargo bed [m]."""
+    v_0: float
+    """Speed of impact [m/s]."""
+    flat_foot: float
+    """1 or 0: whether the foot of the boulder is flat,"""
+    known_shape: float
+    """and whether what was simulated has its shape."""
+
+
+class Course(NamedTuple):
+    """What the rules make of one row, and how far it is decided while it is solved again by finer steps."""
+
+    rule: float
+    """The rule that decides it by the solution that counts so far."""
     overlap: float
     """Height of the top of the boulder over the underside of the bumper [m]."""
     penetration: float
-    """How far the leading edge of the cargo bed came past the far face of the boulder [m]."""
+    """How far the leading edge of the cargo bed came past the far face of the boulder [m]; NaN where not computed."""
     margin: float
-    """Least (limit - value) / limit of rotation and penetration [-]."""
+    """Least (limit - value) / limit of rotation and penetration [-]; NaN where not computed."""
+    decided_by: float
+    """Number of the control by which it was solved."""
+    unconfirmed: float
+    """Number of further solutions that must agree with it."""
+    compared_s: float
+    """Step of the last solution compared or taken over [s]."""
+    given_up: float
+    """1 where the last resort has refused it, or 0."""
+    wanted: float
+    """Number of the control by which it is to be solved next; where it is decided, how many there are."""
+    asked_slower: float
+    """1 where slower trucks decide it, too, or 0."""
 
 
 OF_CRITERION = VerdictLimits._fields[VerdictLimits._fields.index("min_overlap_m") :]
 """Limits that are settings of the criterion as they are."""
-RULINGS = Ruling._fields
-"""Rows of the array of `write_rulings`."""
+RULE, DECIDED_BY, WANTED, ASKED_SLOWER = (
+    Course._fields.index(name) for name in ("rule", "decided_by", "wanted", "asked_slower")
+)
+"""Rows of an array of courses."""
 SHALLOW_RATIO, SHALLOW_SLIDE = 0.45, 0.3
 """A boulder with less depth over height that slides by more [m] may stop a truck and be overturned by a slower one,
 which does not push it aside as far: among the passes of the realistic ranges every such boulder is one of these."""
@@ -74,15 +120,22 @@ SLOWER_SPEEDS = (*(k / 50.0 for k in range(49, 24, -1)), 0.4, 0.3)
 ISLAND_RATIO, ISLAND_SLIDE = 0.35, 0.5
 """With still less depth over height, and a longer slide [m], the speeds at which it stands can be 1 % wide: finer than
 these steps. Such a boulder is not a pass."""
-SIZES = ("L", "H", "d", "e_bumper", "bed_offset", "flat_foot", "known_shape")
-"""Rows of the array of inputs that it takes; the last two are 1 or 0: whether the foot of the boulder is flat, and
-whether what was simulated has its shape."""
+
+
+def sizes_in(sizes: np.ndarray, row: int) -> Sizes:
+    """Return the inputs of one row, of an array whose first rows are the fields of `Sizes`."""
+    return Sizes(*sizes[: len(Sizes._fields), row])
+
+
+def course_in(courses: np.ndarray, row: int) -> Course:
+    """Return the course of one row, of an array whose rows are the fields of `Course`."""
+    return Course(*courses[:, row])
 
 
 @exact_inlined
 def limits_in(values: np.ndarray) -> VerdictLimits:
     """Return the limits that an array holds, in the order of `VerdictLimits`."""
-    return VerdictLimits(values[0], values[1], values[2])
+    return VerdictLimits(values[0], values[1], values[2] > 0.0, values[3])
 
 
 @exact_inlined
@@ -98,112 +151,90 @@ def is_simulated(status: int) -> bool:
     )
 
 
-@exact_inlined
-def ruling_of(o: OutcomeTable, sizes: np.ndarray, row: int, limits: VerdictLimits) -> Ruling:
-    """Apply the rules to one row; arguments: see `write_rulings`."""
-    status, theta, x_v, crush = o.status[row], o.theta_max[row], o.x_v_max[row], o.crush_max[row]
-    bed_offset = sizes[4, row]
-    overlap = sizes[1, row] - sizes[2, row] - sizes[3, row]
-    penetration = x_v - bed_offset - sizes[0, row]
-    room = limits.penetration - penetration
-    margin = min((limits.rotation - theta) / limits.rotation, room / limits.penetration)
-    finite = (
-        np.isfinite(theta)
-        and np.isfinite(o.x_b_max[row])
-        and np.isfinite(x_v)
-        and np.isfinite(o.F_v_max[row])
-        and np.isfinite(crush)
-        and np.isfinite(o.t_end[row])
-    )
-    unproved = status == Status.HORIZON.value or status == Status.OUTWARD.value or status == Status.UNPROVABLE.value
-    ratio, slide = sizes[2, row] / sizes[1, row], o.x_b_max[row]
-    outside = theta > VALID_ROTATION or (ratio < ISLAND_RATIO and slide > ISLAND_SLIDE)
-    # Where only one of two solutions overturns, or no others confirm a late row, the error is infinite, and nothing is
-    # decided.
-    known = not np.isinf(o.theta_error[row])
-    reached = status == Status.LIMIT.value or theta >= limits.rotation
-    unsure = limits.rotation - theta < o.theta_error[row] or min(room, bed_offset - crush) < o.x_error[row]
-    if status == Status.NO_CONTACT.value:
-        rule = NO_CONTACT
-    elif not (is_simulated(status) and finite):
-        rule = NOT_COMPUTED
-    elif reached and known:
-        rule = OVERTURNS
-    elif penetration > limits.penetration and known:
-        rule = PENETRATION
-    elif sizes[5, row] == 0.0:
-        rule = FOOT
-    elif sizes[6, row] == 0.0:
-        rule = SHAPE
-    elif crush > bed_offset:
-        rule = CRUSH
-    elif overlap < limits.min_overlap_m:
-        rule = OVERRIDE
-    elif unproved:
-        rule = UNPROVED
-    elif unsure:
-        rule = NUMERICAL_ERROR
-    elif outside:
-        rule = VALIDITY
-    else:
-        rule = PASSES
-    return Ruling(rule, overlap, penetration, margin)
+@exact_kernel
+def is_known(o: OutcomeTable) -> bool:
+    """Whether a solution of a row has all that is reported of it."""
+    finite = np.isfinite(o.theta_max) and np.isfinite(o.x_b_max) and np.isfinite(o.x_v_max)
+    finite = finite and np.isfinite(o.F_v_max) and np.isfinite(o.crush_max) and np.isfinite(o.t_end)
+    return is_simulated(o.status) and finite
 
 
 @exact_inlined
-def put_ruling(ruling: Ruling, out: np.ndarray, row: int) -> None:
-    """Write what the rules make of one row into a column of an array, see `RULINGS`."""
-    out[0, row] = ruling.rule
-    out[1, row] = ruling.overlap
-    out[2, row] = ruling.penetration
-    out[3, row] = ruling.margin
+def penetration_of(o: OutcomeTable, sizes: Sizes) -> float:
+    """How far the leading edge of the cargo bed comes past the far face of the boulder [m]."""
+    return o.x_v_max - sizes.bed_offset - sizes.L
+
+
+@exact_inlined
+def overlap_of(sizes: Sizes) -> float:
+    """Height of the top of the boulder over the underside of the bumper [m]."""
+    return sizes.H - sizes.d - sizes.e_bumper
+
+
+@exact_inlined
+def margin_of(o: OutcomeTable, sizes: Sizes, limits: VerdictLimits) -> float:
+    """Least (limit - value) / limit of rotation and penetration [-]."""
+    room = limits.penetration - penetration_of(o, sizes)
+    return min((limits.rotation - o.theta_max) / limits.rotation, room / limits.penetration)
 
 
 @exact_kernel
-def write_rulings(o: OutcomeTable, sizes: np.ndarray, limits: VerdictLimits, out: np.ndarray) -> None:
-    """Apply the rules to n rows.
+def rule_of(o: OutcomeTable, sizes: Sizes, limits: VerdictLimits) -> int:
+    """Return the rule that decides a row.
 
     Parameters
     ----------
     o
-        What the simulations gave, arrays of shape (n,).
-    sizes
-        Inputs of the same rows, see `SIZES`, shape (len(SIZES), n).
-    limits
-        Limits of the criterion.
-    out
-        Where the rulings go, shape (len(RULINGS), n).
+        A solution of it, numbers in place of columns.
+    sizes, limits
+        Its inputs, and the limits of the criterion.
     """
-    for row in range(out.shape[1]):
-        put_ruling(ruling_of(o, sizes, row, limits), out, row)
+    penetration = penetration_of(o, sizes)
+    if o.status == Status.NO_CONTACT.value:
+        return NO_CONTACT
+    if not is_known(o):
+        return NOT_COMPUTED
+    # Where only one of two solutions overturns, or no others confirm a late row, the error is infinite, and nothing is
+    # decided.
+    if not (limits.guarded and np.isinf(o.theta_error)):
+        if o.status == Status.LIMIT.value or o.theta_max >= limits.rotation:
+            return OVERTURNS
+        if penetration > limits.penetration:
+            return PENETRATION
+    if sizes.flat_foot == 0.0:
+        return FOOT
+    if sizes.known_shape == 0.0:
+        return SHAPE
+    if o.crush_max > sizes.bed_offset:
+        return CRUSH
+    if overlap_of(sizes) < limits.min_overlap_m:
+        return OVERRIDE
+    if o.status == Status.HORIZON.value or o.status == Status.OUTWARD.value or o.status == Status.UNPROVABLE.value:
+        return UNPROVED
+    room = min(limits.penetration - penetration, sizes.bed_offset - o.crush_max)
+    if limits.guarded and (limits.rotation - o.theta_max < o.theta_error or room < o.x_error):
+        return NUMERICAL_ERROR
+    if o.theta_max > VALID_ROTATION or (sizes.d / sizes.H < ISLAND_RATIO and o.x_b_max > ISLAND_SLIDE):
+        return VALIDITY
+    return PASSES
 
 
 @exact_inlined
-def is_asked_slower(rule: Any, ratio: Any, slide: Any) -> Any:
-    """Whether slower trucks decide a row: one that would pass, shallow, and slides.
-
-    Parameters
-    ----------
-    rule
-        The rule that decides it so far; a number, or an array of shape (n,) as what follows.
-    ratio
-        Embedment depth over height [-].
-    slide
-        Largest displacement [m].
-    """
-    return ((rule == PASSES) | (rule == VALIDITY)) & (ratio < SHALLOW_RATIO) & (slide > SHALLOW_SLIDE)
+def is_asked_slower(rule: int, o: OutcomeTable, sizes: Sizes) -> bool:
+    """Whether slower trucks decide a row, too: one that would pass, shallow, and slides."""
+    shallow, slides = sizes.d / sizes.H < SHALLOW_RATIO, o.x_b_max > SHALLOW_SLIDE
+    return (rule == PASSES or rule == VALIDITY) and shallow and slides
 
 
 @exact_inlined
-def after_slower(rule: Any, slower: Any) -> Any:
-    """Return the rule that decides a row after one more slower truck, itself decided by the rule `slower`.
+def rule_by_slower(slower: int) -> int:
+    """Return the worst rule that may decide a row of which a slower truck is decided by the rule `slower`.
 
     A truck that a slower one would fail against fails; where a slower one is undecided, so is the row, for that reason.
     """
-    fails = (slower >= NO_CONTACT) & (slower <= SLOWER_TRUCK)
-    unknown = slower == NOT_COMPUTED
-    reason = fails * SLOWER_TRUCK + unknown * NUMERICAL_ERROR + (1 - fails - unknown) * slower
-    return np.minimum(rule, reason)
+    if slower == NOT_COMPUTED:
+        return NUMERICAL_ERROR
+    return SLOWER_TRUCK if slower <= SLOWER_TRUCK else slower
 
 
 FLAGS = ("crush", "rotation", "size", "embedment", "rock_density", "soil_pair", "overlap", "slides", "vehicle", "soil")
@@ -258,65 +289,111 @@ class Tested(NamedTuple):
     """Strain rate factor [-]."""
 
 
-class FlagInputs(NamedTuple):
-    """What the flags of a row depend on; numbers of one row, or arrays."""
+class Reached(NamedTuple):
+    """What the flags of a row depend on of what it reaches."""
 
-    slide: Any
+    slide: float
     """Largest displacement [m]."""
-    crush: Any
+    crush: float
     """Largest crush [m]."""
-    theta: Any
+    theta: float
     """Largest rotation [rad]."""
-    overlap: Any
-    """As of `Ruling` [m]."""
-    L: Any
-    W: Any
-    H: Any
+    overlap: float
+    """As of `Course` [m]."""
+
+
+class FlagInputs(NamedTuple):
+    """What they depend on of its inputs."""
+
+    L: float
+    W: float
+    H: float
     """Sides of the boulder [m]."""
-    d: Any
+    d: float
     """Embedment depth [m]."""
-    rock: Any
+    rock: float
     """Density of its rock [kg/m^3]."""
-    beta: Any
-    least_beta: Any
-    most_beta: Any
+    beta: float
+    least_beta: float
+    most_beta: float
     """Constant of subgrade reaction, and between which the friction angle has it [MN/m^3]."""
-    m_v: Any
-    v_0: Any
-    k_v: Any
-    c_v: Any
+    m_v: float
+    v_0: float
+    k_v: float
+    c_v: float
     """Mass, speed, spring and damper of the vehicle, SI."""
-    phi_deg: Any
-    rho_s: Any
-    K_epsilon: Any
+    phi_deg: float
+    rho_s: float
+    K_epsilon: float
     """Friction angle [deg], density [kg/m^3] and strain rate factor of the soil, as they were given."""
 
 
+def reached_in(reached: np.ndarray, row: int) -> Reached:
+    """Return what one row reaches, of an array whose rows are the fields of `Reached`."""
+    return Reached(*reached[:, row])
+
+
+def flag_inputs_in(inputs: np.ndarray, row: int) -> FlagInputs:
+    """Return the inputs of one row, of an array whose rows are the fields of `FlagInputs`."""
+    return FlagInputs(*inputs[:, row])
+
+
 @exact_inlined
-def flags_of(r: FlagInputs, t: Tested) -> Any:
+def is_outside(value: float, least: float, most: float) -> bool:
+    """Whether a value lies outside a range."""
+    return value < least or value > most
+
+
+@exact_inlined
+def flags_of(o: Reached, r: FlagInputs, t: Tested) -> int:
     """Flags of a row, bits of a whole number in the order of `FLAGS`."""
-    length, width, height, ratio = r.L, r.W, r.H, r.d / r.H
-    size = (length < t.least_L) | (length > t.most_L) | (width < t.least_W) | (width > t.most_W)
-    size = size | (height < t.least_H) | (height > t.most_H)
-    rate, damping = np.sqrt(r.k_v / r.m_v), r.c_v / np.sqrt(r.k_v * r.m_v)
-    vehicle = (r.m_v < t.least_m_v) | (r.m_v > t.most_m_v) | (r.v_0 < t.least_v_0) | (r.v_0 > t.most_v_0)
-    vehicle = vehicle | (rate < t.least_rate) | (rate > t.most_rate)
-    vehicle = vehicle | (damping < t.least_damping) | (damping > t.most_damping)
-    soil = (r.phi_deg < t.least_phi_deg) | (r.phi_deg > t.most_phi_deg)
-    soil = soil | (r.rho_s < t.least_rho_s) | (r.rho_s > t.most_rho_s)
-    soil = soil | (r.K_epsilon < t.least_K_epsilon) | (r.K_epsilon > t.most_K_epsilon)
-    return (
-        1 * (r.crush > t.crush)
-        + 2 * (r.theta > t.rotation)
-        + 4 * size
-        + 8 * ((ratio < t.least_ratio) | (ratio > t.most_ratio))
-        + 16 * ((r.rock < t.least_rock) | (r.rock > t.most_rock))
-        + 32 * ((r.beta < r.least_beta) | (r.beta > r.most_beta))
-        + 64 * (r.overlap < t.overlap)
-        + 128 * (r.slide > ISLAND_SLIDE)
-        + 256 * vehicle
-        + 512 * soil
-    )
+    flags = 0
+    if o.crush > t.crush:
+        flags |= 1
+    if o.theta > t.rotation:
+        flags |= 2
+    if is_outside(r.L, t.least_L, t.most_L) or is_outside(r.W, t.least_W, t.most_W):
+        flags |= 4
+    if is_outside(r.H, t.least_H, t.most_H):
+        flags |= 4
+    if is_outside(r.d / r.H, t.least_ratio, t.most_ratio):
+        flags |= 8
+    if is_outside(r.rock, t.least_rock, t.most_rock):
+        flags |= 16
+    if is_outside(r.beta, r.least_beta, r.most_beta):
+        flags |= 32
+    if o.overlap < t.overlap:
+        flags |= 64
+    if o.slide > ISLAND_SLIDE:
+        flags |= 128
+    if is_outside(r.m_v, t.least_m_v, t.most_m_v) or is_outside(r.v_0, t.least_v_0, t.most_v_0):
+        flags |= 256
+    if is_outside(np.sqrt(r.k_v / r.m_v), t.least_rate, t.most_rate):
+        flags |= 256
+    if is_outside(r.c_v / np.sqrt(r.k_v * r.m_v), t.least_damping, t.most_damping):
+        flags |= 256
+    if is_outside(r.phi_deg, t.least_phi_deg, t.most_phi_deg) or is_outside(r.rho_s, t.least_rho_s, t.most_rho_s):
+        flags |= 512
+    if is_outside(r.K_epsilon, t.least_K_epsilon, t.most_K_epsilon):
+        flags |= 512
+    return flags
+
+
+@exact_kernel
+def write_flags(reached: np.ndarray, inputs: np.ndarray, tested: Tested, out: np.ndarray) -> None:
+    """Raise the flags of n rows.
+
+    Parameters
+    ----------
+    reached, inputs
+        Rows are the fields of `Reached` and of `FlagInputs`, shape (·, n).
+    tested
+        What the model was tested on.
+    out
+        Where the flags go, whole numbers, shape (n,).
+    """
+    for row in range(out.size):
+        out[row] = flags_of(reached_in(reached, row), flag_inputs_in(inputs, row), tested)
 
 
 FIRST_FACTOR = 0.5
@@ -330,89 +407,141 @@ SAME_ANGLE, SAME_WAY = 1e-6, LEAST_LATE_M
 less than this [rad], [m]: with the shortest steps the estimate falls below the rounding that late motion amplifies."""
 
 
-class Confirmation(NamedTuple):
-    """How far a row is decided while it is simulated again by finer steps; numbers of one row, or arrays."""
-
-    unconfirmed: Any
-    """Number of further solutions that must agree with what counts so far."""
-    compared_s: Any
-    """Step of the last solution compared or taken over [s]."""
-    given_up: Any
-    """Whether the last resort has refused it."""
-
-
 @exact_inlined
-def confirmations(rule: Any, t_end: Any, control: Control) -> Any:
-    """Return how many others must agree with a late row before it passes, with or without `VALIDITY`, or fails.
+def confirmations(rule: int, t_end: float, control: Control) -> int:
+    """Return how many others must agree with a solution of a row before it passes or fails.
 
-    One is enough for how far the truck gets: nothing amplifies its error. `AGREEING` must for what rocking decides.
-    Never where errors are not confirmed, as by ``fast``.
+    `AGREEING` must for what rocking decides, passes with or without `VALIDITY` among it. One is enough for how far the
+    truck gets: nothing amplifies its error. None where the row is not late, nor where errors are not confirmed, as by
+    ``fast``.
     """
-    late = control.error_estimate & (t_end > control.horizon)
-    rocking = (rule == PASSES) | (rule == VALIDITY) | (rule == OVERTURNS)
-    return late * (AGREEING * rocking + (rule == PENETRATION))
+    if not (control.error_estimate and t_end > control.horizon):
+        return 0
+    if rule == PASSES or rule == VALIDITY or rule == OVERTURNS:
+        return AGREEING
+    return 1 if rule == PENETRATION else 0
 
 
 @exact_inlined
-def is_wanted(row: Confirmation, rule: Any, status: Any, control: Control) -> Any:
+def is_wanted(row: Course, status: int, control: Control) -> bool:
     """Whether a solution by a control may decide or confirm a row.
 
     Where errors are not confirmed, as by ``fast``, rows nearer to a limit than their error stay undecided.
     """
-    refused = (status >= Status.UNSTABLE.value) & (status <= Status.LITTLE_INERTIA.value)
-    refused = refused & (status != Status.INVALID.value)
-    asks = control.error_estimate and not control.last_resort
-    may_decide = (refused | (asks & (rule == NUMERICAL_ERROR))) & np.logical_not(row.given_up)
+    if row.given_up == 0.0:
+        refused = Status.UNSTABLE.value <= status <= Status.LITTLE_INERTIA.value and status != Status.INVALID.value
+        unsure = row.rule == NUMERICAL_ERROR and control.error_estimate and not control.last_resort
+        if refused or unsure:
+            return True
     # The last resort begins with longer steps than the usual ones end with.
-    is_finer = control.h <= FIRST_FACTOR * row.compared_s
-    return may_decide | ((row.unconfirmed > 0) & is_finer)
+    return row.unconfirmed > 0.0 and control.h <= FIRST_FACTOR * row.compared_s
 
 
-@exact_inlined
-def agree(coarse: OutcomeTable, fine: OutcomeTable, v_0: Any) -> Any:
+@exact_kernel
+def agree(coarse: OutcomeTable, fine: OutcomeTable, v_0: float) -> bool:
     """Whether two solutions of a row end alike.
 
     Parameters
     ----------
     coarse, fine
-        Solutions whose steps differ by a factor of two or more, each with its estimated errors; tables, or the numbers
-        of one row.
+        Solutions whose steps differ by a factor of two or more, each with its estimated errors; numbers in place of
+        columns.
     v_0
         Speed of impact [m/s]: an error of the displacement is one of the time, too, see
-        `boulder_kernels.error_estimates.estimate_errors`.
+        `boulder_kernels.error_estimates.estimate_error`.
     """
-    way = np.maximum(coarse.x_error, SAME_WAY)
     limit = coarse.status == Status.LIMIT.value
-    alike = limit == (fine.status == Status.LIMIT.value)
-    in_time = v_0 * np.abs(coarse.t_limit - fine.t_limit) <= way
-    in_angle = np.abs(coarse.theta_max - fine.theta_max) <= np.maximum(coarse.theta_error, SAME_ANGLE)
-    in_place = (np.abs(coarse.x_b_max - fine.x_b_max) <= way) & (np.abs(coarse.x_v_max - fine.x_v_max) <= way)
-    stands_alike = np.logical_not(limit) & in_angle & in_place
-    return alike & np.isfinite(fine.x_error) & ((limit & in_time) | stands_alike)
+    if limit != (fine.status == Status.LIMIT.value) or not np.isfinite(fine.x_error):
+        return False
+    way = max(coarse.x_error, SAME_WAY)
+    if limit:
+        return v_0 * abs(coarse.t_limit - fine.t_limit) <= way
+    in_place = abs(coarse.x_b_max - fine.x_b_max) <= way and abs(coarse.x_v_max - fine.x_v_max) <= way
+    return in_place and abs(coarse.theta_max - fine.theta_max) <= max(coarse.theta_error, SAME_ANGLE)
 
 
 @exact_inlined
-def after_finer(
-    row: Confirmation, before: Any, after: Any, alike: Any, needed: Any, control: Control
-) -> tuple[Confirmation, Any]:
-    """Return how far a row is decided after one more solution, and whether that takes the place of what counts so far.
+def confirms(row: Course, rule: int, counted: OutcomeTable, found: OutcomeTable, v_0: float) -> bool:
+    """Whether a finer solution of a row, by which `rule` decides it, confirms the one that counts so far."""
+    same = (row.rule == PASSES) == (rule == PASSES) and (row.rule <= PENETRATION) == (rule <= PENETRATION)
+    return row.unconfirmed > 0.0 and same and agree(counted, found, v_0)
+
+
+class Rows(NamedTuple):
+    """Many rows on their way to a verdict."""
+
+    counted: np.ndarray
+    """The solutions that count so far, shape (11, n), see `boulder_kernels.outcomes.empty_outcomes`."""
+    courses: np.ndarray
+    """How far they are decided, shape (len(Course._fields), n)."""
+    sizes: np.ndarray
+    """Their inputs; the first rows are the fields of `Sizes`, shape (·, n)."""
+
+
+@exact_kernel
+def put_course(courses: np.ndarray, row: int, c: Course) -> None:
+    """Write the course of one row into a column of an array."""
+    courses[0, row], courses[1, row], courses[2, row], courses[3, row] = c.rule, c.overlap, c.penetration, c.margin
+    courses[4, row], courses[5, row], courses[6, row] = c.decided_by, c.unconfirmed, c.compared_s
+    courses[7, row], courses[8, row], courses[9, row] = c.given_up, c.wanted, c.asked_slower
+
+
+@exact_inlined
+def next_wanted(row: Course, status: int, number: int, controls: np.ndarray) -> int:
+    """Return the number of the first control from one on by which a row is to be solved; how many there are if none."""
+    while number < len(controls) and not is_wanted(row, status, control_in(controls[number])):
+        number += 1
+    return number
+
+
+@exact_kernel
+def consider(
+    rows: Rows, row: int, found: np.ndarray, at: int, number: int, controls: np.ndarray, limits: VerdictLimits
+) -> None:
+    """Take one more solution of a row into account: it confirms what counts so far, or takes its place.
 
     Parameters
     ----------
-    row
-        How far it was decided.
-    before, after
-        The rule that decides what counts so far, and that of the new solution. One that cannot be computed changes
-        nothing, but the last resort is not tried again.
-    alike
-        Whether the two agree, see `agree`.
-    needed, control
-        How many others must agree with the new solution, see `confirmations`, and how it was simulated.
+    rows, row
+        The rows, and the number of the one that was solved. Its course says which solution it needs next.
+    found, at
+        The solution, in an array of `boulder_kernels.outcomes.empty_outcomes`. One that cannot be computed changes
+        nothing but the first time; the last resort is not tried again.
+    number, controls
+        By which control it was solved, and all that there are, shape (count, 13), see `control_in`: each finer than
+        the one before. A row is decided where no further one is wanted; it has an unknown error where there are not
+        enough of them to confirm it.
+    limits
+        Limits of the criterion.
     """
-    failed = after == NOT_COMPUTED
-    same = ((before == PASSES) == (after == PASSES)) & ((before <= PENETRATION) == (after <= PENETRATION))
-    confirmed = same & alike & (row.unconfirmed > 0)
-    replaces = np.logical_not(failed | confirmed)
-    unconfirmed = (row.unconfirmed - confirmed) * np.logical_not(replaces) + needed * replaces
-    compared_s = failed * row.compared_s + np.logical_not(failed) * control.h
-    return Confirmation(unconfirmed, compared_s, control.last_resort & failed), replaces
+    sizes, control, solution = sizes_in(rows.sizes, row), control_in(controls[number]), outcome_in(found, at)
+    before, counted = course_in(rows.courses, row), outcome_in(rows.counted, row)
+    rule, decided_by = float(rule_of(solution, sizes, limits)), float(number)
+    failed = number > 0 and rule == NOT_COMPUTED
+    confirmed = number > 0 and confirms(before, rule, counted, solution, sizes.v_0)
+    if failed or confirmed:
+        solution, rule, decided_by = counted, before.rule, before.decided_by
+        unconfirmed = before.unconfirmed - 1.0 if confirmed else before.unconfirmed
+    else:
+        copy_outcome(found, at, rows.counted, row)
+        unconfirmed = float(confirmations(rule, solution.t_end, control))
+    compared_s, given_up = before.compared_s if failed else control.h, 1.0 if failed and control.last_resort else 0.0
+    penetration, margin = penetration_of(solution, sizes), margin_of(solution, sizes, limits)
+    overlap = overlap_of(sizes)
+    course = Course(rule, overlap, penetration, margin, decided_by, unconfirmed, compared_s, given_up, 0.0, 0.0)
+    wanted = next_wanted(course, solution.status, number + 1, controls)
+    if wanted == len(controls) and unconfirmed > 0.0:
+        rows.counted[THETA_ERROR, row] = rows.counted[X_ERROR, row] = np.inf
+        rule = float(rule_of(outcome_in(rows.counted, row), sizes, limits))
+    put_course(rows.courses, row, course)
+    rows.courses[RULE, row], rows.courses[WANTED, row] = rule, wanted
+    rows.courses[ASKED_SLOWER, row] = is_asked_slower(rule, solution, sizes)
+
+
+@exact_kernel
+def consider_rows(
+    rows: Rows, some: np.ndarray, found: np.ndarray, number: int, controls: np.ndarray, limits: VerdictLimits
+) -> None:
+    """Take one more solution of some rows into account, whose numbers are given, shape (m,); see `consider`."""
+    for at in range(some.size):
+        consider(rows, some[at], found, at, number, controls, limits)

@@ -7,16 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ._jit import array_kernel, kernel, plain, unless_none
-from .control import EVENT_TOLERANCE, STEP_RATIO, Control
+from .control import STEP_RATIO, Control, control_for
 from .design import DesignTable, Readings, design_at, design_in
-from .error_estimates import (
-    SAFETY,
-    SAFETY_CONFIRMED,
-    SAFETY_PRINTED,
-    confirm_errors,
-    estimate_errors,
-    step_errors,
-)
+from .error_estimates import safety_of, step_errors, take_seconds
 from .impact import Problem, simulate, simulate_last_resort
 from .lanes import simulate_lanes
 from .layered import (
@@ -29,8 +22,11 @@ from .layered import (
 from .outcomes import (
     COARSER,
     FINER,
+    NONE_NEEDED,
     PAIR,
     SECOND,
+    STEP,
+    T_END,
     OutcomeTable,
     empty_outcomes,
     outcome_table,
@@ -174,16 +170,24 @@ def is_taper(layers: np.ndarray, outlines: np.ndarray) -> bool:
     return layers.shape[1] + outlines.shape[1] == 3 and not layers[:, :, PRESSURE].any()
 
 
-def simulate_once(table: DesignTable, readings: Readings, control: Control) -> tuple[OutcomeTable, np.ndarray]:
-    """Simulate every design of a table once: in lanes where they can be, else one by one.
+def solve(table: DesignTable, readings: Readings, control: Control) -> tuple[np.ndarray, np.ndarray]:
+    """Solve every design of a table once: in lanes where they can be, else one by one.
 
     Returns
     -------
-    OutcomeTable
-        With the errors of the steps of one solution.
-    ndarray, shape (n,)
+    out : ndarray, shape (11, n)
+        Rows in the order of `OutcomeTable`, with the errors of the steps of one solution.
+    second : ndarray, shape (n,)
         Which second solution each of them needs, see `boulder_kernels.outcomes.StepErrors`.
     """
+    out = _solved(table, readings, control)
+    second = out[SECOND].copy()
+    out[STEP] = np.where(np.isnan(out[T_END]), np.nan, step_of_solution(control))
+    return out, second
+
+
+def _solved(table: DesignTable, readings: Readings, control: Control) -> np.ndarray:
+    """Return outcomes as `boulder_kernels.outcomes.write_outcome` leaves them."""
     n = len(table.L)
     designs = np.stack(table[: len(DesignTable._fields)])
     layers: np.ndarray | None = getattr(table, "layers", None)
@@ -192,19 +196,17 @@ def simulate_once(table: DesignTable, readings: Readings, control: Control) -> t
     if control.last_resort and layers is None:
         out = empty_outcomes(n)
         run_last_resort(designs, readings, control, no_record(), out)
-        return outcome_table(out, step_of_solution(control)), out[SECOND]
+        return out
     given = given_to_lanes(designs, layers, outlines) if side_by_side else None
     if given is not None:
-        out = simulate_lanes(given.designs, readings, control, given.soil, given.parts)
-    elif not n:
-        out = empty_outcomes(0)
-    else:
-        soil = None
-        if layers is not None:
-            outline = None if outlines is None else outlines[0]
-            soil = empty_soil(layers.shape[1], control.elements, outline)
-        out = simulate_rows(designs, layers, outlines, soil, readings, control)
-    return outcome_table(out, step_of_solution(control)), out[SECOND]
+        return simulate_lanes(given.designs, readings, control, given.soil, given.parts)
+    if not n:
+        return empty_outcomes(0)
+    soil = None
+    if layers is not None:
+        outline = None if outlines is None else outlines[0]
+        soil = empty_soil(layers.shape[1], control.elements, outline)
+    return simulate_rows(designs, layers, outlines, soil, readings, control)
 
 
 def is_layered(table: Any) -> bool:
@@ -224,47 +226,9 @@ def is_paired(readings: Readings, control: Control, *, layered: bool) -> bool:
     return control.paired or not measured or not plain(proof_is_possible)(readings)
 
 
-def halved(control: Control) -> Control:
-    """Return how a doubtful design is simulated a second time: by half the step, and steps that end close to events."""
-    return control._replace(h=0.5 * control.h, locate_yield=True, event_tolerance=EVENT_TOLERANCE)
-
-
 def some_rows(table: Any, rows: np.ndarray) -> Any:
     """Return some rows of a named tuple of columns."""
     return type(table)(*(np.ascontiguousarray(column[rows]) for column in table))
-
-
-def simulate_checked(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
-    """Simulate every design once, and a second time those whose error needs to be confirmed.
-
-    Parameters
-    ----------
-    table, readings
-        As of `simulate_table`.
-    control
-        How they are simulated first. A design that cannot be simulated by the finer steps of `halved` has a coarser
-        second solution instead.
-    """
-    out, second = simulate_once(table, readings, control)
-    coarser = control._replace(refined=False)
-    for kind, how in ((FINER, halved(control)), (COARSER, coarser), (PAIR, coarser)):
-        rows = np.flatnonzero(second == kind)
-        if not len(rows):
-            continue
-        some = some_rows(table, rows)
-        designs = DesignTable(*some[: len(DesignTable._fields)])
-        first, (other, _) = some_rows(out, rows), simulate_once(some, readings, how)
-        if kind == FINER:
-            confirm_errors(first, other, designs, SAFETY_CONFIRMED)
-            failed = np.isnan(other.theta_max)
-            second[rows[failed]] = PAIR
-            rows, better = rows[~failed], some_rows(other, ~failed)
-        else:
-            (confirm_errors if kind == COARSER else estimate_errors)(other, first, designs, SAFETY)
-            better = first
-        for values, new in zip(out, better, strict=True):
-            values[rows] = new
-    return out
 
 
 def simulate_table(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
@@ -279,22 +243,25 @@ def simulate_table(table: DesignTable, readings: Readings, control: Control) -> 
         Which formulas are read as printed.
     control
         Step, horizon, limit, soil. Every outcome has the error of its steps (`boulder_kernels.error_estimates`). With
-        ``error_estimate`` designs are simulated by a third of the step, and some a second time: by half of that, and
-        are reported by it, or by the step itself. Where `is_paired` says so, every design is simulated with the step
-        and with a third of it, and the finer result is reported.
+        ``error_estimate`` some designs, or all where `is_paired` says so, have a second solution, see
+        `boulder_kernels.control.control_for`; the finest is reported.
 
     Returns
     -------
     OutcomeTable
         Arrays of shape (n,), in the order of the designs.
     """
+    out, needed = solve(table, readings, plain(control_for)(NONE_NEEDED, control))
     if not control.error_estimate:
-        return simulate_once(table, readings, control)[0]
-    refined = control._replace(refined=True)
-    if not is_paired(readings, control, layered=is_layered(table)):
-        return simulate_checked(table, readings, refined)
-    out, _ = simulate_once(table, readings, control)
-    fine, _ = simulate_once(table, readings, refined)
-    safety = SAFETY if readings.restoring_gravity else SAFETY_PRINTED
-    estimate_errors(out, fine, DesignTable(*table[: len(DesignTable._fields)]), safety)
-    return fine
+        return outcome_table(out)
+    if is_paired(readings, control, layered=is_layered(table)):
+        needed[:] = PAIR
+    for solution in (FINER, COARSER, PAIR):
+        rows = np.flatnonzero(needed == solution)
+        if not len(rows):
+            continue
+        some = some_rows(table, rows)
+        found, _ = solve(some, readings, plain(control_for)(solution, control))
+        designs = np.stack(some[: len(DesignTable._fields)])
+        take_seconds(out, rows, found, needed, designs, plain(safety_of)(readings))
+    return outcome_table(out)

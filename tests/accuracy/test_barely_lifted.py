@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from boulder_kernels import Control, DesignTable, corrected
-from boulder_kernels.table import simulate_once, simulate_table, some_rows
+from boulder_kernels.table import simulate_table, some_rows
 
 LIFTED = DesignTable(
     L=np.array([1.3291114750037603]),
@@ -82,7 +82,7 @@ def barely_lifted(count: int, seed: int) -> DesignTable:
     blow = SHORT._replace(h=2e-3, horizon=0.4)
     for _ in range(18):
         speed = np.sqrt(low * high)
-        lifted = simulate_once(table._replace(v_0=speed), corrected(), blow)[0].theta_max != 0.0
+        lifted = simulate_table(table._replace(v_0=speed), corrected(), blow).theta_max != 0.0
         low, high = np.where(lifted, low, speed), np.where(lifted, speed, high)
     found = (low > 0.3) & (high < 25.0)
     above = by_logarithm(1e-4, 0.15)

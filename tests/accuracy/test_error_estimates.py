@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 from boulder_kernels import OutcomeTable, Status, simulate_table
-from boulder_kernels.error_estimates import estimate_errors
+from boulder_kernels.error_estimates import take_seconds
+from boulder_kernels.outcomes import NONE_NEEDED, PAIR, THETA_ERROR, X_ERROR
 from boulder_sweep.columns import OUTCOMES
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import UNDECIDED
 from boulder_sweep.judge.verdict import Limits, judge
 from docs.studies.coverage import ROUNDING_M, ROUNDING_RAD, coverages, grid_table, random_table
 from docs.studies.wild import wild_families
-from tests.accuracy.box import LIMIT, PRESETS, box_table, how, rows
+from tests.accuracy.box import LIMIT, PRESETS, box_table, how
 from tests.judge.plain import plain_designs
 
 GRID = Path(__file__).parents[2] / "configs" / "m30_sizing.yaml"
@@ -84,12 +85,13 @@ def outcomes(status: list[int], theta: list[float]) -> OutcomeTable:
 
 def test_where_only_one_solution_reached_the_limit_the_error_is_infinite() -> None:
     limit, settled = Status.LIMIT.value, Status.SETTLED.value
-    coarse = outcomes([limit, settled, limit, settled], [0.35, 0.2, 0.35, np.nan])
-    fine = outcomes([settled, limit, limit, settled], [0.34, 0.35, 0.35, 0.3])
-    estimate_errors(coarse, fine, rows(box_table(4, 0), slice(None)), 3.0)
-    assert np.isinf(fine.theta_error[[0, 1, 3]]).all()
-    assert np.isinf(fine.x_error[[0, 1, 3]]).all()
-    assert fine.theta_error[2] == 0.0
+    coarse = np.stack(outcomes([limit, settled, limit, settled], [0.35, 0.2, 0.35, np.nan]))
+    fine = np.stack(outcomes([settled, limit, limit, settled], [0.34, 0.35, 0.35, 0.3]))
+    needed = np.full(4, float(PAIR))
+    take_seconds(fine, np.arange(4), coarse, needed, np.stack(box_table(4, 0)), 3.0)
+    assert np.isinf(fine[np.ix_([THETA_ERROR, X_ERROR], [0, 1, 3])]).all()
+    assert fine[THETA_ERROR, 2] == 0.0
+    assert (needed == NONE_NEEDED).all()
 
 
 @pytest.mark.parametrize(("error", "verdict"), [(0.001, 0), (0.01, 2), (np.inf, 2), (np.nan, 0)])

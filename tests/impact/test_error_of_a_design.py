@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 import boulder_sweep
-from boulder_kernels import corrected
-from boulder_kernels.table import halved, simulate_once
+from boulder_kernels import corrected, simulate_table
+from boulder_kernels._jit import plain
+from boulder_kernels.control import control_for
+from boulder_kernels.outcomes import FINER, NONE_NEEDED
 from boulder_sweep.columns import VERDICTS
 from boulder_sweep.impact import simulation
 from boulder_sweep.impact.simulation import simulate
@@ -42,11 +44,10 @@ def test_error_is_estimated_also_where_the_step_is_shortened(preset: str, change
 def between_the_peaks_of_the_first_two_solutions() -> boulder_sweep.Sweep:
     """A limit that only the first of the two solutions of a doubtful design reaches."""
     sweep = boulder_sweep.load(CONFIGS / "rwg.yaml", ["solver.accuracy=balanced"])
-    control = evaluation_of(sweep, accuracy_of(sweep)).control._replace(refined=True)
+    control = evaluation_of(sweep, accuracy_of(sweep)).control
     design = designs_of(sweep.block(0, 1), None).table
-    peaks = [
-        float(np.degrees(simulate_once(design, corrected(), how)[0].theta_max[0])) for how in (control, halved(control))
-    ]
+    hows = [plain(control_for)(solution, control)._replace(error_estimate=False) for solution in (NONE_NEEDED, FINER)]
+    peaks = [float(np.degrees(simulate_table(design, corrected(), how).theta_max[0])) for how in hows]
     assert peaks[0] > peaks[1]
     limit = 0.25 * peaks[0] + 0.75 * peaks[1]
     return boulder_sweep.load(

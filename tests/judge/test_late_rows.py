@@ -12,11 +12,10 @@ import boulder_sweep
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, Status
 from boulder_kernels.rules import AGREEING, FIRST_FACTOR
 from boulder_sweep.columns import REASONS
-from boulder_sweep.judge.accuracy import accuracy_of, control_of
+from boulder_sweep.judge.accuracy import FACTOR, accuracy_of, control_of
 from boulder_sweep.judge.evaluation import by_kernels, evaluation_of
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import ERROR, FAIL, NUMERICAL_ERROR, PASS, UNDECIDED
-from boulder_sweep.judge.refinement import FACTOR
 
 SHALLOW = Path(__file__).parent / "late_designs.csv"
 """Boulders that rock for seconds. An independent integration by steps of 0.1 ms (`benchmarks.late`) finds: the first

@@ -10,6 +10,8 @@ from scipy.integrate import RK45
 
 import boulder_kernels as bk
 from boulder_kernels import Status
+from boulder_kernels._jit import plain
+from boulder_kernels.control import control_for
 from boulder_kernels.design import error_arm
 from boulder_kernels.dormand_prince import ERROR
 from boulder_kernels.error_estimates import (
@@ -30,8 +32,17 @@ from boulder_kernels.error_estimates import (
     error_time,
     step_errors,
 )
-from boulder_kernels.outcomes import COARSER, FINER, LEAST_ROTATION, NONE_NEEDED, PAIR, no_maxima
-from boulder_kernels.table import halved, is_paired, simulate_checked, simulate_once, step_of_solution
+from boulder_kernels.outcomes import (
+    COARSER,
+    FINER,
+    LEAST_ROTATION,
+    NONE_NEEDED,
+    PAIR,
+    THETA_MAX,
+    no_maxima,
+    outcome_table,
+)
+from boulder_kernels.table import is_paired, solve, step_of_solution
 from tests import oracle
 
 from .samples import control, design_of, random_designs, table_of
@@ -170,11 +181,11 @@ def test_the_error_of_the_steps_is_of_fourth_order() -> None:
 def test_some_designs_are_solved_twice() -> None:
     """Doubtful ones are reported by the second solution; of all, the difference from the first is within the error."""
     table = table_of(random_designs(3000, seed=171))
-    how = control(0.012, 1.0, LIMIT, stop_at_limit=True, error_estimate=True)._replace(refined=True)
-    first, needed = simulate_once(table, CORRECTED, how)
-    finer, _ = simulate_once(table, CORRECTED, halved(how))
-    coarser, _ = simulate_once(table, CORRECTED, how._replace(refined=False))
-    found = simulate_checked(table, CORRECTED, how)
+    how = control(0.012, 1.0, LIMIT, stop_at_limit=True, error_estimate=True)
+    hows = [plain(control_for)(solution, how) for solution in (NONE_NEEDED, FINER, COARSER)]
+    (first, needed), *others = [solve(table, CORRECTED, one) for one in hows]
+    first, finer, coarser = (outcome_table(out) for out in (first, *(out for out, _ in others)))
+    found = bk.simulate_table(table, CORRECTED, how)
     assert set(needed) == {NONE_NEEDED, FINER, COARSER}
     assert np.mean(needed != NONE_NEEDED) < 0.05
     for name in ("status", "theta_max", "x_b_max", "x_v_max", "F_v_max", "crush_max", "t_limit", "t_end", "step"):
@@ -187,26 +198,24 @@ def test_some_designs_are_solved_twice() -> None:
         apart = np.abs(one.x_v_max - other.x_v_max)[rows]
         assert (found.x_error[rows] >= np.maximum(safety * apart, LEAST_CONFIRMED_M)).all()
         assert (found.x_error[rows] >= other.x_error[rows]).all()
-    assert step_of_solution(how) == 0.004
-    assert step_of_solution(halved(how)) == 0.002
+    assert [step_of_solution(one) for one in hows] == [0.004, 0.002, 0.012]
 
 
 def test_a_second_solution_that_cannot_be_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Then a coarser one gives the error, and the first is reported."""
     table = table_of([design_of(oracle.RWG)])
-    how = control(0.012, 1.0, LIMIT, stop_at_limit=True, error_estimate=True)._replace(refined=True)
-    first, _ = simulate_once(table, CORRECTED, how)
+    how = control(0.012, 1.0, LIMIT, stop_at_limit=True, error_estimate=True)
+    first, _ = solve(table, CORRECTED, plain(control_for)(NONE_NEEDED, how))
 
     def failing(table: bk.DesignTable, readings: bk.Readings, how: bk.Control) -> object:
-        out, _ = simulate_once(table, readings, how)
+        out, _ = solve(table, readings, how)
         if how.h < 0.012:
-            for column in out[1:]:
-                column[:] = np.nan
-        return out, np.full(1, FINER)
+            out[THETA_MAX:] = np.nan
+        return out, np.full(1, float(FINER))
 
-    monkeypatch.setattr("boulder_kernels.table.simulate_once", failing)
-    found = simulate_checked(table, CORRECTED, how)
-    assert found.theta_max == first.theta_max
+    monkeypatch.setattr("boulder_kernels.table.solve", failing)
+    found = bk.simulate_table(table, CORRECTED, how)
+    assert found.theta_max == first[THETA_MAX]
     assert found.step == 0.004
     assert 0.0 < found.x_error < 1e-3
 

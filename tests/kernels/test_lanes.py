@@ -10,7 +10,7 @@ import pytest
 import boulder_kernels as bk
 from boulder_kernels import Design, OutcomeTable, Status
 from boulder_kernels.error_estimates import step_errors
-from boulder_kernels.outcomes import empty_outcomes, outcome_table, write_outcome
+from boulder_kernels.outcomes import STEP, T_END, empty_outcomes, outcome_table, write_outcome
 from boulder_kernels.workspace import LANES
 
 from .samples import ALL_READINGS, control, random_designs, same_bits, table_of
@@ -42,13 +42,19 @@ def assert_alike(found: OutcomeTable, known: OutcomeTable, excused: int) -> None
     assert unlike.sum() <= excused
 
 
+def with_step(out: np.ndarray, h: float) -> OutcomeTable:
+    """Return outcomes as a table, by their step [s]."""
+    out[STEP] = np.where(np.isnan(out[T_END]), np.nan, h)
+    return outcome_table(out)
+
+
 def one_by_one(designs: list[Design], readings: bk.Readings, how: bk.Control) -> OutcomeTable:
     """Single impacts in the columns of a table."""
     out = empty_outcomes(len(designs))
     for row, design in enumerate(designs):
         found = bk.simulate_design(design, readings, how, bk.no_record())
         write_outcome(out, row, found, step_errors(found, design, how.theta_limit, how.horizon))
-    return outcome_table(out, how.h)
+    return with_step(out, how.h)
 
 
 @pytest.mark.parametrize("readings", ALL_READINGS)

@@ -9,13 +9,13 @@ import boulder_kernels as bk
 from boulder_kernels import OutcomeTable, Status
 from boulder_kernels.error_estimates import step_errors
 from boulder_kernels.layered import COUNTS, LayeredTable, filled_layers, lanes_count
-from boulder_kernels.outcomes import empty_outcomes, outcome_table, write_outcome
+from boulder_kernels.outcomes import empty_outcomes, write_outcome
 from boulder_kernels.soil_laws import soil_potential
 from boulder_kernels.table import problem_at, some_rows
 from boulder_kernels.workspace import LANES
 
 from .samples import control, layered_constants, random_designs, random_layers
-from .test_lanes import PRESETS, assert_alike, assert_same
+from .test_lanes import PRESETS, assert_alike, assert_same, with_step
 
 HOW = control(8e-3, 1.0, np.radians(20.0), stop_at_limit=True)
 READINGS = bk.corrected()
@@ -28,7 +28,7 @@ def one_by_one(table: Any, readings: bk.Readings, how: bk.Control) -> OutcomeTab
         problem = problem_at(table, row, how)
         found = bk.simulate(problem, readings, how, bk.no_record())
         write_outcome(out, row, found, step_errors(found, problem.design, how.theta_limit, how.horizon))
-    return outcome_table(out, how.h)
+    return with_step(out, how.h)
 
 
 def split(table: LayeredTable, m: int) -> LayeredTable:

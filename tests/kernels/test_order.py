@@ -21,7 +21,7 @@ from boulder_kernels.dynamics import (
 )
 from boulder_kernels.impact import Problem, simulate
 from boulder_kernels.modes import CONTACT, CORNER, COUPLE, ROTATION, TOLERANCE
-from boulder_kernels.table import simulate_once
+from boulder_kernels.table import simulate_table
 from boulder_kernels.time_history import no_record
 from tests import oracle
 from tests.oracle.dynamics import motion_of
@@ -229,7 +229,7 @@ def test_late_motions_agree_in_lanes_where_kinks_are_precise() -> None:
     for tolerance in (TOLERANCE, 1e-2 * TOLERANCE):
         how = control(7.5e-4, 1.0, np.radians(20.0), stop_at_limit=True)
         how = how._replace(locate_yield=True, longest_horizon=10.0, event_tolerance=tolerance, refined=True)
-        found = [simulate_once(table_of([SHALLOW]), bk.corrected(), how._replace(h=h))[0] for h in (7.5e-4, 1.875e-4)]
+        found = [simulate_table(table_of([SHALLOW]), bk.corrected(), how._replace(h=h)) for h in (7.5e-4, 1.875e-4)]
         assert found[0].t_end[0] >= 3.0
         differences.append(abs(found[1].theta_max[0] - found[0].theta_max[0]))
     assert differences[1] < 1e-8

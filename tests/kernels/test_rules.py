@@ -1,7 +1,5 @@
 """The rules of the verdict on single rows: each alone, the worst of several, and which rows need another solution."""
 
-from itertools import product
-
 import numpy as np
 import pytest
 
@@ -18,27 +16,25 @@ from boulder_kernels.rules import (
     OVERTURNS,
     PASSES,
     PENETRATION,
-    RULES,
-    RULINGS,
     SHAPE,
-    SIZES,
     SLOWER_SPEEDS,
     SLOWER_TRUCK,
     UNPROVED,
     VALIDITY,
-    Confirmation,
+    Course,
+    Rows,
+    Sizes,
     VerdictLimits,
-    after_finer,
-    after_slower,
     agree,
     confirmations,
+    consider,
     is_asked_slower,
     is_simulated,
     is_wanted,
-    write_rulings,
+    rule_by_slower,
 )
 
-LIMITS = VerdictLimits(rotation=0.35, penetration=1.0, min_overlap_m=0.25)
+LIMITS = VerdictLimits(rotation=0.35, penetration=1.0, guarded=True, min_overlap_m=0.25)
 STANDS = {
     "status": bk.Status.SETTLED,
     "theta_max": 0.1,
@@ -52,20 +48,34 @@ STANDS = {
     "x_error": 1e-5,
     "step": 4e-3,
 }
-BOULDER = {"L": 1.5, "H": 3.0, "d": 1.5, "e_bumper": 0.5, "bed_offset": 2.9, "flat_foot": 1.0, "known_shape": 1.0}
+BOULDER = {
+    "L": 1.5, "H": 3.0, "d": 1.5, "e_bumper": 0.5, "bed_offset": 2.9, "v_0": 10.0, "flat_foot": 1.0, "known_shape": 1.0,
+}  # fmt: skip
+CONTROL = bk.Control(0.012, 1.0, LIMITS.rotation, 0, error_estimate=True)
+
+
+def column(record, **changed):
+    """A row that stands, or its boulder, but for some numbers, as a column of an array."""
+    return np.array([[float((STANDS | BOULDER | changed)[name])] for name in record._fields])
+
+
+def considered(limits, controls, solutions, **changed):
+    """Course of a row after each of its solutions, None for a control that is passed over, and what counts then."""
+    rows = Rows(column(bk.OutcomeTable), np.zeros((len(Course._fields), 1)), column(Sizes, **changed))
+    found = []
+    for number, solution in enumerate(solutions):
+        if solution is not None:
+            every = np.array(controls, dtype=float)
+            consider(rows, 0, column(bk.OutcomeTable, **solution), 0, number, every, limits)
+        found.append(Course(*rows.courses[:, 0]))
+    return found, bk.OutcomeTable(*rows.counted[:, 0])
 
 
 def ruling(**changed):
-    """Rule of a row that stands but for some numbers, and what was computed with it."""
-    row = STANDS | {name: value for name, value in changed.items() if name in STANDS}
-    sizes = BOULDER | {name: value for name, value in changed.items() if name in BOULDER}
+    """What the rules make of a row that stands but for some numbers."""
     limits = LIMITS._replace(**{name: value for name, value in changed.items() if name in LIMITS._fields})
-    outcomes = bk.OutcomeTable(
-        np.array([row["status"]], np.int8), *(np.array([row[name]]) for name in list(STANDS)[1:])
-    )
-    out = np.empty((len(RULINGS), 1))
-    write_rulings(outcomes, np.array([[sizes[name]] for name in SIZES]), limits, out)
-    return tuple(out[:, 0])
+    (found,), _ = considered(limits, [CONTROL._replace(error_estimate=False)], [changed], **changed)
+    return found
 
 
 @pytest.mark.parametrize(
@@ -92,6 +102,8 @@ def ruling(**changed):
         ({"theta_error": 0.3}, NUMERICAL_ERROR),
         ({"x_error": 4.0}, NUMERICAL_ERROR),
         ({"theta_error": np.nan, "x_error": np.nan}, PASSES),
+        ({"theta_error": 0.3, "guarded": False}, PASSES),
+        ({"status": bk.Status.LIMIT, "theta_error": np.inf, "guarded": False}, OVERTURNS),
         # The model does not hold beyond 20 degrees, nor for boulders hardly buried that slide.
         ({"theta_max": 0.3495, "rotation": 0.5}, VALIDITY),
         ({"theta_max": 0.3490, "rotation": 0.5}, PASSES),
@@ -140,8 +152,10 @@ def test_the_worst_rule_decides():
     ],
 )
 def test_slower_trucks_are_asked_about_shallow_boulders_that_slide(rule, ratio, slide, asked):
-    assert plain(is_asked_slower)(rule, ratio, slide) == asked
-    assert plain(is_asked_slower)(np.array([rule]), np.array([ratio]), np.array([slide])).tolist() == [asked]
+    sizes = Sizes(**BOULDER | {"d": ratio * BOULDER["H"]})
+    assert plain(is_asked_slower)(rule, solution(x_b_max=slide), sizes) == asked
+    if rule == PASSES:
+        assert ruling(d=ratio * BOULDER["H"], x_b_max=slide).asked_slower == asked
 
 
 @pytest.mark.parametrize(
@@ -161,7 +175,7 @@ def test_slower_trucks_are_asked_about_shallow_boulders_that_slide(rule, ratio, 
     ],
 )
 def test_the_worst_of_the_slower_trucks_decides(rule, slower, after):
-    assert plain(after_slower)(rule, slower) == after
+    assert min(rule, plain(rule_by_slower)(slower)) == after
 
 
 def test_slower_trucks_go_down_by_two_percent_to_half_the_speed():
@@ -171,45 +185,74 @@ def test_slower_trucks_go_down_by_two_percent_to_half_the_speed():
 
 
 def test_overlap_penetration_and_margin():
-    _, overlap, penetration, margin = ruling()
-    assert (overlap, penetration) == pytest.approx((1.0, -2.4))
-    assert margin == pytest.approx(min(0.25 / 0.35, 3.4))
-    assert ruling(x_v_max=5.2)[3] == pytest.approx(0.2)
+    found = ruling()
+    assert (found.overlap, found.penetration) == pytest.approx((1.0, -2.4))
+    assert found.margin == pytest.approx(min(0.25 / 0.35, 3.4))
+    assert ruling(x_v_max=5.2).margin == pytest.approx(0.2)
+    assert np.isnan(ruling(status=bk.Status.UNSTABLE, x_v_max=np.nan).penetration)
 
 
 def test_a_simulation_has_maxima_where_the_table_says_so():
     assert [status for status in bk.Status if is_simulated(status)] == sorted(bk.SIMULATED)
 
 
-CONTROL = bk.Control(0.012, 1.0, LIMITS.rotation, 0, error_estimate=True)
-CONTROLS = [CONTROL, CONTROL._replace(error_estimate=False), CONTROL._replace(last_resort=True, h=0.004)]
-COMBINATIONS = list(
-    product(
-        range(len(RULES)),
-        (NOT_COMPUTED, OVERTURNS, PENETRATION, UNPROVED, PASSES),
-        bk.Status,
-        (0.6, 1.5),
-        range(AGREEING + 1),
-        (True, False),
-    )
+LAST = CONTROL._replace(last_resort=True, h=0.001)
+CONTROLS = (CONTROL, *(CONTROL._replace(h=0.012 / 2**n) for n in range(1, 4)), LAST, LAST._replace(h=0.00025))
+STEPS = len(CONTROLS)
+
+
+@pytest.mark.parametrize(
+    ("row", "status", "control", "wanted"),
+    [
+        ({"rule": NOT_COMPUTED}, bk.Status.UNSTABLE, CONTROL, True),
+        ({"rule": NOT_COMPUTED}, bk.Status.LITTLE_INERTIA, LAST, True),
+        ({"rule": NOT_COMPUTED, "given_up": 1.0}, bk.Status.LITTLE_INERTIA, LAST, False),
+        ({"rule": NOT_COMPUTED}, bk.Status.INVALID, CONTROL, False),
+        ({"rule": NUMERICAL_ERROR}, bk.Status.SETTLED, CONTROL, True),
+        ({"rule": NUMERICAL_ERROR}, bk.Status.SETTLED, CONTROL._replace(error_estimate=False), False),
+        ({"rule": NUMERICAL_ERROR}, bk.Status.SETTLED, LAST, False),
+        ({"rule": PASSES}, bk.Status.SETTLED, CONTROL, False),
+        ({"rule": PASSES, "unconfirmed": 1.0, "compared_s": 0.024}, bk.Status.SETTLED, CONTROL, True),
+        ({"rule": PASSES, "unconfirmed": 1.0, "compared_s": 0.023}, bk.Status.SETTLED, CONTROL, False),
+    ],
 )
+def test_which_rows_are_solved_again(row, status, control, wanted):
+    assert plain(is_wanted)(Course(*[0.0] * len(Course._fields))._replace(**row), status, control) == wanted
 
 
-@pytest.mark.parametrize("control", CONTROLS)
-def test_what_is_asked_of_one_row_in_the_page_is_asked_of_many_in_a_table(control):
-    """The same functions take numbers there, and arrays here."""
-    columns = [np.array(values) for values in zip(*COMBINATIONS, strict=True)]
+LATE = {"t_end": 1.5}
+UNLIKE = LATE | {"theta_max": 0.2}
+FALLS = LATE | {"status": bk.Status.LIMIT, "theta_max": 0.35, "t_limit": 1.4}
+REFUSED = {"status": bk.Status.STIFF_SOIL, "theta_max": np.nan, "theta_error": np.nan, "x_error": np.nan}
 
-    def answers(before, after, status, t_end, unconfirmed, flag):
-        row = Confirmation(unconfirmed, 0.006 + 0.004 * flag, flag)
-        needed = plain(confirmations)(after, t_end, control)
-        known, replaces = plain(after_finer)(row, before, after, np.logical_not(flag), needed, control)
-        return (needed, plain(is_wanted)(row, before, status, control), replaces, *known)
 
-    together = answers(*columns)
-    alone = [answers(*combination) for combination in COMBINATIONS]
-    for many, one_by_one in zip(together, zip(*alone, strict=True), strict=True):
-        assert np.array_equal(many, np.array(one_by_one))
+@pytest.mark.parametrize(
+    ("solutions", "wanted", "rule", "decided_by"),
+    [
+        # The first decides; late ones when as many others agree as are needed.
+        ([{}], [STEPS], PASSES, 0),
+        ([LATE, LATE, LATE], [1, 2, STEPS], PASSES, 0),
+        ([FALLS, FALLS, FALLS], [1, 2, STEPS], OVERTURNS, 0),
+        ([LATE | {"x_v_max": 5.5}] * 2, [1, STEPS], PENETRATION, 0),
+        ([LATE | {"crush_max": 3.0}], [STEPS], CRUSH, 0),
+        # One that differs takes the place of what counted so far.
+        ([LATE, UNLIKE, UNLIKE, UNLIKE], [1, 2, 3, STEPS], PASSES, 1),
+        ([LATE, LATE, FALLS, FALLS], [1, 2, 3, 5], OVERTURNS, 2),
+        # Where too few agree in the end nothing is decided.
+        ([LATE, UNLIKE, LATE, UNLIKE], [1, 2, 3, 5], PASSES, 3),
+        ([LATE, UNLIKE, LATE, UNLIKE, None, LATE], [1, 2, 3, 5, 5, STEPS], NUMERICAL_ERROR, 5),
+        # Refused ones are tried by each, and one that fails changes nothing.
+        ([REFUSED, {}], [1, STEPS], PASSES, 1),
+        ([REFUSED] * 5, [1, 2, 3, 4, STEPS], NOT_COMPUTED, 0),
+        ([LATE, REFUSED, LATE, LATE], [1, 2, 3, STEPS], PASSES, 0),
+        ([{"theta_error": 0.3}, {"theta_error": 0.3}, {}], [1, 2, STEPS], PASSES, 2),
+    ],
+)
+def test_the_course_of_a_row(solutions, wanted, rule, decided_by):
+    courses, counted = considered(LIMITS, CONTROLS, solutions)
+    assert [course.wanted for course in courses] == wanted
+    assert (courses[-1].rule, courses[-1].decided_by) == (rule, decided_by)
+    assert np.isinf(counted.theta_error) == np.isinf(counted.x_error) == (rule == NUMERICAL_ERROR)
 
 
 @pytest.mark.parametrize(
@@ -221,7 +264,7 @@ def test_what_is_asked_of_one_row_in_the_page_is_asked_of_many_in_a_table(contro
         (PENETRATION, 1.5, CONTROL, 1),
         (CRUSH, 1.5, CONTROL, 0),
         (UNPROVED, 10.0, CONTROL, 0),
-        (PASSES, 1.5, CONTROLS[1], 0),
+        (PASSES, 1.5, CONTROL._replace(error_estimate=False), 0),
     ],
 )
 def test_a_row_that_passes_or_fails_past_the_horizon_needs_others_that_agree(rule, t_end, control, expected):

@@ -14,7 +14,7 @@ from boulder_kernels.dynamics import least_couple, lift_of
 from boulder_kernels.layered import COUNTS, OutlinedTable, uniform_layers
 from boulder_kernels.outlined import GivenPiece, constants_beside, given_beside
 from boulder_kernels.soil_laws import constants_in, drag_power, profile_of, soil_potential, soil_reaction
-from boulder_kernels.table import is_layered, is_paired, simulate_once, simulate_table, some_rows
+from boulder_kernels.table import is_layered, is_paired, simulate_table, some_rows
 from boulder_kernels.workspace import LANES
 from tests.kernels.samples import control, random_designs, random_layers, random_state, table_of
 from tests.kernels.test_lanes import PRESETS, assert_alike, assert_same
@@ -115,15 +115,15 @@ def test_a_spoilt_row_leaves_its_neighbours_alone(shape: Callable[[Design], np.n
 def test_a_taper_that_does_not_taper_is_the_box() -> None:
     """And a point of the outline that changes nothing changes nothing."""
     designs = random_designs(100, seed=194)
-    known = simulate_once(table_of(designs), READINGS, HOW)[0]
-    assert_alike(simulate_once(outlined(designs, box), READINGS, HOW)[0], known, 1)
+    known = simulate_table(table_of(designs), READINGS, HOW)
+    assert_alike(simulate_table(outlined(designs, box), READINGS, HOW), known, 1)
 
     def cut(design: Design) -> np.ndarray:
         """A box with a point in the middle."""
         ends = box(design)
         return np.insert(ends, 1, 0.5 * (ends[0] + ends[1]), axis=0)
 
-    assert_alike(simulate_once(outlined(designs, cut), READINGS, HOW)[0], known, 1)
+    assert_alike(simulate_table(outlined(designs, cut), READINGS, HOW), known, 1)
 
 
 @pytest.mark.compiled
@@ -161,7 +161,7 @@ def test_the_error_of_one_solve_covers_what_is_wrong(share: float, count: int) -
     for shape in (lambda design: taper(design, 1.0, share), lambda design: taper(design, share, 1.0)):
         table = outlined(designs, shape)
         found = simulate_table(table, READINGS, how)
-        fine = simulate_once(table, READINGS, how._replace(h=5e-4, error_estimate=False, locate_yield=True))[0]
+        fine = simulate_table(table, READINGS, how._replace(h=5e-4, error_estimate=False, locate_yield=True))
         stand = np.isfinite(found.theta_max) & (fine.theta_max < how.theta_limit)
         assert stand.sum() > 100
         covered = np.abs(found.theta_max - fine.theta_max) <= found.theta_error

@@ -127,7 +127,7 @@ class Kernel {
     const results = outcome.length * n;
     const { at, views } = this.room([
       2, design.length * n, ...this.soilLengths(controls[0], n), controls.flat().length, sizes.length * n,
-      limits.length, results, 3 * results, rulings.length * n,
+      limits.length, results, 3 * results, 2 * rulings.length * n,
     ]);
     design.forEach((name, field) => designs.forEach((one, row) => (views[1][field * n + row] = one[name])));
     views[8].set(controls.flat());

@@ -84,10 +84,6 @@ function solidityOf(inputs, filled) {
   return inputs.boulder_mass_kg / (inputs.boulder_density_kg_m3 * box);
 }
 
-/** How the kernel estimates errors, see `boulder_sweep.report.page_records`. */
-const PAIRED = 1;
-const ONCE = 2;
-
 /** @param {number} step [s] @returns {number} the same to twelve digits, as tables have it */
 function exact(step) {
   return Number(step.toPrecision(12));
@@ -198,9 +194,7 @@ class Simulator {
     const settings = [...this.data.controls[number]];
     const [h, paired] = [this.at("h"), this.at("paired")];
     settings[this.at("stop_at_limit")] = 0;
-    if (settings[paired] === PAIRED) return settings;
-    settings[paired] = ONCE;
-    if (step_s === exact(this.data.steps_s[number] / 2)) {
+    if (settings[paired] === 0 && step_s === exact(this.data.steps_s[number] / 2)) {
       settings[h] /= 2;
       settings[this.at("locate_yield")] = 1;
       settings[this.at("event_tolerance")] = this.data.controls.at(-1)[this.at("event_tolerance")];  // of all but the first
