@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from boulder_kernels.outcomes import empty_outcomes
 from boulder_kernels.rules import FLAGS as RAISED
 from boulder_kernels.rules import ISLAND_SLIDE, UNSTUDIED, Tested, write_flags
 from boulder_sweep.investigation import FAMILY_FACTOR, family_bounds
@@ -215,8 +216,8 @@ def run_by_run(function: Callable[[np.ndarray], np.ndarray], column: np.ndarray)
     return np.repeat(function(column[starts]), np.diff(starts, append=len(column)), axis=-1)
 
 
-def _bits(designs: Any, limits: Any, reached: tuple[Any, Any, Any, Any]) -> np.ndarray:
-    """Return the flags of n designs as bits, from what they reach: the fields of `boulder_kernels.rules.Reached`."""
+def _bits(designs: Any, limits: Any, counted: np.ndarray, overlap: np.ndarray) -> np.ndarray:
+    """Return the flags of n designs as bits, from what they reach: the first arguments of `write_flags`."""
     table = designs.table
     rocks = table.rho_b if designs.rocks is None else designs.rocks
     least_beta, most_beta = run_by_run(lambda phi: family_bounds(np.degrees(phi)), table.phi)
@@ -225,20 +226,19 @@ def _bits(designs: Any, limits: Any, reached: tuple[Any, Any, Any, Any]) -> np.n
     soil = (np.degrees(table.phi), table.rho_s, designs.given_factors)
     tested = tested_of(limits.calibrated_crush, limits.tested_rotation, odd_layers=limits.odd_layers)
     bits = np.empty(designs.size, dtype=np.int64)
-    write_flags(np.stack(np.broadcast_arrays(*reached, bits)[:-1]), np.stack([*sizes, *vehicle, *soil]), tested, bits)
+    write_flags(counted, overlap, np.stack([*sizes, *vehicle, *soil]), tested, bits)
     return bits
 
 
 def are_studied(designs: Any, limits: Any) -> np.ndarray:
     """Return which of n designs lie where the study of second opinions has drawn, bool, shape (n,)."""
-    return _bits(designs, limits, (0.0, 0.0, 0.0, math.inf)) & _UNSTUDIED == 0
+    nothing, enough = empty_outcomes(designs.size), np.full(designs.size, math.inf)
+    return _bits(designs, limits, nothing, enough) & _UNSTUDIED == 0
 
 
 def flagged(facts: Any) -> tuple[np.ndarray, tuple[str, ...]]:
     """Return the column ``validity`` of n rows: codes, and the words they stand for."""
-    outcomes = facts.outcomes
-    reached = (outcomes.x_b_max, outcomes.crush_max, outcomes.theta_max, facts.overlap)
-    bits = _bits(facts.designs, facts.limits, reached)
+    bits = _bits(facts.designs, facts.limits, np.stack(facts.outcomes), facts.overlap)
     used = np.flatnonzero(np.bincount(bits, minlength=1))
     words = {mask: SEPARATOR.join(flag.name for k, flag in enumerate(FLAGS) if mask >> k & 1) for mask in used.tolist()}
     named = ("", *sorted(set(words.values()) - {""}))

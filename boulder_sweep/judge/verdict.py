@@ -100,7 +100,7 @@ class Limits(NamedTuple):
     def of_rules(self) -> VerdictLimits:
         """Those that decide a verdict, as the kernels take them."""
         further = (getattr(self.criterion, name) for name in OF_CRITERION)
-        return VerdictLimits(self.rotation, self.penetration, self.guarded, *further)
+        return VerdictLimits(self.rotation, self.penetration, float(self.guarded), *further)
 
 
 class Facts(NamedTuple):

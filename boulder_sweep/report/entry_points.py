@@ -23,7 +23,6 @@ from boulder_kernels.rules import (
     RULE,
     SLOWER_SPEEDS,
     WANTED,
-    Reached,
     Rows,
     VerdictLimits,
     consider,
@@ -32,6 +31,7 @@ from boulder_kernels.rules import (
     flags_of,
     limits_in,
     rule_by_slower,
+    tested_in,
 )
 from boulder_kernels.soil_laws import SoilProfile, constants_in
 from boulder_kernels.time_history import sample_of, state_of
@@ -46,6 +46,7 @@ from boulder_sweep.report.page_records import (
     OUTCOME_COUNT,
     PIECE_ROOM,
     READINGS_COUNT,
+    RULE_LIMITS,
     RULE_SIZES,
     RULINGS_COUNT,
     SETTINGS_COUNT,
@@ -58,7 +59,6 @@ from boulder_sweep.report.page_records import (
     pieces_from,
     readings_from,
     table_from,
-    tested_from,
 )
 
 EXPORTS = {"rows": "pippipipipppippppp", "history": "pppipipipppipppppp"}
@@ -293,8 +293,8 @@ def rows(
     rulings_at
         Where the rulings go, shape (len(RULINGS), n), and room for as many.
     """
-    settings, numbers = carray(controls_at, (count, SETTINGS_COUNT)), carray(limits_at, (LIMITS_COUNT,))
-    limits, tested = limits_in(numbers), tested_from(numbers)
+    settings, numbers = carray(controls_at, (count, SETTINGS_COUNT)), carray(limits_at, (LIMITS_COUNT, 1))
+    limits, tested = limits_in(numbers, 0), tested_in(numbers[RULE_LIMITS:], 0)
     designs, sizes = carray(designs_at, (DESIGN_COUNT, n)), carray(sizes_at, (SIZES_COUNT, n))
     layers, outlines = carray(layers_at, (n, m, 6)), carray(outlines_at, (n, points, 4))
     put_soils(designs, ground_at, below_at, deeper, carray(profile_at, (points, 4)), layers, outlines)
@@ -312,8 +312,8 @@ def rows(
                 worst = rule_by_slower(slower.courses[RULE, row])
                 own.courses[RULE, row] = min(own.courses[RULE, row], worst)
             designs[V_0, row] = sizes[SIZES_V_0, row] = v_0
-        reached = Reached(o.x_b_max, o.crush_max, o.theta_max, course_in(own.courses, row).overlap)
-        rulings[0, -1, row] = flags_of(reached, flag_inputs_in(flag_inputs, row), tested)
+        overlap = course_in(own.courses, row).overlap
+        rulings[0, -1, row] = flags_of(o, overlap, flag_inputs_in(flag_inputs, row), tested)
 
 
 @array_kernel

@@ -5,13 +5,10 @@ WebAssembly has no named tuples, so designs, soils and settings are passed as pl
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, get_type_hints
-
 import numpy as np
 
 from boulder_kernels import Control, Design, DesignTable, OutcomeTable, Readings
-from boulder_kernels._jit import function_of, inlined
+from boulder_kernels._jit import inlined
 from boulder_kernels.ground import Ground
 from boulder_kernels.layered import SoilElements, SoilLayers, SoilSums
 from boulder_kernels.outlined import OutlinedElements, OutlinedPieces
@@ -33,7 +30,7 @@ LIMITS = (*VerdictLimits._fields, *Tested._fields)
 """Limits of the criterion, and what the model was tested on, in this order; rad, m, kg/m^3."""
 SIZES = (*Sizes._fields, *FlagInputs._fields)
 """Inputs of the rules, and behind them those of the flags; SI, the friction angle of the flags in degrees."""
-RULE_SIZES, SIZES_V_0 = len(Sizes._fields), SIZES.index("v_0")
+RULE_LIMITS, RULE_SIZES, SIZES_V_0 = len(VerdictLimits._fields), len(Sizes._fields), SIZES.index("v_0")
 RULINGS = (*Course._fields, "flags")
 """What the rules make of a design."""
 LIMITS_COUNT, SIZES_COUNT, RULINGS_COUNT = len(LIMITS), len(SIZES), len(RULINGS)
@@ -55,17 +52,18 @@ BELOW = 5
 """Numbers of a deeper layer."""
 
 
-def taking(record: Any, first: int = 0) -> Callable[[np.ndarray], Any]:
-    """Return a kernel that takes a record out of the rows of an array, from one on; a boolean is any other than 0."""
-    kinds = get_type_hints(record).values()
-    fields = [f"s[{first + k}]{' > 0.0' if kind is bool else ''}" for k, kind in enumerate(kinds)]
-    function = function_of(f"def take(s):\n return Record({', '.join(fields)})", Record=record)
-    function.__module__ = __name__
-    return inlined(function)
+@inlined
+def readings_from(s: np.ndarray) -> Readings:
+    """Return the first numbers of an array as readings."""
+    return Readings(s[0] > 0.0, s[1] > 0.0, s[2] > 0.0, s[3] > 0.0, s[4] > 0.0)
 
 
-readings_from, table_from = taking(Readings), taking(DesignTable)
-tested_from = taking(Tested, len(VerdictLimits._fields))
+@inlined
+def table_from(s: np.ndarray) -> DesignTable:
+    """Return the rows of an array as a table."""
+    return DesignTable(s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9], s[10], s[11], s[12], s[13], s[14])
+
+
 LAYER_ROOM = len(SoilLayers._fields) - 1 + len(SoilSums._fields)
 """Numbers for each layer of the soil of a design: enough for the layers, and once for their sums."""
 

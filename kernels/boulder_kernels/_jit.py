@@ -44,6 +44,7 @@ __all__ = [
     "exact_inlined",
     "exact_kernel",
     "function_of",
+    "in_columns",
     "inlined",
     "kernel",
     "overload",
@@ -157,6 +158,23 @@ def overload(function: Callable[..., Any]) -> Callable[[Callable[..., Any]], Cal
         return choose
 
     return registered
+
+
+def in_columns(record: Any) -> Callable[[Any, int], Any]:
+    """Return a function that takes a record out of a column of an array, whose first rows are its fields."""
+
+    def take(array: Any, row: int) -> Any:
+        """Return the record, numbers in place of columns."""
+        return record(*array[: len(record._fields), row])
+
+    def lower() -> None:
+        """Tell Numba of it."""
+        from ._numba import lower_take
+
+        lower_take(take, record)
+
+    when_compiling(lower)
+    return take
 
 
 def is_plain() -> bool:

@@ -16,11 +16,10 @@ from numba.core import cgutils
 from numba.extending import lower_builtin, type_callable
 from numba.np import arrayobj
 
-from .design import Constants, Design, design_in
+from ._numba import rows_of
+from .design import Constants, Design
 from .layered import LayeredConstants
 from .numerics import WIDTH, field, partial_sums, put
-from .outcomes import OutcomeTable, outcome_in
-from .rules import Course, FlagInputs, Reached, Sizes, course_in, flag_inputs_in, reached_in, sizes_in
 from .workspace import (
     CONSTANTS,
     KNOWN,
@@ -245,7 +244,7 @@ def _lower_store_given(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     soil: Any = soil_in(sig.args[0])
     count = len(sig.args[0][1])
     size = soil.given_size(count) // LANES
-    for i, number in enumerate(_rows_of(context, builder, sig.args[2:], args[2:], len(Design._fields), size)):
+    for i, number in enumerate(rows_of(context, builder, sig.args[2:], args[2:], len(Design._fields), size)):
         offset = given_offset(soil, count) + i * LANES
         builder.store(number, _pointer(context, builder, sig.args[:2], args[:2], offset))
     return context.get_dummy_value()
@@ -272,46 +271,3 @@ def _lower_copy_lane(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         )
         builder.store(builder.load(source), target)
     return context.get_dummy_value()
-
-
-# Inside kernels it is one load for every field: an index that need not be checked lets a loop over rows be vectorised.
-
-
-def _rows_of(context: Any, builder: Any, kinds: Any, values: Any, first: int, count: int) -> list[Any]:
-    """Load the numbers of a column of an array from some of its rows."""
-    array = context.make_array(kinds[0])(context, builder, values[0])
-    columns = builder.extract_value(array.shape, 1)
-    index, numbers = context.cast(builder, values[1], kinds[1], types.intp), []
-    if first:
-        index = builder.add(index, builder.mul(columns, context.get_constant(types.intp, first)))
-    for _ in range(count):
-        numbers.append(builder.load(builder.gep(array.data, [index], inbounds=True)))
-        index = builder.add(index, columns)
-    return numbers
-
-
-def _row_of(function: Any, record: Any) -> None:
-    """Tell Numba of a function that returns a column of an array, from its first row on, as a record."""
-
-    def result(array: Any, row: Any) -> Any:
-        """Return the type of the result, or None where a column is not one piece of memory."""
-        return types.NamedUniTuple(array.dtype, len(record._fields), record) if array.layout == "C" else None
-
-    def loads(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        """Load its numbers."""
-        numbers = _rows_of(context, builder, sig.args, args, 0, len(record._fields))
-        return context.make_tuple(builder, sig.return_type, numbers)
-
-    type_callable(function)(lambda context: result)
-    lower_builtin(function, types.Array, types.Any)(loads)
-
-
-for _function, _record_of_rows in (
-    (design_in, Design),
-    (outcome_in, OutcomeTable),
-    (course_in, Course),
-    (sizes_in, Sizes),
-    (flag_inputs_in, FlagInputs),
-    (reached_in, Reached),
-):
-    _row_of(_function, _record_of_rows)

@@ -21,6 +21,7 @@ import numba
 import numpy as np
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
+from numba.extending import lower_builtin, type_callable
 
 from ._ahead import ENTRY, NOTHING, REAL, TRUTH, WHOLE, UnsuitableError, function_of, name_of, record_of
 
@@ -309,3 +310,35 @@ def linked(code: bytes) -> bytes | None:
         command = [*compiler, "-shared", "-s", "-o", str(target), str(source), "-lm"]
         done = subprocess.run(command, capture_output=True, check=False)
         return target.read_bytes() if done.returncode == 0 else None
+
+
+def rows_of(context: Any, builder: Any, kinds: Any, values: Any, first: int, count: int) -> list[Any]:
+    """Load the numbers of a column of an array from some of its rows."""
+    array = context.make_array(kinds[0])(context, builder, values[0])
+    columns = builder.extract_value(array.shape, 1)
+    index, numbers = context.cast(builder, values[1], kinds[1], numba.types.intp), []
+    if first:
+        index = builder.add(index, builder.mul(columns, context.get_constant(numba.types.intp, first)))
+    for _ in range(count):
+        numbers.append(builder.load(builder.gep(array.data, [index], inbounds=True)))
+        index = builder.add(index, columns)
+    return numbers
+
+
+def lower_take(take: Any, record: Any) -> None:
+    """Tell Numba of a function of `boulder_kernels._jit.in_columns`.
+
+    It is one load for every field: an index that need not be checked lets a loop over rows be vectorised.
+    """
+
+    def result(array: Any, row: Any) -> Any:
+        """Return the type of the result, or None where a column is not one piece of memory."""
+        return numba.types.NamedUniTuple(array.dtype, len(record._fields), record) if array.layout == "C" else None
+
+    def loads(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        """Load its numbers."""
+        numbers = rows_of(context, builder, sig.args, args, 0, len(record._fields))
+        return context.make_tuple(builder, sig.return_type, numbers)
+
+    type_callable(take)(lambda context: result)
+    lower_builtin(take, numba.types.Array, numba.types.Any)(loads)

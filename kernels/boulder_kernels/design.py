@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import exact_inlined, inlined
+from ._jit import exact_inlined, in_columns, inlined
 from .numerics import direction, half_tangent
 
 
@@ -103,9 +103,7 @@ def design_at(table: DesignTable, row: int) -> Design:
     return Design(*(column[row] for column in table[: len(Design._fields)]))
 
 
-def design_in(designs: np.ndarray, row: int) -> Design:
-    """Return one design of an array whose first rows are the columns of a `DesignTable`."""
-    return Design(*designs[: len(Design._fields), row])
+design_in = in_columns(Design)
 
 
 class Constants(NamedTuple):

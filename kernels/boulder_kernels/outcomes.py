@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import inlined, kernel
+from ._jit import in_columns, inlined, kernel
 from .design import Constants
 from .dormand_prince import DenseOutput, displacement_at, state_at, turning_point
 from .dynamics import State, Switches, contact_displacement, contact_lever, spring_compression
@@ -169,9 +169,7 @@ def outcome_table(out: np.ndarray) -> OutcomeTable:
     return OutcomeTable(out[STATUS].astype(np.int8), *out[THETA_MAX:])
 
 
-def outcome_in(out: np.ndarray, row: int) -> OutcomeTable:
-    """Return one outcome of an array, numbers in place of columns."""
-    return OutcomeTable(*out[:, row])
+outcome_in = in_columns(OutcomeTable)
 
 
 @kernel

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import exact_inlined, exact_kernel
+from ._jit import exact_inlined, exact_kernel, in_columns
 from .control import VALID_ROTATION, Control, control_in
 from .error_estimates import LEAST_LATE_M
 from .outcomes import THETA_ERROR, X_ERROR, OutcomeTable, Status, copy_outcome, outcome_in
@@ -54,8 +54,8 @@ class VerdictLimits(NamedTuple):
     """Largest rotation [rad]."""
     penetration: float
     """Largest penetration [m]."""
-    guarded: bool
-    """Whether a row nearer to a limit than its error is undecided."""
+    guarded: float
+    """1 where a row nearer to a limit than its error is undecided, or 0."""
     min_overlap_m: float
     """Least overlap of boulder and bumper [m]. It and what follows have the names that they have among the settings."""
 
@@ -122,20 +122,7 @@ ISLAND_RATIO, ISLAND_SLIDE = 0.35, 0.5
 these steps. Such a boulder is not a pass."""
 
 
-def sizes_in(sizes: np.ndarray, row: int) -> Sizes:
-    """Return the inputs of one row, of an array whose first rows are the fields of `Sizes`."""
-    return Sizes(*sizes[: len(Sizes._fields), row])
-
-
-def course_in(courses: np.ndarray, row: int) -> Course:
-    """Return the course of one row, of an array whose rows are the fields of `Course`."""
-    return Course(*courses[:, row])
-
-
-@exact_inlined
-def limits_in(values: np.ndarray) -> VerdictLimits:
-    """Return the limits that an array holds, in the order of `VerdictLimits`."""
-    return VerdictLimits(values[0], values[1], values[2] > 0.0, values[3])
+limits_in, sizes_in, course_in = in_columns(VerdictLimits), in_columns(Sizes), in_columns(Course)
 
 
 @exact_inlined
@@ -196,7 +183,7 @@ def rule_of(o: OutcomeTable, sizes: Sizes, limits: VerdictLimits) -> int:
         return NOT_COMPUTED
     # Where only one of two solutions overturns, or no others confirm a late row, the error is infinite, and nothing is
     # decided.
-    if not (limits.guarded and np.isinf(o.theta_error)):
+    if not (limits.guarded > 0.0 and np.isinf(o.theta_error)):
         if o.status == Status.LIMIT.value or o.theta_max >= limits.rotation:
             return OVERTURNS
         if penetration > limits.penetration:
@@ -212,7 +199,7 @@ def rule_of(o: OutcomeTable, sizes: Sizes, limits: VerdictLimits) -> int:
     if o.status == Status.HORIZON.value or o.status == Status.OUTWARD.value or o.status == Status.UNPROVABLE.value:
         return UNPROVED
     room = min(limits.penetration - penetration, sizes.bed_offset - o.crush_max)
-    if limits.guarded and (limits.rotation - o.theta_max < o.theta_error or room < o.x_error):
+    if limits.guarded > 0.0 and (limits.rotation - o.theta_max < o.theta_error or room < o.x_error):
         return NUMERICAL_ERROR
     if o.theta_max > VALID_ROTATION or (sizes.d / sizes.H < ISLAND_RATIO and o.x_b_max > ISLAND_SLIDE):
         return VALIDITY
@@ -289,21 +276,8 @@ class Tested(NamedTuple):
     """Strain rate factor [-]."""
 
 
-class Reached(NamedTuple):
-    """What the flags of a row depend on of what it reaches."""
-
-    slide: float
-    """Largest displacement [m]."""
-    crush: float
-    """Largest crush [m]."""
-    theta: float
-    """Largest rotation [rad]."""
-    overlap: float
-    """As of `Course` [m]."""
-
-
 class FlagInputs(NamedTuple):
-    """What they depend on of its inputs."""
+    """Inputs of a row that its flags depend on."""
 
     L: float
     W: float
@@ -328,14 +302,7 @@ class FlagInputs(NamedTuple):
     """Friction angle [deg], density [kg/m^3] and strain rate factor of the soil, as they were given."""
 
 
-def reached_in(reached: np.ndarray, row: int) -> Reached:
-    """Return what one row reaches, of an array whose rows are the fields of `Reached`."""
-    return Reached(*reached[:, row])
-
-
-def flag_inputs_in(inputs: np.ndarray, row: int) -> FlagInputs:
-    """Return the inputs of one row, of an array whose rows are the fields of `FlagInputs`."""
-    return FlagInputs(*inputs[:, row])
+tested_in, flag_inputs_in = in_columns(Tested), in_columns(FlagInputs)
 
 
 @exact_inlined
@@ -345,12 +312,20 @@ def is_outside(value: float, least: float, most: float) -> bool:
 
 
 @exact_inlined
-def flags_of(o: Reached, r: FlagInputs, t: Tested) -> int:
-    """Flags of a row, bits of a whole number in the order of `FLAGS`."""
+def flags_of(o: OutcomeTable, overlap: float, r: FlagInputs, t: Tested) -> int:
+    """Flags of a row, bits of a whole number in the order of `FLAGS`.
+
+    Parameters
+    ----------
+    o, overlap
+        What counts of it, numbers in place of columns, and its overlap [m].
+    r, t
+        Its inputs, and what the model was tested on.
+    """
     flags = 0
-    if o.crush > t.crush:
+    if o.crush_max > t.crush:
         flags |= 1
-    if o.theta > t.rotation:
+    if o.theta_max > t.rotation:
         flags |= 2
     if is_outside(r.L, t.least_L, t.most_L) or is_outside(r.W, t.least_W, t.most_W):
         flags |= 4
@@ -362,9 +337,9 @@ def flags_of(o: Reached, r: FlagInputs, t: Tested) -> int:
         flags |= 16
     if is_outside(r.beta, r.least_beta, r.most_beta):
         flags |= 32
-    if o.overlap < t.overlap:
+    if overlap < t.overlap:
         flags |= 64
-    if o.slide > ISLAND_SLIDE:
+    if o.x_b_max > ISLAND_SLIDE:
         flags |= 128
     if is_outside(r.m_v, t.least_m_v, t.most_m_v) or is_outside(r.v_0, t.least_v_0, t.most_v_0):
         flags |= 256
@@ -380,20 +355,22 @@ def flags_of(o: Reached, r: FlagInputs, t: Tested) -> int:
 
 
 @exact_kernel
-def write_flags(reached: np.ndarray, inputs: np.ndarray, tested: Tested, out: np.ndarray) -> None:
+def write_flags(counted: np.ndarray, overlap: np.ndarray, inputs: np.ndarray, tested: Tested, out: np.ndarray) -> None:
     """Raise the flags of n rows.
 
     Parameters
     ----------
-    reached, inputs
-        Rows are the fields of `Reached` and of `FlagInputs`, shape (·, n).
+    counted, overlap
+        As of `Rows` and of `Course`, shapes (11, n) and (n,).
+    inputs
+        Rows are the fields of `FlagInputs`, shape (15, n).
     tested
         What the model was tested on.
     out
         Where the flags go, whole numbers, shape (n,).
     """
     for row in range(out.size):
-        out[row] = flags_of(reached_in(reached, row), flag_inputs_in(inputs, row), tested)
+        out[row] = flags_of(outcome_in(counted, row), overlap[row], flag_inputs_in(inputs, row), tested)
 
 
 FIRST_FACTOR = 0.5

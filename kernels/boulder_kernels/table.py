@@ -180,33 +180,28 @@ def solve(table: DesignTable, readings: Readings, control: Control) -> tuple[np.
     second : ndarray, shape (n,)
         Which second solution each of them needs, see `boulder_kernels.outcomes.StepErrors`.
     """
-    out = _solved(table, readings, control)
-    second = out[SECOND].copy()
-    out[STEP] = np.where(np.isnan(out[T_END]), np.nan, step_of_solution(control))
-    return out, second
-
-
-def _solved(table: DesignTable, readings: Readings, control: Control) -> np.ndarray:
-    """Return outcomes as `boulder_kernels.outcomes.write_outcome` leaves them."""
     n = len(table.L)
     designs = np.stack(table[: len(DesignTable._fields)])
     layers: np.ndarray | None = getattr(table, "layers", None)
     outlines: np.ndarray | None = getattr(table, "outlines", None)
     side_by_side = control.side_by_side and control.elements == 0 and control.stop_at_limit
+    given = given_to_lanes(designs, layers, outlines) if side_by_side else None
     if control.last_resort and layers is None:
         out = empty_outcomes(n)
         run_last_resort(designs, readings, control, no_record(), out)
-        return out
-    given = given_to_lanes(designs, layers, outlines) if side_by_side else None
-    if given is not None:
-        return simulate_lanes(given.designs, readings, control, given.soil, given.parts)
-    if not n:
-        return empty_outcomes(0)
-    soil = None
-    if layers is not None:
-        outline = None if outlines is None else outlines[0]
-        soil = empty_soil(layers.shape[1], control.elements, outline)
-    return simulate_rows(designs, layers, outlines, soil, readings, control)
+    elif given is not None:
+        out = simulate_lanes(given.designs, readings, control, given.soil, given.parts)
+    elif not n:
+        out = empty_outcomes(0)
+    else:
+        soil = None
+        if layers is not None:
+            outline = None if outlines is None else outlines[0]
+            soil = empty_soil(layers.shape[1], control.elements, outline)
+        out = simulate_rows(designs, layers, outlines, soil, readings, control)
+    second = out[SECOND].copy()
+    out[STEP] = np.where(np.isnan(out[T_END]), np.nan, step_of_solution(control))
+    return out, second
 
 
 def is_layered(table: Any) -> bool:
