@@ -236,9 +236,9 @@ def are_studied(designs: Any, limits: Any) -> np.ndarray:
     return _bits(designs, limits, nothing, enough) & _UNSTUDIED == 0
 
 
-def flagged(facts: Any) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Return the column ``validity`` of n rows: codes, and the words they stand for."""
-    bits = _bits(facts.designs, facts.limits, np.stack(facts.outcomes), facts.overlap)
+def flagged(facts: Any, counted: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Return the column ``validity`` of n rows, of which this counts: codes, and the words they stand for."""
+    bits = _bits(facts.designs, facts.limits, counted, facts.overlap)
     used = np.flatnonzero(np.bincount(bits, minlength=1))
     words = {mask: SEPARATOR.join(flag.name for k, flag in enumerate(FLAGS) if mask >> k & 1) for mask in used.tolist()}
     named = ("", *sorted(set(words.values()) - {""}))

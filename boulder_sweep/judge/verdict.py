@@ -194,7 +194,7 @@ def judged_rows(rows: Rows, designs: Designs, limits: Limits, only: tuple[str, .
         if only and spec.name not in only:
             continue
         if spec.name == "validity":
-            flags, named = flagged(facts)
+            flags, named = flagged(facts, rows.counted)
             facts = facts._replace(validity=flags, words=facts.words | {"validity": named})
         if spec.name == "robustness":
             facts = facts._replace(robustness=grades_without_asking(facts))
@@ -210,8 +210,8 @@ def judged_rows(rows: Rows, designs: Designs, limits: Limits, only: tuple[str, .
 
 def facts_of(rows: Rows, designs: Designs, limits: Limits) -> Facts:
     """Return what is known of n rows; see `judged_rows`."""
-    outcomes, courses = outcome_table(rows.counted), Course(*rows.courses)
-    status, rule, penetration = outcomes.status, courses.rule.astype(np.intp), courses.penetration
+    outcomes, courses = outcome_table(rows.counted), dict(zip(Course._fields, rows.courses, strict=True))
+    status, rule, penetration = outcomes.status, courses["rule"].astype(np.intp), courses["penetration"]
     verdict, reason = _VERDICTS.take(rule), _REASONS.take(rule)
     failed = rule == verdicts.NOT_COMPUTED
     reasons: tuple[str, ...] = REASONS
@@ -232,9 +232,9 @@ def facts_of(rows: Rows, designs: Designs, limits: Limits) -> Facts:
             "overturned": overturned,
             "passing": verdict == PASS,
         },
-        overlap=courses.overlap,
+        overlap=courses["overlap"],
         penetration=penetration,
-        margin=courses.margin,
+        margin=courses["margin"],
         rule=rule,
         verdict=verdict,
         reason=reason,

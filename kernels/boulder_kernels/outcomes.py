@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -124,29 +124,29 @@ class StepErrors(NamedTuple):
 
 
 class OutcomeTable(NamedTuple):
-    """Results of many designs: arrays of shape (n,); NaN where not computed."""
+    """Results of many designs, arrays of shape (n,), or of one, numbers; NaN where not computed."""
 
-    status: np.ndarray
+    status: Any
     """int8, see `Status`."""
-    theta_max: np.ndarray
+    theta_max: Any
     """Largest |theta_b| [rad]."""
-    x_b_max: np.ndarray
+    x_b_max: Any
     """Largest x_b [m]."""
-    x_v_max: np.ndarray
+    x_v_max: Any
     """Largest x_v [m]."""
-    F_v_max: np.ndarray
+    F_v_max: Any
     """Largest contact force [N]."""
-    crush_max: np.ndarray
+    crush_max: Any
     """Largest crush of the truck's front while it drives forward [m]."""
-    t_limit: np.ndarray
+    t_limit: Any
     """Time at which the rotation reached its limit [s]."""
-    t_end: np.ndarray
+    t_end: Any
     """Simulated time [s]."""
-    theta_error: np.ndarray
+    theta_error: Any
     """Estimated numerical error of theta_max [rad]."""
-    x_error: np.ndarray
+    x_error: Any
     """Estimated numerical error of x_b_max, x_v_max and crush_max, the largest [m]."""
-    step: np.ndarray
+    step: Any
     """Step asked for of the solution that is reported [s]; NaN where there is none."""
 
 

@@ -108,9 +108,7 @@ class Course(NamedTuple):
 
 OF_CRITERION = VerdictLimits._fields[VerdictLimits._fields.index("min_overlap_m") :]
 """Limits that are settings of the criterion as they are."""
-RULE, DECIDED_BY, WANTED, ASKED_SLOWER = (
-    Course._fields.index(name) for name in ("rule", "decided_by", "wanted", "asked_slower")
-)
+RULE, WANTED, ASKED_SLOWER = (Course._fields.index(name) for name in ("rule", "wanted", "asked_slower"))
 """Rows of an array of courses."""
 SHALLOW_RATIO, SHALLOW_SLIDE = 0.45, 0.3
 """A boulder with less depth over height that slides by more [m] may stop a truck and be overturned by a slower one,
@@ -120,8 +118,6 @@ SLOWER_SPEEDS = (*(k / 50.0 for k in range(49, 24, -1)), 0.4, 0.3)
 ISLAND_RATIO, ISLAND_SLIDE = 0.35, 0.5
 """With still less depth over height, and a longer slide [m], the speeds at which it stands can be 1 % wide: finer than
 these steps. Such a boulder is not a pass."""
-
-
 limits_in, sizes_in, course_in = in_columns(VerdictLimits), in_columns(Sizes), in_columns(Course)
 
 
