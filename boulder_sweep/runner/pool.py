@@ -129,7 +129,8 @@ class Cluster:
             raise
         except Exception as problem:  # what a call raises, or Dask instead
             if type(problem).__module__.startswith("distributed"):
-                raise ClusterLostError(f"Dask has given up a part of the work: {one_line(problem)}") from problem
+                said = f"its workers were lost ({type(problem).__name__})"
+                raise ClusterLostError(f"Dask has given up a part of the work: {said}") from problem
             raise BackendError(f"the workers cannot compute this: {one_line(problem)}") from problem
 
     def _results(self, calls: Iterator[Call], shared: Any) -> Iterator[Any]:
