@@ -443,7 +443,7 @@ def estimate(
     Parameters
     ----------
     sweep, out, jobs, simulate
-        As of `run`.
+        See `run`.
     resume
         Count only the rows that are missing in `out` or damaged there.
 
