@@ -42,7 +42,6 @@ QUICK = (
     "docs/test_drift.py",
     "docs/test_register.py",
     "impact/test_error_of_a_design.py",
-    "impact/test_explanation.py",
     "judge/",
     "kernels/test_check_values.py",
     "kernels/test_constants.py",
@@ -58,10 +57,9 @@ QUICK = (
     "oracle/test_soil.py",
     "oracle/test_vehicle.py",
     "settings/",
-    "store/test_files.py",
-    "store/test_manifest.py",
+    "store/test_folder.py",
+    "store/test_part.py",
     "store/test_provenance.py",
-    "store/test_reader.py",
     "test_rooms.py",
 )
 """Folders and files whose tests are marked ``quick``: together well under a minute, something of every room."""

@@ -13,6 +13,8 @@ from typing import Any
 import pytest
 from ruamel.yaml import YAML
 
+from tests.conftest import NOT_QUICK, QUICK
+
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 SOURCE = PROJECT["urls"]["Source"]
@@ -101,6 +103,11 @@ def test_numba_is_admitted_up_to_the_version_that_is_tested() -> None:
     """
     major, minor, _ = pins("requirements-dev.lock")["numba"].split(".")
     assert bounds()["numba"].partition(",")[2] == f"<{major}.{int(minor) + 1}"
+
+
+@pytest.mark.parametrize("name", sorted({*QUICK, *NOT_QUICK}))
+def test_what_the_quick_layer_names_is_there(name: str) -> None:
+    assert (ROOT / "tests" / name).exists()
 
 
 @pytest.mark.parametrize("script", sorted(path.name for path in (ROOT / ".ci").iterdir()))

@@ -162,9 +162,7 @@ def working(quiet: bool, doing: str = "simulating", of: str = "designs") -> Iter
                 begun = now
                 if not sys.stderr.isatty():
                     return
-            seconds = max(now - begun, 1e-9)
-            left = seconds / done * (total - done) if done else None
-            shown(Progress(done, total, seconds, done / seconds, left))
+            shown(Progress(0, done, total, now - begun))
 
         yield update
 

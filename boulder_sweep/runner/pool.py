@@ -128,8 +128,11 @@ class Cluster:
         except BoulderSweepError:
             raise
         except Exception as problem:  # what a call raises, or Dask instead
+            if self._client.status != "running":
+                raise ClusterLostError("the connection to the Dask scheduler was lost") from problem
             if type(problem).__module__.startswith("distributed"):
-                raise ClusterLostError(f"Dask has given up a part of the work: {one_line(problem)}") from problem
+                said = f"its workers were lost ({type(problem).__name__})"
+                raise ClusterLostError(f"Dask has given up a part of the work: {said}") from problem
             raise BackendError(f"the workers cannot compute this: {one_line(problem)}") from problem
 
     def _results(self, calls: Iterator[Call], shared: Any) -> Iterator[Any]:
@@ -146,8 +149,6 @@ class Cluster:
                 return
             with suppress(TimeoutError), client.as_current():
                 wait(waiting, timeout=_LOOK_EVERY_S, return_when="FIRST_COMPLETED")
-            if client.status != "running":
-                raise ClusterLostError("the connection to the Dask scheduler was lost")
             ended = [one for one in waiting if one.done()]
             waiting = [one for one in waiting if one not in ended]
             for one in ended:

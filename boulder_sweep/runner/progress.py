@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -126,24 +126,35 @@ class Progress:
 
     Parameters
     ----------
-    rows_done, rows
-        Rows computed so far, including earlier runs; rows of the whole table.
+    rows_before, rows_computed, rows
+        Rows that were there when the run began, rows computed since, and rows of the whole table.
     seconds
         Since the computing began.
-    rows_per_second
-        Computed by this run.
-    seconds_left
-        At that speed; None before there is one.
     notes
-        What the user should know so far: damaged parts.
+        What the user should know so far.
     """
 
-    rows_done: int
+    rows_before: int
+    rows_computed: int
     rows: int
     seconds: float
-    rows_per_second: float
-    seconds_left: float | None
-    notes: tuple[str, ...] = ()
+    notes: Sequence[str] = ()
+
+    @property
+    def rows_done(self) -> int:
+        """Rows that are there now."""
+        return self.rows_before + self.rows_computed
+
+    @property
+    def rows_per_second(self) -> float:
+        """Rows computed by this run in a second."""
+        return self.rows_computed / self.seconds if self.seconds > 0 else 0.0
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Time that is left at this speed; None before there is one."""
+        speed = self.rows_per_second
+        return (self.rows - self.rows_done) / speed if speed > 0 else None
 
 
 @dataclass(frozen=True)
@@ -158,8 +169,6 @@ class Summary:
         Rows of the table.
     rows_computed
         Rows computed by this run; the others existed before.
-    verdicts
-        Rows of each verdict.
     reasons
         Rows of each verdict and reason, keyed ``verdict/reason``, or ``verdict`` where there is none.
     seconds
@@ -175,7 +184,7 @@ class Summary:
     firmness
         How many verdicts of a sample small changes of the inputs would change, see `boulder_sweep.judge.firmness`.
     notes
-        What the user should know: damaged parts that were computed again.
+        What the user should know: damaged parts that were computed again, a heading that stays.
     boulder
         What is assumed of the boulders: their ``foot``, and whether the density of the rock is (``rock_assumed``).
     """
@@ -183,7 +192,6 @@ class Summary:
     out: Location
     rows: int
     rows_computed: int
-    verdicts: dict[str, int]
     reasons: dict[str, int]
     seconds: float
     started: str
@@ -192,10 +200,18 @@ class Summary:
     backend: str
     parts: int
     bytes: int
-    accuracy: dict[str, Any] = field(default_factory=dict)
-    firmness: dict[str, Any] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
-    boulder: dict[str, Any] = field(default_factory=dict)
+    accuracy: dict[str, Any]
+    firmness: dict[str, Any]
+    notes: Sequence[str]
+    boulder: dict[str, Any]
+
+    @property
+    def verdicts(self) -> dict[str, int]:
+        """Rows of each verdict."""
+        verdicts: Counter[str] = Counter()
+        for key, number in self.reasons.items():
+            verdicts[key.partition("/")[0]] += number
+        return dict(sorted(verdicts.items()))
 
     @property
     def rows_per_second(self) -> float:
@@ -214,82 +230,5 @@ class Summary:
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data."""
-        return {
-            **asdict(self),
-            "out": str(self.out),
-            "rows_per_second": self.rows_per_second,
-            "errors": self.errors,
-            "exit_code": self.exit_code,
-        }
-
-
-def progress_of(rows_before: int, rows_computed: int, rows: int, seconds: float, notes: Sequence[str] = ()) -> Progress:
-    """Return the progress of a run.
-
-    Parameters
-    ----------
-    rows_before
-        Rows that existed when the run began.
-    rows_computed
-        Rows computed since.
-    rows
-        Rows of the whole table.
-    seconds
-        Since the computing began.
-    notes
-        What the user should know so far.
-    """
-    speed = rows_computed / seconds if seconds > 0 else 0.0
-    done = rows_before + rows_computed
-    return Progress(
-        rows_done=done,
-        rows=rows,
-        seconds=seconds,
-        rows_per_second=speed,
-        seconds_left=(rows - done) / speed if speed > 0 else None,
-        notes=tuple(notes),
-    )
-
-
-def summary_of(
-    out: Location,
-    identity: Mapping[str, Any],
-    rows: int,
-    parts: Iterable[tuple[int, Mapping[str, int]]],
-    **more: Any,
-) -> Summary:
-    """Return the summary of a finished run.
-
-    Parameters
-    ----------
-    out
-        Folder of the table.
-    identity
-        See `boulder_sweep.store.provenance.identity`.
-    rows
-        Rows of the table.
-    parts
-        Bytes of each part, and its rows of each verdict and reason.
-    more
-        The other entries of `Summary`.
-    """
-    reasons: Counter[str] = Counter()
-    verdicts: Counter[str] = Counter()
-    count, size = 0, 0
-    for part_bytes, part_reasons in parts:
-        count, size = count + 1, size + part_bytes
-        reasons.update(part_reasons)
-    for key, number in reasons.items():
-        verdicts[key.partition("/")[0]] += number
-    model = identity["settings"]["model"]
-    return Summary(
-        out=out,
-        rows=rows,
-        verdicts=dict(sorted(verdicts.items())),
-        reasons=dict(sorted(reasons.items())),
-        parts=count,
-        bytes=size,
-        accuracy=identity.get("accuracy", {}),
-        boulder={name: model[name] for name in ("foot", "rock_assumed") if name in model},
-        **more,
-    )
+        computed = ("verdicts", "rows_per_second", "errors", "exit_code")
+        return {**asdict(self), "out": str(self.out), **{name: getattr(self, name) for name in computed}}

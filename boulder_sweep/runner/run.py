@@ -11,6 +11,7 @@ import shlex
 import socket
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -40,8 +41,6 @@ from boulder_sweep.runner.progress import (
     Estimate,
     Progress,
     Summary,
-    progress_of,
-    summary_of,
     take_sample,
     time_and_disk,
     too_large,
@@ -52,7 +51,7 @@ from boulder_sweep.signals import Signals, noted_signals, undone
 from boulder_sweep.store import failures
 from boulder_sweep.store.folder import Ranges, check_writable, clear, locked, make, part_file, part_files, remove_parts
 from boulder_sweep.store.provenance import differences, file_metadata, identity
-from boulder_sweep.store.reading import Contents, FinishedRows, Table, contents, refuse_two
+from boulder_sweep.store.reading import Contents, Described, FinishedRows, Table, contents, refuse_two
 from boulder_sweep.text import why
 
 if TYPE_CHECKING:
@@ -180,26 +179,28 @@ def run(
                 signals.call(lambda: _check_whole(out, plan, whole.written))
         except Interrupted as stop:
             raise Interrupted(stop.signum, whole.done, sweep.n_designs, again) from None
-        except (ClusterLostError, ComputationError) as problem:
+        except (ClusterLostError, ComputationError, failures.WriteError) as problem:
             safe = f"{whole.done:,} of {sweep.n_designs:,} rows are safe"
             raise type(problem)(f"{problem}. {safe}. Resume with: {again}") from problem
-        except failures.WriteError as problem:
-            raise failures.WriteError(f"{problem}. Finished rows are safe. Resume with: {again}") from problem
-    parts = [(part.bytes, part.verdicts) for part in plan.there.intact.values()]
-    parts += [(part.bytes, part.verdicts) for part in whole.written]
-    return summary_of(
+    parts: list[Described | Written] = [*plan.there.intact.values(), *whole.written]
+    reasons = sum((Counter(part.verdicts) for part in parts), Counter[str]())
+    model = plan.identity["settings"]["model"]
+    return Summary(
         out,
-        plan.identity,
         sweep.n_designs,
-        parts,
         rows_computed=sum(part.rows for part in whole.written),
+        reasons=dict(sorted(reasons.items())),
         seconds=time.monotonic() - begun,
         started=started,
         host=socket.gethostname(),
         jobs=whole.jobs,
         backend=backend,
+        parts=len(parts),
+        bytes=sum(part.bytes for part in parts),
+        accuracy=plan.identity["accuracy"],
         firmness=firmness,
-        notes=tuple(_notes(plan)),
+        notes=_notes(plan),
+        boulder={name: model[name] for name in ("foot", "rock_assumed") if name in model},
     )
 
 
@@ -239,7 +240,7 @@ class _Run:
                 self._signals.check()
                 if progress is not None:
                     seconds = time.monotonic() - begun
-                    progress(progress_of(before, self._ticked, self._rows, seconds, _notes(plan)))
+                    progress(Progress(before, self._ticked, self._rows, seconds, _notes(plan)))
         except BaseException:
             self._stopped.set()
             thread.join(_PATIENCE_S)
@@ -442,7 +443,7 @@ def estimate(
     Parameters
     ----------
     sweep, out, jobs, simulate
-        As of `run`.
+        See `run`.
     resume
         Count only the rows that are missing in `out` or damaged there.
 

@@ -1,7 +1,7 @@
 """The folder of a table: one file for each range of rows, each of which appears whole and never changes.
 
 A folder contains ``rows-<first>-<stop>-<hash>.parquet``, and nothing else. The ranges follow from the settings, the
-hash is that of the file's bytes: damage shows by name, and the same work has the same name. So nobody need record what
+hash comes from the file's bytes: damage shows by name, and the same work has the same name. Nobody need record what
 is finished. A local file is written in a hidden folder beside the table's and renamed; where that folder cannot be,
 it is written in the table's folder, under a name that readers skip. On an object store a file is one request.
 """
@@ -91,7 +91,7 @@ def hash_of(content: bytes | memoryview) -> str:
 
 
 def part_file(name: str) -> PartFile | None:
-    """Return what a name says; None where it is not that of a part."""
+    """Return what the name of a part says; None for any other name."""
     match = _NAME.fullmatch(name)
     part = PartFile(int(match[1]), int(match[2]), match[3]) if match else None
     return part if part and part.name == name else None
@@ -103,7 +103,7 @@ def part_files(names: Sequence[str]) -> list[PartFile]:
 
 
 def put_part(out: Location, first: int, stop: int, content: bytes | memoryview) -> PartFile:
-    """Write a part; it appears whole, or not at all. Whoever computes the same rows may write it, too.
+    """Write a part; it appears whole, or not at all. Another worker may write the same part, too.
 
     Raises
     ------
@@ -187,7 +187,7 @@ def _remove_empty(folder: Path) -> None:
 
 
 def hidden_folder(out: Path) -> Path:
-    """Return the folder beside that of a table in which its files are written."""
+    """Return the hidden folder beside a table in which its files are written."""
     whole = out.resolve()
     return whole.with_name(f".{whole.name}{WRITING}")
 

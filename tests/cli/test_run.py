@@ -11,7 +11,7 @@ import pytest
 
 from boulder_sweep.cli import output
 from boulder_sweep.errors import Interrupted
-from boulder_sweep.runner.progress import progress_of
+from boulder_sweep.runner.progress import Progress
 from boulder_sweep.runner.run import resuming
 from boulder_sweep.store import folder
 from boulder_sweep.text import duration_text
@@ -260,7 +260,7 @@ def test_progress_without_a_terminal_is_a_plain_line_now_and_then(capsys, monkey
     monkeypatch.setattr(output.time, "monotonic", lambda: clock["now"])
     with output.progress(quiet=False, notes=output.Notes()) as show:
         for clock["now"], done in ((1.0, 100), (11.0, 200), (12.0, 300), (30.0, 400)):
-            show(progress_of(0, done, 1000, done / 50))
+            show(Progress(0, done, 1000, done / 50))
     lines = capsys.readouterr().err.splitlines()
     assert lines == [
         " 20.0%  200 of 1,000 designs, 50 per second, 16 s left",

@@ -61,7 +61,7 @@ def test_a_store_that_does_not_answer_ends_the_run_in_words(monkeypatch):
         raise ConnectionResetError("not now")
 
     monkeypatch.setattr(MemoryFileSystem, "pipe_file", refuse)
-    with pytest.raises(WriteError, match=f"cannot write into {OUT}: .*not now. Finished rows are safe. Resume with: "):
+    with pytest.raises(WriteError, match=f"cannot write into {OUT}: .*not now. .* rows are safe. Resume with: "):
         run(grid(), OUT, **HOW)
 
 
@@ -76,7 +76,7 @@ def test_a_store_that_lists_nothing_any_more_ends_the_run_in_words(monkeypatch, 
         return ls(self, path, **more)
 
     monkeypatch.setattr(MemoryFileSystem, "ls", refuse)
-    with pytest.raises(WriteError, match=f"cannot write into {OUT}: .*not now. Finished rows are safe. Resume with: "):
+    with pytest.raises(WriteError, match=f"cannot write into {OUT}: .*not now. .* rows are safe. Resume with: "):
         run(grid(), OUT, overwrite=True, **HOW)
 
 
