@@ -66,7 +66,7 @@ class Written(NamedTuple):
     verdicts: dict[str, int]
 
 
-class Stopped(Exception):  # noqa: N818 - not an error: the run was stopped
+class StoppedError(Exception):
     """The run was stopped before the range was finished."""
 
 
