@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from boulder_sweep.judge.evaluation import Evaluation
     from boulder_sweep.settings import Sweep
 
-WORK_S = 0.25
-"""Work of a range, and most of a block [s]: so long that its few rows that need finer steps fill lanes, and short
-enough for Ctrl-C to act at once."""
+WORK_S, BLOCK_S = 0.25, 0.125
+"""Work of a range, and most of a block [s]: so long that the few rows of a block that need finer steps fill lanes, and
+short enough for Ctrl-C to act at once, also where threads share a core."""
 _PLAIN_S, _LAYERED_S, _OUTLINED_S = 1e-5, 4e-5, 6e-5
 """Cost of a row on one core [s]: of a box in uniform soil, in layers, and of a boulder of several pieces in them."""
 _STEP_S, _LOCATED_STEP_S, _LOCATED = 0.012, 0.006, 3.0
@@ -66,7 +66,7 @@ class Written(NamedTuple):
     verdicts: dict[str, int]
 
 
-class Stopped(Exception):  # noqa: N818 - not an error: the run was stopped
+class StoppedError(Exception):
     """The run was stopped before the range was finished."""
 
 

@@ -45,7 +45,7 @@ from boulder_sweep.runner.progress import (
     time_and_disk,
     too_large,
 )
-from boulder_sweep.runner.ranges import WORK_S, Stopped, Work, Written, planned, seconds_per_row
+from boulder_sweep.runner.ranges import BLOCK_S, StoppedError, Work, Written, planned, seconds_per_row
 from boulder_sweep.settings.sweep import SECTION
 from boulder_sweep.signals import Signals, noted_signals, undone
 from boulder_sweep.store import failures
@@ -229,7 +229,7 @@ class _Run:
 
     def compute(self, plan: _Plan, metadata: dict[bytes, bytes], progress: Report | None) -> None:
         """Compute and write what is missing; raises as `run`."""
-        size = max(int(WORK_S / seconds_per_row(plan.sweep, plan.evaluation)), 1)
+        size = max(int(BLOCK_S / seconds_per_row(plan.sweep, plan.evaluation)), 1)
         work = Work(plan.evaluation, plan.sweep.block, metadata, str(self._out), size)
         thread = threading.Thread(target=self._work, args=(plan, work), name="run", daemon=True)
         thread.start()
@@ -247,7 +247,7 @@ class _Run:
             if thread.is_alive():
                 self._signals.abandon(thread)
             raise
-        if self._problem is not None and not isinstance(self._problem, Stopped):
+        if self._problem is not None and not isinstance(self._problem, StoppedError):
             raise self._problem
         self._signals.check()
 
@@ -293,7 +293,7 @@ class _Run:
     def _tick(self, rows: int) -> None:
         """Count a block; called by the threads of this process."""
         if self._stopped.is_set():
-            raise Stopped
+            raise StoppedError
         self._ticked += rows
 
 
