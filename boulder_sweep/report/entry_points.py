@@ -191,7 +191,7 @@ def simulate_in_soil(
 
 
 class Given(NamedTuple):
-    """Designs, their soil, and room for that of one of them."""
+    """Designs, their layers and outlines, and room for the soil of one design."""
 
     designs: np.ndarray
     layers: np.ndarray

@@ -29,7 +29,7 @@ OUTCOME_COUNT = len(OUTCOME)
 LIMITS = (*VerdictLimits._fields, *Tested._fields)
 """Limits of the criterion, and what the model was tested on, in this order; rad, m, kg/m^3."""
 SIZES = (*Sizes._fields, *FlagInputs._fields)
-"""Inputs of the rules, and behind them those of the flags; SI, the friction angle of the flags in degrees."""
+"""Inputs of the rules, then inputs of the flags; SI, the friction angle of the flags in degrees."""
 RULE_LIMITS, RULE_SIZES, SIZES_V_0 = len(VerdictLimits._fields), len(Sizes._fields), SIZES.index("v_0")
 RULINGS = (*Course._fields, "flags")
 """What the rules make of a design."""

@@ -216,14 +216,14 @@ def take_second(
     ----------
     out, row
         The solution that counts so far, with the errors of its steps, in an array of `empty_outcomes`. A finer one
-        takes its place, and the errors are those that two solutions have: that of the steps of the finer, or the
-        difference if larger.
+        takes its place. The errors become the larger of the finer solution's own and the difference of the two; of a
+        pair, the difference alone.
     found, at
         The second solution, the same way.
     solution
         Which one it is, `FINER` to `PAIR`.
     design, safety
-        As of `estimate_error`.
+        The design, and the factor from the difference to the estimate, see `safety_of`.
     """
     first, second = outcome_in(out, row), outcome_in(found, at)
     finer = solution == FINER
@@ -255,7 +255,7 @@ def take_seconds(
     found, designs
         Their second solutions and designs, shapes (11, m) and (15, m).
     safety
-        As of `estimate_error`.
+        Factor from the difference to the estimate, see `safety_of`.
     """
     for at in range(rows.size):
         row = rows[at]

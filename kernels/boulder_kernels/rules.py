@@ -357,7 +357,7 @@ def write_flags(counted: np.ndarray, overlap: np.ndarray, inputs: np.ndarray, te
     Parameters
     ----------
     counted, overlap
-        As of `Rows` and of `Course`, shapes (11, n) and (n,).
+        The solutions that count, shape (11, n), and the overlap with the bumper, shape (n,) [m].
     inputs
         Rows are the fields of `FlagInputs`, shape (15, n).
     tested
