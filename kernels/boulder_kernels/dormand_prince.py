@@ -282,9 +282,10 @@ def turning_point(q: Track, tau_end: float) -> float:
     Three steps from the chord: the velocity bends little within a step, and what is left counts by its square.
     """
     end = slope_at(q, tau_end)
-    tau = tau_end * q.x1 / (q.x1 - end) if q.x1 != end else tau_end
-    tau = closer(q, closer(q, closer(q, tau, tau_end), tau_end), tau_end)
-    return tau if q.x1 * end < 0.0 else tau_end
+    if not q.x1 * end < 0.0:
+        return tau_end
+    tau = tau_end * q.x1 / (q.x1 - end)
+    return closer(q, closer(q, closer(q, tau, tau_end), tau_end), tau_end)
 
 
 @exact_inlined

@@ -14,26 +14,11 @@ number of steps lasts. Three things make such designs affordable.
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ._jit import inlined, kernel
-from .after_step import (
-    RUNNING,
-    Decided,
-    Kept,
-    at_limit,
-    decide,
-    ending_of,
-    enter_modes,
-    initial_state,
-    is_finite,
-    keep_step,
-    passed_maxima,
-    passes,
-)
 from .control import (
     ACCEPTED,
     MOST_STEPS,
@@ -41,31 +26,18 @@ from .control import (
     STEP_RATIO,
     Control,
     Rates,
-    attempt_budget,
-    first_length,
     first_step,
     rates_of,
     stable_step,
 )
 from .design import Constants, Design, Readings, constants_of, is_computable
 from .dormand_prince import dense_output, step
-from .dynamics import rate_of
-from .error_estimates import error_time
-from .events import NONE, SHORTEN, locate_limit
-from .modes import change_mode, changes_counted, initial_modes, length_after
-from .outcomes import Outcome, Status, compression_at, no_maxima, undefined_maxima
-from .settling import NO_PROOF, boulder_energy
+from .dynamics import Acceleration, State
+from .events import locate_limit
+from .following import RUNNING, Impact, failed, first_touch, follow, go_on, outcome_of, stop_of
+from .outcomes import Outcome, Status
 from .soil_laws import constants_in
-from .time_history import Record, add_exchanged, nothing_exchanged, write_samples
-
-FULL_TURN = math.pi
-"""Rotation at which a simulation that does not stop at the limit ends [rad]: the boulder is upside down."""
-
-
-@kernel
-def failed(status: int) -> Outcome:
-    """Outcome of a design that was not simulated, or not to its end."""
-    return Outcome(status, undefined_maxima(), np.nan, np.nan, 0, np.nan, np.nan, 0.0)
+from .time_history import Exchanged, Record, add_exchanged, nothing_exchanged, write_samples
 
 
 class Problem(NamedTuple):
@@ -115,14 +87,13 @@ def simulate(problem: Problem, readings: Readings, control: Control, record: Rec
     c = constants_in(problem.design, readings, control.elements, problem.profile)
     if not is_computable(c):
         return failed(Status.INVALID.value)
-    theta_stop = control.theta_limit if control.stop_at_limit else FULL_TURN
-    h, status = first_step(control, theta_stop, c)
+    h, status = first_step(control, stop_of(control), c)
     if status != ACCEPTED:
         return failed(status)
-    outcome = simulate_by_steps(h, h, c, readings, control, theta_stop, record)
+    outcome = simulate_by_steps(h, h, c, readings, control, record)
     while outcome.status == Status.UNSTABLE.value and control.horizon <= MOST_STEPS * h:
         h *= RETRY
-        outcome = simulate_by_steps(h, h, c, readings, control, theta_stop, record)
+        outcome = simulate_by_steps(h, h, c, readings, control, record)
     return outcome
 
 
@@ -132,82 +103,54 @@ def misses(design: Design) -> bool:
     return design.H - design.d <= design.e_bumper
 
 
+class Watched(NamedTuple):
+    """What is noted of an impact while it goes on."""
+
+    t_limit: float
+    """When it reached a limit at which it does not stop [s]; NaN before."""
+    written: int
+    """Samples of its record that have been written."""
+    exchanged: Exchanged
+    """Energies exchanged so far."""
+
+
+@inlined
+def watch(
+    w: Watched, i: Impact, y_end: State, k_end: Acceleration, after: Impact, c: Constants, control: Control, record: Record
+) -> Watched:
+    """Note what there is of a step, from an impact at its start and after it; other arguments: see `follow`."""
+    t, h, t_end = i.clock.t, i.clock.h, after.clock.t
+    dense = dense_output(i.y, i.k, y_end, k_end, h)
+    t_limit, written, exchanged = w.t_limit, w.written, w.exchanged
+    if np.isnan(t_limit) and after.maxima.theta >= control.theta_limit:
+        gap_start, gap = control.theta_limit - abs(i.y.theta_b), control.theta_limit - after.maxima.theta
+        tau = (after.maxima.t_theta - t) / h
+        t_limit = t + h * locate_limit(gap_start, gap, dense.rotation, control.theta_limit, tau)
+    if record.times.size > 0:
+        written = write_samples(record, written, t, t_end, dense, i.modes, i.switches, c, exchanged)
+        exchanged = add_exchanged(exchanged, dense, (t_end - t) / h, i.modes, i.switches, c)
+    return Watched(t_limit, written, exchanged)
+
+
 @kernel
 def simulate_by_steps(
-    h_touching: float,
-    h_apart: float,
-    c: Constants,
-    readings: Readings,
-    control: Control,
-    theta_stop: float,
-    record: Record,
+    h_touching: float, h_apart: float, c: Constants, readings: Readings, control: Control, record: Record
 ) -> Outcome:
     """Simulate one impact with given time steps [s] while the truck touches and while not; see `simulate`."""
-    ending = ending_of(control, readings, h_apart)
-    budget = float(MOST_STEPS) if control.last_resort else attempt_budget(h_apart, ending.longest)
-    h_full = h_touching
-    y, modes = initial_state(c), initial_modes(readings, c)
-    switches, factors = enter_modes(modes, readings, theta_stop, control.locate_yield, control.event_tolerance, c)
-    k1, start = rate_of(y, switches, c), compression_at(y, switches, c)
-    m = no_maxima()
-    exchanged = nothing_exchanged()
-    recording = record.times.size > 0
-    written = 0
-    t, t_limit = 0.0, np.nan
-    attempts = 0
-    h_next = first_length(h_full, factors, c)
-    barrier, horizon = NO_PROOF, control.horizon
-    error = rotation_changes = 0.0
-    while attempts < budget:
-        attempts += 1
-        h = min(h_next, horizon - t)
-        y_end, k_end, step_error = step(y, k1, h, switches, c)
-        passing, end = passes(y, y_end, k_end, factors, switches, c, 0.0)
-        # Where nothing proves that the motion may end, there is no energy to compare.
-        provable = barrier > NO_PROOF and y_end.v_v <= 0.0
-        if passing and h < horizon - t and not (provable and not boulder_energy(y_end, c) >= barrier):
-            kept = Kept(float(NONE), 1.0, y_end, passed_maxima(m, t, h, y, y_end, start, end, switches))
-            decided = Decided(RUNNING, t + h, barrier, horizon)
-        elif not is_finite(y_end):
-            return failed(Status.UNSTABLE.value)
-        else:
-            dense = dense_output(y, k1, y_end, k_end, h)
-            kept = keep_step(t, y, k1.M, y_end, k_end.M, start, m, dense, factors, switches, control.locate_yield, c)
-            if kept.event == SHORTEN:
-                h_next = kept.tau * h
-                continue
-            decided = decide(t, h, y, kept, barrier, horizon, ending, c)
-            end = compression_at(kept.y, switches, c)
-        h_next, m, barrier, horizon = h_full, kept.m, decided.barrier, decided.horizon
-        error += step_error
-        if recording or not control.stop_at_limit:
-            dense = dense_output(y, k1, y_end, k_end, h)
-            if np.isnan(t_limit) and m.theta >= control.theta_limit and not control.stop_at_limit:
-                gap_start, gap = control.theta_limit - abs(y.theta_b), control.theta_limit - m.theta
-                tau = (m.t_theta - t) / h
-                t_limit = t + h * locate_limit(gap_start, gap, dense.rotation, control.theta_limit, tau)
-            if recording:
-                written = write_samples(record, written, t, h, kept.tau, dense, modes, switches, c, exchanged)
-                exchanged = add_exchanged(exchanged, dense, h, kept.tau, modes, switches, c)
-        begun, t = t, decided.t
-        if decided.status != RUNNING:
-            if decided.status == Status.LIMIT.value:
-                m = at_limit(m, t, theta_stop)
-                t_limit = t if control.stop_at_limit else t_limit
-            yield_located = control.locate_yield and control.elements == 0
-            moved = error_time(h_full, yield_located) * error
-            return Outcome(decided.status, m, t_limit, t, attempts, moved, kept.y.omega_b, rotation_changes)
-        y, k1, start = kept.y, k_end, end
-        if kept.event > NONE:
-            rotation_changes += changes_counted(kept.event, begun, modes)
-            y, modes = change_mode(int(kept.event), y, rate_of(y, switches, c).M, modes, c)
-            switches, factors = enter_modes(
-                modes, readings, theta_stop, control.locate_yield, control.event_tolerance, c
-            )
-            k1, start = rate_of(y, switches, c), compression_at(y, switches, c)
-            h_full = h_touching if modes.touching else h_apart
-            h_next = length_after(kept.event, h_full, y.omega_b, k1.alpha_b)
-    return failed(Status.STEP_BUDGET.value)
+    watching = record.times.size > 0 or not control.stop_at_limit
+    w = Watched(np.nan, 0, nothing_exchanged())
+    i = first_touch(h_touching, h_apart, c, readings, control)
+    status = RUNNING
+    while status == RUNNING:
+        y_end, k_end, error = step(i.y, i.k, i.clock.h, i.switches, c)
+        plain, after = go_on(i, y_end, k_end, error, c)
+        if not plain:
+            followed = follow(i, y_end, k_end, error, c, readings, control)
+            status, after = followed.status, followed.impact
+        if watching and after.clock.t > i.clock.t:
+            w = watch(w, i, y_end, k_end, after, c, control, record)
+        i = after
+    return outcome_of(i, status, i.clock.t if status == Status.LIMIT.value and control.stop_at_limit else w.t_limit, control)
 
 
 DAMPED = 16.0
@@ -266,5 +209,5 @@ def simulate_last_resort(design: Design, readings: Readings, control: Control, r
     ratio = STEP_RATIO if control.refined else 1.0
     h = min(control.h, RESOLVED * longest_step(control.theta_limit, c)) / ratio
     h_apart = min(control.h, longest_step(control.theta_limit, apart)) / ratio if readings.separation_released else h
-    outcome = simulate_by_steps(h, h_apart, c, readings, control, control.theta_limit, record)
+    outcome = simulate_by_steps(h, h_apart, c, readings, control, record)
     return failed(status) if outcome.status == Status.STEP_BUDGET.value else outcome

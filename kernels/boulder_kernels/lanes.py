@@ -1,270 +1,237 @@
-"""Many designs side by side: their way through the lanes.
+"""Many designs side by side, one in each lane of the vector registers.
 
-All groups of lanes are stepped in turn (`boulder_kernels.lane_steps`). A lane whose step needs more than to be accepted
-hands its design over to a group of events and goes on with another at once: one that returns from there, else the next
-of the table, so that no lane waits. A group of events is worked out when it is full (`boulder_kernels.lane_events`);
-there are two, because designs return from one while the other is being filled. The next of the table are started side
-by side, too (`boulder_kernels.lane_steps`). What a lane computes does not depend on the others, only when and where it
-does so.
+One loop advances all lanes by a step, each by its own clock (`attempt_steps`), and another accepts the steps that are
+plain (`take_over_steps`). What follows from any other step is found for its lane alone, by the function that the single
+impact uses (`boulder_kernels.following.follow`), and a lane whose design has ended goes on with the next of the table.
+Designs are started side by side, in a group of their own. What a lane computes does not depend on the others.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ._jit import inlined, kernel
-from .after_step import RUNNING, ending_of
-from .control import MOST_STEPS, RETRY, Control
-from .design import Readings
-from .lane_events import conclude, start_steps, work_out
-from .lane_steps import attempt_steps, start_designs, take_over_steps, write_lane
+from .control import ACCEPTED, MOST_STEPS, RETRY, Control, first_step
+from .design import Readings, design_in, is_computable
+from .dormand_prince import step
+from .error_estimates import step_errors
+from .following import RUNNING, Clock, Impact, first_touch, follow, go_on, outcome_of, stop_of
 from .numerics import field, put
-from .outcomes import STATUS, Status, empty_outcomes
+from .outcomes import STATUS, Outcome, Status, empty_outcomes, write_outcome
 from .workspace import (
-    ATTENTION,
-    EVENT_SIZE,
-    EVENTS,
+    ATTEMPT,
+    CLOCK,
+    CONSTANTS,
+    DESIGN,
+    END,
+    END_STATE,
+    FACTORS,
+    FRONT,
     GROUPS,
     LANES,
+    MAXIMA,
+    MODES,
+    PACE,
     SIZE,
-    STARTS,
-    STATUS_OF_LANE,
-    STEP,
-    STEP_FULL,
-    WHOLE,
+    START,
+    STARTED,
+    STATE,
+    SWITCHES,
+    Attempt,
+    align_stack,
+    constants_in_lane,
     copy_lane,
+    load,
     part,
+    room,
+    store,
+    store_given,
 )
 
 EMPTY = -1
 """Row of a lane that holds no design."""
-STEPPED = GROUPS * LANES
-"""Slots that are stepped: 0 ... STEPPED - 1. Behind them are those of the two groups of events, and behind
-those the ones where designs are started."""
-SLOTS = STEPPED + 3 * LANES
-BUSY, PENDING, READY, IDLE, SIDE, HANDLED, STARTED = range(7)
-"""Among the counts of a `Queue`: lanes with a design; designs in the group of events that is being filled, designs in
-the other one that may return, lanes without a design, which of the groups is being filled, 0 or 1, how many steps have
-been worked out there in all, and designs that have been started and wait for a lane."""
-
-
-class Queue(NamedTuple):
-    """Where the designs are: arrays of whole numbers."""
-
-    rows: Any
-    """Row of the design in each slot or EMPTY, and behind them the first row not yet started."""
-    ready: np.ndarray
-    """Slots of designs that may return into a lane."""
-    started: np.ndarray
-    """Slots of designs that may enter a lane."""
-    idle: np.ndarray
-    """Lanes without a design."""
-    waiting: np.ndarray
-    """Lanes whose step needs more than to be accepted."""
-    counts: np.ndarray
-    """How many of each, see BUSY."""
+NEXT = LANES
+"""Behind the rows in the lanes: the next row of the table."""
 
 
 @inlined
-def lane_of(slot: int) -> int:
-    """Lane of the workspace that a slot stands for."""
-    if slot < STEPPED:
-        return (slot // LANES) * SIZE + slot % LANES
-    if slot < SLOTS - LANES:
-        return EVENTS + ((slot - STEPPED) // LANES) * EVENT_SIZE + slot % LANES
-    return STARTS + slot % LANES
+def load_impact(ws: Any, lane: int) -> Impact:
+    """Return the impact in a lane."""
+    return Impact(
+        load(ws, PACE, lane),
+        load(ws, STATE, lane),
+        load(ws, START, lane),
+        load(ws, FRONT, lane),
+        load(ws, MAXIMA, lane),
+        load(ws, CLOCK, lane),
+        load(ws, MODES, lane),
+        load(ws, SWITCHES, lane),
+        load(ws, FACTORS, lane),
+    )
+
+
+@inlined
+def store_motion(ws: Any, lane: int, i: Impact) -> None:
+    """Write what changes with every step of an impact into its lane."""
+    store(ws, STATE, lane, i.y)
+    store(ws, START, lane, i.k)
+    store(ws, FRONT, lane, i.front)
+    store(ws, MAXIMA, lane, i.maxima)
+    store(ws, CLOCK, lane, i.clock)
+
+
+@inlined
+def store_modes(ws: Any, lane: int, i: Impact) -> None:
+    """Write what changes with the modes of an impact into its lane."""
+    store(ws, MODES, lane, i.modes)
+    store(ws, SWITCHES, lane, i.switches)
+    store(ws, FACTORS, lane, i.factors)
 
 
 @kernel
-def start_more(ws: Any, q: Queue, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray) -> None:
-    """Start the next designs of the table, until there are some that need integration; write those that need none.
+def attempt_steps(ws: Any) -> None:
+    """Advance every lane by its step, in one vectorised loop."""
+    align_stack()
+    for lane in range(LANES):
+        y_end, k_end, error = step(
+            load(ws, STATE, lane),
+            load(ws, START, lane),
+            load(ws, CLOCK, lane).h,
+            load(ws, SWITCHES, lane),
+            load(ws, CONSTANTS, lane),
+        )
+        store(ws, END_STATE, lane, y_end)
+        store(ws, END, lane, k_end)
+        store(ws, ATTEMPT, lane, Attempt(error, 0.0, RUNNING))
+
+
+@kernel
+def take_over_steps(ws: Any) -> int:
+    """Accept the steps that are plain; mark and count the others."""
+    align_stack()
+    others = 0
+    for lane in range(LANES):
+        i, error = load_impact(ws, lane), load(ws, ATTEMPT, lane).error
+        plain, after = go_on(
+            i, load(ws, END_STATE, lane), load(ws, END, lane), error, load(ws, CONSTANTS, lane)
+        )
+        store(ws, ATTEMPT, lane, Attempt(error, 1.0 if plain else 0.0, RUNNING))
+        others += 0 if plain else 1
+        store_motion(ws, lane, after if plain else i)
+    return others
+
+
+@kernel
+def start_designs(ws: Any, designs: np.ndarray, first: int, readings: Readings, control: Control) -> None:
+    """Put as many designs as there are lanes into a group.
 
     Parameters
     ----------
-    ws, q
-        The workspace and the queue.
-    designs, readings, control, out
-        As of `simulate_lanes`, and its result; of the designs, at least as many as lanes.
+    ws
+        The workspace, from the group on.
+    designs, first
+        Designs as of `simulate_lanes`, and the row of that in the first lane.
+    readings, control
+        As of `simulate_lanes`.
+
+    Notes
+    -----
+    A lane is left with the status RUNNING, or with that of a design that needs no integration or allows none.
     """
-    while q.counts[STARTED] == 0 and q.rows[-1] < out.shape[1]:
-        first = min(q.rows[-1], designs.shape[1] - LANES)
-        start_designs(part(ws, STARTS), designs, first, readings, control, control.h)
-        for row in range(q.rows[-1], min(first + LANES, out.shape[1])):
-            slot = SLOTS - LANES + row - first
-            status = int(field(part(ws, STARTS), STATUS_OF_LANE, row - first))
-            if status == RUNNING:
-                q.rows[slot] = row
-                q.started[q.counts[STARTED]] = slot
-                q.counts[STARTED] += 1
-            else:
-                out[STATUS, row] = status
-        q.rows[-1] = first + LANES
-
-
-@inlined
-def let_return(ws: Any, q: Queue, other: int, slot: int) -> None:
-    """Move a design from its slot in another group into a lane."""
-    copy_lane(ws, lane_of(other), lane_of(slot), ATTENTION)
-    q.rows[slot] = q.rows[other]
+    align_stack()
+    # Loads from another array would keep the loop from being vectorised.
+    for lane in range(LANES):
+        store(ws, DESIGN, lane, design_in(designs, first + lane))
+        store_given(ws, lane, designs, first + lane)
+    for lane in range(LANES):
+        design = load(ws, DESIGN, lane)
+        c = constants_in_lane(ws, lane, design, readings)
+        h, status = first_step(control, stop_of(control), c)
+        status = RUNNING if status == ACCEPTED else status
+        status = status if is_computable(c) else Status.INVALID.value
+        status = Status.NO_CONTACT.value if design.H - design.d <= design.e_bumper else status
+        store(ws, CONSTANTS, lane, c)
+        store(ws, ATTEMPT, lane, Attempt(h, 0.0, float(status)))
+    for lane in range(LANES):
+        h = load(ws, ATTEMPT, lane).error
+        i = first_touch(h, h, load(ws, CONSTANTS, lane), readings, control)
+        store(ws, PACE, lane, i.pace)
+        store_motion(ws, lane, i)
+        store_modes(ws, lane, i)
 
 
 @inlined
 def next_design(
-    ws: Any,
-    q: Queue,
-    slot: int,
-    designs: np.ndarray,
-    readings: Readings,
-    control: Control,
-    out: np.ndarray,
+    ws: Any, rows: np.ndarray, lane: int, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray
 ) -> None:
-    """Put the next design that needs integration into the lane of a slot; other arguments: see `start_more`."""
-    if q.counts[STARTED] == 0:
-        start_more(ws, q, designs, readings, control, out)
-    if q.counts[STARTED] > 0:
-        q.counts[STARTED] -= 1
-        let_return(ws, q, q.started[q.counts[STARTED]], slot)
-        return
+    """Put the next design that needs integration into a lane; write those that need none."""
+    started = (GROUPS - 1) * SIZE
+    while rows[NEXT] < out.shape[1]:
+        row = rows[NEXT]
+        rows[NEXT] += 1
+        if row % LANES == 0:
+            start_designs(part(ws, started), designs, row, readings, control)
+        status = int(load(part(ws, started), ATTEMPT, row % LANES).status)
+        if status == RUNNING:
+            copy_lane(ws, started + row % LANES, lane, STARTED)
+            rows[lane] = row
+            return
+        out[STATUS, row] = status
+    rows[lane] = EMPTY
     # An empty lane stands still: its steps have no length, and their results are ignored.
-    lane = lane_of(slot)
-    q.rows[slot] = EMPTY
-    put(ws, STEP, lane, 0.0)
-    put(ws, STEP_FULL, lane, 0.0)
+    store(ws, CLOCK, lane, Clock(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 
 
-@inlined
-def start_again(
-    ws: Any, lane: int, designs: np.ndarray, row: int, readings: Readings, control: Control, longest: float
-) -> int:
-    """Start a design in a lane of the workspace by steps no longer than given [s]; return its status."""
-    first = min(row, designs.shape[1] - LANES)
-    again = STARTS + EVENT_SIZE
-    start_designs(part(ws, again), designs, first, readings, control, longest)
-    copy_lane(ws, again + row - first, lane, ATTENTION)
-    return int(field(part(ws, again), STATUS_OF_LANE, row - first))
+@kernel
+def follow_lane(ws: Any, lane: int, readings: Readings, control: Control) -> int:
+    """Find what follows from the step of a lane, see `boulder_kernels.following.follow`; return its status."""
+    mine = part(ws, lane)
+    i, c = load_impact(mine, 0), load(mine, CONSTANTS, 0)
+    error = load(mine, ATTEMPT, 0).error
+    followed = follow(i, load(mine, END_STATE, 0), load(mine, END, 0), error, c, readings, control)
+    status, after = followed.status, followed.impact
+    if status == Status.UNSTABLE.value and control.horizon <= MOST_STEPS * i.clock.h_full:
+        h = RETRY * i.clock.h_full
+        after = first_touch(h, h, c, readings, control)
+        store(mine, PACE, 0, after.pace)
+        status = RUNNING
+    store_motion(mine, 0, after)
+    store_modes(mine, 0, after)
+    return status
 
 
-@inlined
-def hand_over(
-    ws: Any,
-    q: Queue,
-    slot: int,
-    designs: np.ndarray,
-    readings: Readings,
-    control: Control,
-    out: np.ndarray,
+@kernel
+def write_lane(
+    ws: Any, lane: int, status: int, designs: np.ndarray, control: Control, out: np.ndarray, row: int
 ) -> None:
-    """Move a design into the group of events, and let another into its lane; arguments: see `start_more`."""
-    counts = q.counts
-    other = STEPPED + counts[SIDE] * LANES + counts[PENDING]
-    copy_lane(ws, lane_of(slot), lane_of(other), SIZE)
-    q.rows[other] = q.rows[slot]
-    counts[PENDING] += 1
-    if counts[READY] > 0:
-        counts[READY] -= 1
-        let_return(ws, q, q.ready[counts[READY]], slot)
-        return
-    next_design(ws, q, slot, designs, readings, control, out)
-    if q.rows[slot] == EMPTY:
-        q.idle[counts[IDLE]] = slot
-        counts[IDLE] += 1
-        counts[BUSY] -= 1
+    """Write the outcome of a lane into its row; a design that failed leaves its row NaN."""
+    i = load_impact(part(ws, lane), 0)
+    o = outcome_of(i, status, i.clock.t if status == Status.LIMIT.value else np.nan, control)
+    write_outcome(out, row, o, step_errors(o, design_in(designs, row), control.theta_limit, control.horizon))
 
 
 @kernel
-def handle(
-    ws: Any,
-    q: Queue,
-    designs: np.ndarray,
-    readings: Readings,
-    control: Control,
-    out: np.ndarray,
+def run_lanes(
+    designs: np.ndarray, readings: Readings, control: Control, ws: Any, rows: np.ndarray, out: np.ndarray
 ) -> None:
-    """Work out what follows from the steps in the group of events; arguments: see `start_more`.
-
-    As many designs as lanes have left since this was last done, so all that were ready then have returned.
-    """
-    counts = q.counts
-    side, size = counts[SIDE], counts[PENDING]
-    events = part(ws, EVENTS + side * EVENT_SIZE)
-    work_out(events, size, control.locate_yield)
-    for k in range(size):
-        ending = ending_of(control, readings, field(events, STEP_FULL, k))
-        put(events, STATUS_OF_LANE, k, float(conclude(events, k, readings, ending, control.locate_yield)))
-    start_steps(events)
-    for k in range(size):
-        other = STEPPED + side * LANES + k
-        row, h = q.rows[other], field(events, STEP_FULL, k)
-        status = int(field(events, STATUS_OF_LANE, k))
-        if status == Status.UNSTABLE.value and control.horizon <= MOST_STEPS * h:
-            lane = EVENTS + side * EVENT_SIZE + k
-            status = start_again(ws, lane, designs, row, readings, control, RETRY * h)
-        if status != RUNNING:
-            write_lane(events, k, status, designs, control, out, row)
-        elif counts[IDLE] > 0:
-            counts[IDLE] -= 1
-            counts[BUSY] += 1
-            let_return(ws, q, other, q.idle[counts[IDLE]])
-        else:
-            q.ready[counts[READY]] = other
-            counts[READY] += 1
-    counts[HANDLED] += size
-    counts[PENDING] = 0
-    counts[SIDE] = 1 - side
-
-
-@kernel
-def is_empty(q: Queue, group: int) -> bool:
-    """Whether all lanes of a group are empty."""
-    empty = True
-    for slot in range(group * LANES, (group + 1) * LANES):
-        empty &= q.rows[slot] == EMPTY
-    return empty
-
-
-@kernel
-def step_groups(ws: Any, q: Queue) -> int:
-    """Attempt a step in all lanes of all groups, accept those that need no more, and list and count the others."""
-    count = 0
-    for group in range(GROUPS):
-        # The last rows of a table, or the few that need the finest steps, leave a group empty for long.
-        if q.counts[IDLE] >= LANES and is_empty(q, group):
-            continue
-        lanes = part(ws, group * SIZE)
-        attempt_steps(lanes)
-        if take_over_steps(lanes) > 0:
+    """Simulate every design of a table; arguments: see `simulate_lanes`, and rows of the lanes, as many and one more."""
+    for lane in range(LANES):
+        next_design(ws, rows, lane, designs, readings, control, out)
+    busy = True
+    while busy:
+        attempt_steps(ws)
+        busy = True
+        if take_over_steps(ws) > 0:
+            busy = False
             for lane in range(LANES):
-                slot = group * LANES + lane
-                q.waiting[count] = slot
-                count += int((field(lanes, ATTENTION, lane) != 0.0) & (q.rows[slot] != EMPTY))
-    return count
-
-
-@kernel
-def begin(ws: Any, q: Queue, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray) -> None:
-    """Put the first designs into the lanes of an empty workspace; arguments: see `start_more`."""
-    for slot in range(STEPPED):
-        next_design(ws, q, slot, designs, readings, control, out)
-        if q.rows[slot] == EMPTY:
-            q.idle[q.counts[IDLE]] = slot
-            q.counts[IDLE] += 1
-        else:
-            q.counts[BUSY] += 1
-
-
-@kernel
-def sweep(ws: Any, q: Queue, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray) -> bool:
-    """Step all lanes once; return whether any design is left. Arguments: see `start_more`."""
-    for k in range(step_groups(ws, q)):
-        hand_over(ws, q, q.waiting[k], designs, readings, control, out)
-        if q.counts[PENDING] == LANES:
-            handle(ws, q, designs, readings, control, out)
-    # Towards the end, when lanes are empty, fewer need to come together.
-    if q.counts[PENDING] >= max(q.counts[BUSY] // GROUPS, 1):
-        handle(ws, q, designs, readings, control, out)
-    return q.counts[BUSY] > 0 or q.counts[PENDING] > 0
+                if rows[lane] != EMPTY and load(ws, ATTEMPT, lane).plain == 0.0:
+                    status = follow_lane(ws, lane, readings, control)
+                    if status != RUNNING:
+                        write_lane(ws, lane, status, designs, control, out, rows[lane])
+                        next_design(ws, rows, lane, designs, readings, control, out)
+                busy |= rows[lane] != EMPTY
 
 
 def empty_workspace(soil: type | None = None, parts: int = 0) -> Any:
@@ -277,36 +244,16 @@ def empty_workspace(soil: type | None = None, parts: int = 0) -> Any:
     parts
         Number of parts of the soil of a design.
     """
-    ws = np.zeros((1 if soil is None else 2) * WHOLE + LANES)
+    ws = np.zeros(room(soil, parts) + LANES)
     behind = ws.ctypes.data // ws.itemsize % LANES
     ws = ws[LANES - behind :]
     return ws if soil is None else soil(ws, (0,) * parts)
 
 
-def empty_queue() -> Queue:
-    """Return the queue before the first design has been started."""
-    return Queue(
-        np.zeros(SLOTS + 1, np.int64),
-        np.zeros(LANES, np.int64),
-        np.zeros(LANES, np.int64),
-        np.zeros(STEPPED, np.int64),
-        np.zeros(STEPPED, np.int64),
-        np.zeros(STARTED + 1, np.int64),
-    )
-
-
 def filled_up(designs: np.ndarray) -> np.ndarray:
-    """Return designs that are at least as many as lanes, the last one repeated where they are fewer."""
-    missing = LANES - designs.shape[1]
-    return designs if missing <= 0 else np.pad(designs, ((0, 0), (0, missing)), "edge")
-
-
-@kernel
-def run_lanes(designs: np.ndarray, readings: Readings, control: Control, ws: Any, q: Queue, out: np.ndarray) -> None:
-    """Simulate every design of a table; arguments: see `simulate_lanes` and `start_more`."""
-    begin(ws, q, designs, readings, control, out)
-    while sweep(ws, q, designs, readings, control, out):
-        pass
+    """Return designs that fill whole groups of lanes, the last one repeated."""
+    missing = -designs.shape[1] % LANES
+    return np.pad(designs, ((0, 0), (0, missing)), "edge") if missing else designs
 
 
 def simulate_lanes(
@@ -333,5 +280,7 @@ def simulate_lanes(
     """
     out = empty_outcomes(designs.shape[1])
     if designs.shape[1] > 0:
-        run_lanes(filled_up(designs), readings, control, empty_workspace(soil, parts), empty_queue(), out)
+        rows = np.full(LANES + 1, EMPTY)
+        rows[NEXT] = 0
+        run_lanes(filled_up(designs), readings, control, empty_workspace(soil, parts), rows, out)
     return out

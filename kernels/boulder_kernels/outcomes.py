@@ -281,8 +281,8 @@ def updated_maxima(
     dense: DenseOutput,
     s: Switches,
     c: Constants,
-) -> Maxima:
-    """Maxima after a step, from its end and from the turning points inside, by the dense output.
+) -> tuple[Maxima, Compression]:
+    """Maxima after a step, from its end and from the turning points inside, and the compression at its end.
 
     Parameters
     ----------
@@ -301,19 +301,25 @@ def updated_maxima(
     """
     h = dense.h
     t_end = t + tau_end * h
+    theta, t_theta = grown(m.theta, m.t_theta, abs(y_end.theta_b), t_end)
     tau = turning_point(dense.rotation, tau_end)
-    theta, t_theta = grown(m.theta, m.t_theta, abs(displacement_at(dense.rotation, tau)), t + tau * h)
-    theta, t_theta = grown(theta, t_theta, abs(y_end.theta_b), t_end)
+    if tau < tau_end:
+        theta, t_theta = grown(theta, t_theta, abs(displacement_at(dense.rotation, tau)), t + tau * h)
+    x_b, t_x_b = grown(m.x_b, m.t_x_b, y_end.x_b, t_end)
     tau = turning_point(dense.boulder, tau_end)
-    x_b, t_x_b = grown(m.x_b, m.t_x_b, displacement_at(dense.boulder, tau), t + tau * h)
-    x_b, t_x_b = grown(x_b, t_x_b, y_end.x_b, t_end)
-    tau = turning_point(dense.truck, tau_end)
-    x_v, t_x_v = grown(m.x_v, m.t_x_v, displacement_at(dense.truck, tau), t + tau * h)
-    x_v, t_x_v = grown(x_v, t_x_v, y_end.x_v, t_end)
-    stop = compression_at(state_at(dense, tau), s, c)  # where the truck stops, or at the end
-    deepest, share = highest(start.crush, start.crush_rate, stop.crush, stop.crush_rate, tau * h)
-    crush, t_crush = grown(m.crush, m.t_crush, deepest if dense.truck.x1 > 0.0 else 0.0, t + share * tau * h)
+    if tau < tau_end:
+        x_b, t_x_b = grown(x_b, t_x_b, displacement_at(dense.boulder, tau), t + tau * h)
+    x_v, t_x_v = grown(m.x_v, m.t_x_v, y_end.x_v, t_end)
     end = compression_at(y_end, s, c)
+    tau = turning_point(dense.truck, tau_end)
+    stop = end
+    if tau < tau_end:
+        x_v, t_x_v = grown(x_v, t_x_v, displacement_at(dense.truck, tau), t + tau * h)
+        stop = compression_at(state_at(dense, tau), s, c)
+    crush, t_crush = m.crush, m.t_crush
+    if dense.truck.x1 > 0.0:
+        deepest, share = highest(start.crush, start.crush_rate, stop.crush, stop.crush_rate, tau * h)
+        crush, t_crush = grown(m.crush, m.t_crush, deepest, t + share * tau * h)
     u, share = highest(start.u, start.rate, end.u, end.rate, tau_end * h)
     F_v, t_F_v = grown(m.F_v, m.t_F_v, s.k_contact * u, t + share * tau_end * h)
-    return Maxima(theta, t_theta, x_b, t_x_b, x_v, t_x_v, F_v, t_F_v, crush, t_crush)
+    return Maxima(theta, t_theta, x_b, t_x_b, x_v, t_x_v, F_v, t_F_v, crush, t_crush), end

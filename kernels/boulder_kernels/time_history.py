@@ -124,17 +124,16 @@ def exchange_rates(y: State, modes: Modes, s: Switches, c: Constants) -> Exchang
 def add_exchanged(
     before: Exchanged,
     dense: DenseOutput,
-    h: float,
     tau: float,
     modes: Modes,
     switches: Switches,
     c: Constants,
 ) -> Exchanged:
-    """Add the energies exchanged in the part 0 ... tau of a step of length h [s] by Gauss-Legendre quadrature."""
+    """Add the energies exchanged in the part 0 ... tau of a step by Gauss-Legendre quadrature."""
     drag, damper, restoring, pull = before.drag, before.damper, before.restoring, before.pull
     for node in range(4):
         rates = exchange_rates(state_at(dense, GAUSS_NODES[node] * tau), modes, switches, c)
-        weight = GAUSS_WEIGHTS[node] * tau * h
+        weight = GAUSS_WEIGHTS[node] * tau * dense.h
         drag += weight * rates.drag
         damper += weight * rates.damper
         restoring += weight * rates.restoring
@@ -173,25 +172,23 @@ def write_samples(
     record: Record,
     written: int,
     t: float,
-    h: float,
-    tau_end: float,
+    t_end: float,
     dense: DenseOutput,
     modes: Modes,
     switches: Switches,
     c: Constants,
     exchanged: Exchanged,
 ) -> int:
-    """Write the samples that lie in a step, and return how many have been written in all."""
-    t_end = t + tau_end * h
+    """Write the samples that lie in a step from t to t_end [s], and return how many have been written in all."""
     while written < record.times.size and record.times[written] <= t_end:
-        tau = (record.times[written] - t) / h
+        tau = (record.times[written] - t) / dense.h
         y = state_at(dense, tau)
         states = record.states[written]
         states[0], states[1], states[2] = y.x_b, y.v_b, y.theta_b
         states[3], states[4], states[5] = y.omega_b, y.x_v, y.v_v
         record.turning[written] = modes.turning
         record.touching[written] = modes.touching
-        so_far = add_exchanged(exchanged, dense, h, tau, modes, switches, c)
+        so_far = add_exchanged(exchanged, dense, tau, modes, switches, c)
         sums = record.exchanged[written]
         sums[0], sums[1], sums[2], sums[3] = (
             so_far.drag,

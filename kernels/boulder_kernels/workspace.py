@@ -19,77 +19,51 @@ import numpy as np
 
 from ._jit import function_of, overload
 from .design import Body, Constants, Design, Readings, constants_of
-from .dormand_prince import Track
 from .dynamics import Acceleration, Modes, State, Switches
+from .following import Clock, Pace
 from .layered import COUNTS, FewLayers, GivenLayer, Layer, LayeredConstants, SoilSums, constants_of_few
-from .modes import GapFactors, Gaps
-from .numerics import Bracket, field, put
+from .modes import GapFactors
+from .numerics import field, put
 from .outcomes import Compression, Maxima
 from .outlined import FewPieces, GivenPiece, Lean, Piece, TaperedPiece, TaperedSoil, constants_beside
 
 LANES = 8
 """Designs that are integrated side by side: one vector of eight doubles. More of them hide no more latency and take
 more of the fastest memory (measured: 2 to 5 % slower with 16 or 32)."""
-
 KNOWN: dict[str, object] = {"elements": 0, "c_x": 0.0, "c_y": 0.0, "d_N": 0.0}
-KNOWN |= {name: 0.0 for name in Maxima._fields if name.startswith("t_")}
-"""Fields that are not kept: lanes know the closed form of the soil only and no times of maxima; and no motion depends
-on three lengths from which other constants have been made."""
+"""Fields that are not kept: lanes know the closed form of the soil only; and no motion depends on three lengths from
+which other constants have been made."""
 
 
-GROUPS = 2
-"""Groups of lanes that are stepped in turn, so that those in need of more than a step fill a group of their own."""
+class Attempt(NamedTuple):
+    """What is known of a lane's last step, beside where it ended."""
 
-
-class Number(NamedTuple):
-    """A field that belongs to no record."""
-
-    value: float
+    error: float
+    """Its error [m/s]."""
+    plain: float
+    """1.0 where it has been accepted as it is."""
+    status: float
+    """RUNNING, or why the design that has been started here needs no step."""
 
 
 _LAYOUT: dict[str, Any] = {
     "constants": Constants,
-    # What a step changes.
-    "switches": Switches,
-    "factors": GapFactors,
+    "pace": Pace,
     "state": State,
     "start": Acceleration,
-    "compression": Compression,
+    "front": Compression,
     "maxima": Maxima,
+    "clock": Clock,
     "modes": Modes,
-    "step": Number,
-    "step_full": Number,
-    "time": Number,
-    "barrier": Number,
-    "horizon": Number,
-    "attempts_left": Number,
-    "error": Number,
-    "rotation_changes": Number,
-    # What the attempt at a step gives.
-    "attention": Number,
+    "switches": Switches,
+    "factors": GapFactors,
     "end_state": State,
     "end": Acceleration,
-    "step_error": Number,
-    "status": Number,
-}
-_EVENT_LAYOUT: dict[str, Any] = {
-    "boulder": Track,
-    "rotation": Track,
-    "truck": Track,
-    "weights": Gaps,
-    "end_gaps": Gaps,
-    "bracket": Bracket,
-    "tau": Number,
-    "open": Number,
-    "event": Number,
-    "moment": Number,
-    # Of designs that are being started.
+    "attempt": Attempt,
     "design": Design,
 }
-"""What is known of a step in the group of those that need more: in a second part of the same array."""
-
-
-_ALL = _LAYOUT | _EVENT_LAYOUT
+"""The records of a lane: constants, what `boulder_kernels.following.Impact` has, the end of a step, and the design of a
+lane that is being started."""
 
 
 def _size(record: Any) -> int:
@@ -97,73 +71,23 @@ def _size(record: Any) -> int:
 
 
 def _offset_of(name: str) -> int:
-    names = list(_ALL)
-    return sum(_size(_ALL[before]) for before in names[: names.index(name)])
+    names = list(_LAYOUT)
+    return sum(_size(_LAYOUT[before]) for before in names[: names.index(name)])
 
 
-SIZE = _offset_of("boulder")
+CONSTANTS, PACE, STATE, START, FRONT, MAXIMA, CLOCK, MODES, SWITCHES, FACTORS, END_STATE, END, ATTEMPT, DESIGN = map(
+    _offset_of, _LAYOUT
+)
+STARTED = END_STATE
+"""The end of what is copied when a design that has been started enters a lane."""
+SIZE = DESIGN + _size(Design)
 """Numbers of one group."""
-EVENTS = GROUPS * SIZE
-"""Where the first of the two groups of those that need more begins: its lanes are EVENTS ... EVENTS + LANES - 1."""
-EVENT_SIZE = sum(_size(record) for record in _ALL.values())
-"""Numbers of one of them."""
-STARTS = EVENTS + 2 * EVENT_SIZE
-"""Where the group of designs that are being started begins, and behind it that of those that are started again."""
-WHOLE = STARTS + 2 * EVENT_SIZE
-"""Numbers of all groups."""
-CONSTANTS = _offset_of("constants")
-SWITCHES = _offset_of("switches")
-FACTORS = _offset_of("factors")
-STATE = _offset_of("state")
-"""State at the start of the step."""
-START = _offset_of("start")
-"""Acceleration there."""
-END_STATE = _offset_of("end_state")
-"""State at the end of the step."""
-END = _offset_of("end")
-"""Acceleration there."""
-COMPRESSION = _offset_of("compression")
-"""Compression of the vehicle's spring at the start of the step."""
-MAXIMA = _offset_of("maxima")
-"""Largest values so far."""
-MODES = _offset_of("modes")
-STEP = _offset_of("step")
-"""Length of the next step [s]."""
-STEP_FULL = _offset_of("step_full")
-"""Length of a step that nothing shortens [s]."""
-TIME = _offset_of("time")
-"""Start of the next step [s]."""
-BARRIER = _offset_of("barrier")
-"""Energy below which the motion has settled [J], see `boulder_kernels.settling`."""
-HORIZON = _offset_of("horizon")
-"""Time at which the simulation ends, unless there is a reason to go on [s]."""
-ATTENTION = _offset_of("attention")
-"""1.0 where a step cannot simply be accepted."""
-ATTEMPTS_LEFT = _offset_of("attempts_left")
-ERROR = _offset_of("error")
-"""Sum of the errors of the steps so far [m/s], see `boulder_kernels.error_estimates`."""
-ROTATION_CHANGES = _offset_of("rotation_changes")
-"""How often the mode of rotation has changed."""
-STEP_ERROR = _offset_of("step_error")
-"""Error of the step [m/s]."""
-BOULDER, ROTATION, TRUCK = _offset_of("boulder"), _offset_of("rotation"), _offset_of("truck")
-"""The motion within the step."""
-WEIGHTS = _offset_of("weights")
-"""Factors of the gaps in the search for the first event."""
-END_GAPS = _offset_of("end_gaps")
-BRACKET = _offset_of("bracket")
-TAU = _offset_of("tau")
-OPEN = _offset_of("open")
-"""1.0 while the search goes on."""
-EVENT = _offset_of("event")
-MOMENT = _offset_of("moment")
-"""Net moment where the step is cut [N m]."""
-STATUS_OF_LANE = _offset_of("status")
-DESIGN = _offset_of("design")
-RECORDS = {_offset_of(name): record for name, record in _ALL.items()}
+RECORDS = {_offset_of(name): record for name, record in _LAYOUT.items()}
 
 
-SOIL = WHOLE
+GROUPS = 2
+"""Groups of lanes: one that is stepped, and one in which designs are started."""
+SOIL = GROUPS * SIZE
 """Where the soil of a design lies that is not uniform, from its lane on: in a second half of the array, laid out as the
 first, which only the workspaces of `SOILS` have."""
 
@@ -231,6 +155,13 @@ def soil_in(ws: Any) -> LaneSoil | None:
     return SOILS.get(getattr(ws, "instance_class", type(ws)))
 
 
+def room(form: type | None, parts: int) -> int:
+    """Return how many numbers a workspace has, by its type and the number of parts of its soil."""
+    if form is None:
+        return GROUPS * SIZE
+    return SOIL + (GROUPS - 1) * SIZE + SOILS[form].size(parts) + SOILS[form].given_size(parts)
+
+
 def given_offset(soil: LaneSoil, count: int) -> int:
     """Return where what is given of the soil of a design that is being started lies, from its lane on."""
     return SOIL + soil.size(count)
@@ -238,7 +169,6 @@ def given_offset(soil: LaneSoil, count: int) -> int:
 
 for _soil in SOILS.values():
     assert _soil.size(COUNTS[-1]) <= SIZE, "the soil of a lane reaches into that of the next group"
-    assert _soil.size(COUNTS[-1]) + _soil.given_size(COUNTS[-1]) <= EVENT_SIZE
 
 
 def part(ws: Any, start: int) -> Any:
