@@ -21,7 +21,7 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import NamedTuple
 
-from ._jit import exact_inlined, inlined
+from ._jit import inlined
 from .design import Constants, error_arm
 from .dynamics import Acceleration, State, Switches, acceleration
 
@@ -221,7 +221,7 @@ class DenseOutput(NamedTuple):
     truck: Track
 
 
-@exact_inlined
+@inlined
 def track(h: float, x: float, v: float, a: float, x_end: float, v_end: float, a_end: float) -> Track:
     """Quintic Hermite polynomial of one degree of freedom.
 
@@ -249,25 +249,25 @@ def track(h: float, x: float, v: float, a: float, x_end: float, v_end: float, a_
     )
 
 
-@exact_inlined
+@inlined
 def displacement_at(q: Track, tau: float) -> float:
     """Displacement of a track at the fraction tau of its step."""
     return q.x0 + tau * (q.x1 + tau * (q.x2 + tau * (q.x3 + tau * (q.x4 + tau * q.x5))))
 
 
-@exact_inlined
+@inlined
 def slope_at(q: Track, tau: float) -> float:
     """Derivative of a track by tau: the velocity times the length of the step."""
     return q.x1 + tau * (2.0 * q.x2 + tau * (3.0 * q.x3 + tau * (4.0 * q.x4 + tau * (5.0 * q.x5))))
 
 
-@exact_inlined
+@inlined
 def curvature_at(q: Track, tau: float) -> float:
     """Second derivative of a track by tau: the acceleration times the square of the length of the step."""
     return 2.0 * q.x2 + tau * (6.0 * q.x3 + tau * (12.0 * q.x4 + tau * (20.0 * q.x5)))
 
 
-@exact_inlined
+@inlined
 def closer(q: Track, tau: float, tau_end: float) -> float:
     """One step of Newton's method to the zero of a velocity, within 0 ... tau_end."""
     curvature = curvature_at(q, tau)
@@ -275,7 +275,7 @@ def closer(q: Track, tau: float, tau_end: float) -> float:
     return min(max(tau - ahead, 0.0), tau_end)
 
 
-@exact_inlined
+@inlined
 def turning_point(q: Track, tau_end: float) -> float:
     """Fraction of a step at which a velocity that changes its sign before tau_end is zero; tau_end for any other.
 
@@ -288,7 +288,7 @@ def turning_point(q: Track, tau_end: float) -> float:
     return closer(q, closer(q, closer(q, tau, tau_end), tau_end), tau_end)
 
 
-@exact_inlined
+@inlined
 def dense_output(y: State, k: Acceleration, y_end: State, k_end: Acceleration, h: float) -> DenseOutput:
     """Polynomials of a step of length h [s] from states and accelerations at its ends."""
     return DenseOutput(
@@ -299,7 +299,7 @@ def dense_output(y: State, k: Acceleration, y_end: State, k_end: Acceleration, h
     )
 
 
-@exact_inlined
+@inlined
 def state_at(dense: DenseOutput, tau: float) -> State:
     """State at the fraction tau of a step."""
     per_second = 1.0 / dense.h

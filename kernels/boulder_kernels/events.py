@@ -12,7 +12,7 @@ import math
 from ._jit import inlined, kernel
 from .design import Constants
 from .dormand_prince import DenseOutput, Track, curvature_at, displacement_at, slope_at, state_at, turning_point
-from .dynamics import State, Switches, rate_of
+from .dynamics import State, Switches, contact_displacement, rate_of, spring_compression
 from .modes import (
     ARM,
     AT_END,
@@ -26,10 +26,11 @@ from .modes import (
     YIELD_TOP,
     GapFactors,
     Gaps,
+    contact_gap,
     gaps_at,
     needs_moment,
 )
-from .numerics import ITERATIONS, Bracket, narrowed, next_guess
+from .numerics import ITERATIONS, Bracket, narrowed, next_guess, sine_versine
 
 NONE = -1
 """In place of an event: there is none."""
@@ -48,13 +49,6 @@ HARMLESS = 10.0
 """A kink that lies before the end of the step by less than so many times the precision does no harm."""
 BEYOND = 2.0
 """A retried step ends so many times the precision behind the kink, so that the kink lies in it and not in the next."""
-
-
-@inlined
-def gaps_within(tau: float, dense: DenseOutput, forces: bool, g: GapFactors, switches: Switches, c: Constants) -> Gaps:
-    """Gaps at the fraction tau of a step; ``forces`` says whether one of those asked for depends on the net moment."""
-    y = state_at(dense, tau)
-    return gaps_at(y, rate_of(y, switches, c).M if forces else 0.0, g, c)
 
 
 @inlined
@@ -81,6 +75,31 @@ def least_gap(gaps: Gaps, weights: Gaps) -> tuple[float, int]:
     least, event = lesser(least, event, gaps.top, weights.top, YIELD_TOP)
     least, event = lesser(least, event, gaps.base, weights.base, YIELD_BASE)
     return lesser(least, event, gaps.limit, weights.limit, LIMIT)
+
+
+@inlined
+def least_within(
+    tau: float, weights: Gaps, dense: DenseOutput, g: GapFactors, switches: Switches, c: Constants
+) -> tuple[float, int]:
+    """Least of the gaps that are looked for at the fraction tau of a step, scaled, and its event."""
+    forces = (weights.rotation > 0.0 and needs_moment(g)) or weights.couple > 0.0
+    if forces or weights.arm > 0.0 or weights.top > 0.0 or weights.base > 0.0:
+        y = state_at(dense, tau)
+        return least_gap(gaps_at(y, rate_of(y, switches, c).M if forces else 0.0, g, c), weights)
+    least, event = NEVER, NONE
+    theta_b = displacement_at(dense.rotation, tau)
+    if weights.contact > 0.0:
+        sin, versin = sine_versine(theta_b)
+        x_c = contact_displacement(displacement_at(dense.boulder, tau), sin, versin, c)
+        x_v, v_v = displacement_at(dense.truck, tau), slope_at(dense.truck, tau) / dense.h
+        gap = contact_gap(spring_compression(x_v, v_v, x_c, c), g, c)
+        least, event = lesser(least, event, gap, weights.contact, CONTACT)
+    if weights.rotation > 0.0 or weights.corner > 0.0:
+        omega_b = slope_at(dense.rotation, tau) / dense.h
+        turned = g.rotation_0 + g.rotation_theta * theta_b + g.rotation_omega * omega_b
+        least, event = lesser(least, event, turned, weights.rotation, ROTATION)
+        least, event = lesser(least, event, g.corner_0 + g.corner_theta * theta_b, weights.corner, CORNER)
+    return lesser(least, event, g.limit - abs(theta_b), weights.limit, LIMIT)
 
 
 @inlined
@@ -178,7 +197,6 @@ def sought(
     opens only by rounding counts as crossed at once: the step still advances, and the next mode resolves it.
     """
     f_low, event = least_gap(start, weights)
-    forces = (weights.rotation > 0.0 and needs_moment(g)) or weights.couple > 0.0
     tolerance = EDGE_TOLERANCE if g.rotation_omega != 0.0 else g.tolerance  # only as printed a gap depends on omega
     b = Bracket(0.0, f_low, 1.0, -1.0, 0.0)
     tau = next_guess(b) if f_low > 0.0 else JUST_AFTER
@@ -187,7 +205,7 @@ def sought(
     for _ in range(ITERATIONS):
         if not searching:
             break
-        f, _ = least_gap(gaps_within(tau, dense, forces, g, switches, c), weights)
+        f, _ = least_within(tau, weights, dense, g, switches, c)
         b = narrowed(b, tau, f) if b.f_low > 0.0 else Bracket(tau, f, b.high, b.f_high, 0.0)
         if b.f_low > 0.0:
             following = next_guess(b)
@@ -197,7 +215,7 @@ def sought(
             following = JUST_AFTER * tau if searching else tau
         tau = following
     if number_of(weights) > 1:
-        _, event = least_gap(gaps_within(tau, dense, forces, g, switches, c), weights)
+        _, event = least_within(tau, weights, dense, g, switches, c)
     return event, refined(event, tau, b, g, dense)
 
 

@@ -23,13 +23,15 @@ from .control import (
 )
 from .design import Constants, Readings
 from .dormand_prince import dense_output, state_at
-from .dynamics import Acceleration, Modes, State, Switches, rate_of, signed_arm, switches_of
+from .dynamics import TURNING_FORWARD, Acceleration, Modes, State, Switches, rate_of, signed_arm, switches_of
 from .error_estimates import error_time
 from .events import NONE, SHORTEN, first_event
 from .modes import (
+    AT_END,
     COUPLE,
     LIMIT,
     ROTATION,
+    TOLERANCE,
     GapFactors,
     change_mode,
     changes_counted,
@@ -38,6 +40,7 @@ from .modes import (
     gaps_of,
     initial_modes,
     length_after,
+    needs_moment,
 )
 from .numerics import sine_versine
 from .outcomes import (
@@ -185,10 +188,11 @@ def turned_back(y: State, y_end: State) -> bool:
 
 
 @inlined
-def passes(i: Impact, y_end: State, k_end: Acceleration, c: Constants) -> tuple[bool, Compression]:
+def passes(i: Impact, y_end: State, k_end: Acceleration, beyond: float, c: Constants) -> tuple[bool, Compression]:
     """Whether a step meets no event and turns nowhere, so that it may be kept as it is; and the compression at its end.
 
-    A comparison with NaN is false, so a step to a state that is not a number does not pass.
+    A comparison with NaN is false, so a step to a state that is not a number does not pass. The net moment may exceed
+    the couple of the weight of a boulder that is seated by ``beyond`` [N m].
     """
     y = i.y
     sin, versin = sine_versine(y_end.theta_b)
@@ -198,7 +202,7 @@ def passes(i: Impact, y_end: State, k_end: Acceleration, c: Constants) -> tuple[
     gaps = gaps_of(k.A, k.slope_x, y_end.theta_b, y_end.omega_b, end.u, k_end.M, arm, i.factors, c)
     plain = (
         (gaps.contact >= 0.0)
-        & (gaps.rotation >= 0.0)
+        & (gaps.rotation >= -beyond)
         & (gaps.couple >= 0.0)
         & (gaps.corner >= 0.0)
         & (gaps.arm >= 0.0)
@@ -249,7 +253,7 @@ def go_on(
     No branch, so that a loop over lanes stays vectorised. Arguments: see `follow`.
     """
     clock = i.clock
-    passing, end = passes(i, y_end, k_end, c)
+    passing, end = passes(i, y_end, k_end, 0.0, c)
     lively = (y_end.v_v > 0.0) | (boulder_energy(y_end, c) >= clock.barrier)
     plain = passing & lively & (clock.h < clock.horizon - clock.t) & (clock.attempts < i.pace.budget)
     m = passed_maxima(i.maxima, clock.t, clock.h, i.y, y_end, i.front, end, i.switches)
@@ -258,6 +262,27 @@ def go_on(
     attempts, error = clock.attempts + 1.0, clock.error + error
     after = Clock(t, h, clock.h_full, attempts, clock.barrier, clock.horizon, error, clock.rotation_changes)
     return plain, Impact(i.pace, y_end, k_end, end, m, after, i.modes, i.switches, i.factors)
+
+
+@inlined
+def begin_to_turn(
+    i: Impact, y_end: State, k_end: Acceleration, error: float, c: Constants, readings: Readings, control: Control
+) -> tuple[bool, Impact]:
+    """Whether the first step just ends where the boulder begins to turn, as it should; and what is carried on then.
+
+    No branch, as in `go_on`; arguments: see `follow`.
+    """
+    clock, seated = i.clock, needs_moment(i.factors)
+    beyond = AT_END * TOLERANCE * c.C_cos if seated else 0.0
+    passing, _ = passes(i, y_end, k_end, beyond, c)
+    turns = passing & seated & (k_end.M > c.C_cos) & (clock.h < clock.horizon) & (y_end.v_v > 0.0)
+    modes = Modes(TURNING_FORWARD, True, 1.0, 1.0, 0, 0)
+    switches, g = enter_modes(modes, readings, i.factors.limit, control.locate_yield, control.event_tolerance, c)
+    front = compression_at(y_end, switches, c)
+    m = passed_maxima(i.maxima, 0.0, clock.h, i.y, y_end, i.front, front, i.switches)
+    h = min(clock.h_full, clock.horizon - clock.h)
+    after = Clock(clock.h, h, clock.h_full, 1.0, clock.barrier, clock.horizon, error, 0.0)
+    return turns, Impact(i.pace, y_end, rate_of(y_end, switches, c), front, m, after, modes, switches, g)
 
 
 @inlined

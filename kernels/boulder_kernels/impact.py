@@ -34,7 +34,7 @@ from .design import Constants, Design, Readings, constants_of, is_computable
 from .dormand_prince import dense_output, step
 from .dynamics import Acceleration, State
 from .events import locate_limit
-from .following import RUNNING, Impact, failed, first_touch, follow, go_on, outcome_of, stop_of
+from .following import RUNNING, Impact, begin_to_turn, failed, first_touch, follow, go_on, outcome_of, stop_of
 from .outcomes import Outcome, Status
 from .soil_laws import constants_in
 from .time_history import Exchanged, Record, add_exchanged, nothing_exchanged, write_samples
@@ -140,6 +140,11 @@ def simulate_by_steps(
     watching = record.times.size > 0 or not control.stop_at_limit
     w = Watched(np.nan, 0, nothing_exchanged())
     i = first_touch(h_touching, h_apart, c, readings, control)
+    y_end, k_end, error = step(i.y, i.k, i.clock.h, i.switches, c)
+    turns, after = begin_to_turn(i, y_end, k_end, error, c, readings, control)
+    if turns:
+        w = watch(w, i, y_end, k_end, after, c, control, record) if watching else w
+        i = after
     status = RUNNING
     while status == RUNNING:
         y_end, k_end, error = step(i.y, i.k, i.clock.h, i.switches, c)

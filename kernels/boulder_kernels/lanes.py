@@ -17,7 +17,8 @@ from .control import ACCEPTED, MOST_STEPS, RETRY, Control, first_step
 from .design import Readings, design_in, is_computable
 from .dormand_prince import step
 from .error_estimates import step_errors
-from .following import RUNNING, Clock, Impact, first_touch, follow, go_on, outcome_of, stop_of
+from .events import NONE
+from .following import RUNNING, Clock, Impact, begin_to_turn, first_touch, follow, go_on, outcome_of, stop_of
 from .numerics import field, put
 from .outcomes import STATUS, Outcome, Status, empty_outcomes, write_outcome
 from .workspace import (
@@ -52,7 +53,7 @@ from .workspace import (
 
 EMPTY = -1
 """Row of a lane that holds no design."""
-NEXT = LANES
+NEXT = GROUPS * LANES
 """Behind the rows in the lanes: the next row of the table."""
 
 
@@ -104,7 +105,7 @@ def attempt_steps(ws: Any) -> None:
         )
         store(ws, END_STATE, lane, y_end)
         store(ws, END, lane, k_end)
-        store(ws, ATTEMPT, lane, Attempt(error, 0.0, RUNNING))
+        store(ws, ATTEMPT, lane, Attempt(error, 0.0, load(ws, ATTEMPT, lane).status))
 
 
 @kernel
@@ -119,7 +120,8 @@ def take_over_steps(ws: Any) -> int:
         )
         store(ws, ATTEMPT, lane, Attempt(error, 1.0 if plain else 0.0, RUNNING))
         others += 0 if plain else 1
-        store_motion(ws, lane, after if plain else i)
+        if plain:
+            store_motion(ws, lane, after)
     return others
 
 
@@ -162,26 +164,40 @@ def start_designs(ws: Any, designs: np.ndarray, first: int, readings: Readings, 
         store_modes(ws, lane, i)
 
 
+@kernel
+def begin_to_turn_in_lanes(ws: Any, readings: Readings, control: Control) -> None:
+    """Accept the first steps that end where the boulder begins to turn; leave the others undone."""
+    align_stack()
+    for lane in range(LANES):
+        i, error, c = load_impact(ws, lane), load(ws, ATTEMPT, lane).error, load(ws, CONSTANTS, lane)
+        turns, after = begin_to_turn(i, load(ws, END_STATE, lane), load(ws, END, lane), error, c, readings, control)
+        if turns:
+            store_motion(ws, lane, after)
+            store_modes(ws, lane, after)
+
+
 @inlined
 def next_design(
-    ws: Any, rows: np.ndarray, lane: int, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray
+    ws: Any, rows: np.ndarray, group: int, lane: int, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray
 ) -> None:
     """Put the next design that needs integration into a lane; write those that need none."""
-    started = (GROUPS - 1) * SIZE
+    started = GROUPS * SIZE
     while rows[NEXT] < out.shape[1]:
         row = rows[NEXT]
         rows[NEXT] += 1
         if row % LANES == 0:
             start_designs(part(ws, started), designs, row, readings, control)
+            attempt_steps(part(ws, started))
+            begin_to_turn_in_lanes(part(ws, started), readings, control)
         status = int(load(part(ws, started), ATTEMPT, row % LANES).status)
         if status == RUNNING:
-            copy_lane(ws, started + row % LANES, lane, STARTED)
-            rows[lane] = row
+            copy_lane(ws, started + row % LANES, group * SIZE + lane, STARTED)
+            rows[group * LANES + lane] = row
             return
         out[STATUS, row] = status
-    rows[lane] = EMPTY
+    rows[group * LANES + lane] = EMPTY
     # An empty lane stands still: its steps have no length, and their results are ignored.
-    store(ws, CLOCK, lane, Clock(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    store(ws, CLOCK, group * SIZE + lane, Clock(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 
 
 @kernel
@@ -198,7 +214,8 @@ def follow_lane(ws: Any, lane: int, readings: Readings, control: Control) -> int
         store(mine, PACE, 0, after.pace)
         status = RUNNING
     store_motion(mine, 0, after)
-    store_modes(mine, 0, after)
+    if followed.event > NONE or after.clock.t == 0.0:
+        store_modes(mine, 0, after)
     return status
 
 
@@ -217,21 +234,26 @@ def run_lanes(
     designs: np.ndarray, readings: Readings, control: Control, ws: Any, rows: np.ndarray, out: np.ndarray
 ) -> None:
     """Simulate every design of a table; arguments: see `simulate_lanes`, and rows of the lanes, as many and one more."""
-    for lane in range(LANES):
-        next_design(ws, rows, lane, designs, readings, control, out)
+    for group in range(GROUPS):
+        for lane in range(LANES):
+            next_design(ws, rows, group, lane, designs, readings, control, out)
     busy = True
     while busy:
-        attempt_steps(ws)
-        busy = True
-        if take_over_steps(ws) > 0:
-            busy = False
-            for lane in range(LANES):
-                if rows[lane] != EMPTY and load(ws, ATTEMPT, lane).plain == 0.0:
-                    status = follow_lane(ws, lane, readings, control)
-                    if status != RUNNING:
-                        write_lane(ws, lane, status, designs, control, out, rows[lane])
-                        next_design(ws, rows, lane, designs, readings, control, out)
-                busy |= rows[lane] != EMPTY
+        busy = False
+        for group in range(GROUPS):
+            lanes = part(ws, group * SIZE)
+            attempt_steps(lanes)
+            if take_over_steps(lanes) > 0:
+                for lane in range(LANES):
+                    slot = group * LANES + lane
+                    if rows[slot] != EMPTY and load(lanes, ATTEMPT, lane).plain == 0.0:
+                        status = follow_lane(lanes, lane, readings, control)
+                        if status != RUNNING:
+                            write_lane(lanes, lane, status, designs, control, out, rows[slot])
+                            next_design(ws, rows, group, lane, designs, readings, control, out)
+                    busy |= rows[slot] != EMPTY
+            else:
+                busy = True
 
 
 def empty_workspace(soil: type | None = None, parts: int = 0) -> Any:
@@ -280,7 +302,7 @@ def simulate_lanes(
     """
     out = empty_outcomes(designs.shape[1])
     if designs.shape[1] > 0:
-        rows = np.full(LANES + 1, EMPTY)
+        rows = np.full(NEXT + 1, EMPTY)
         rows[NEXT] = 0
         run_lanes(filled_up(designs), readings, control, empty_workspace(soil, parts), rows, out)
     return out

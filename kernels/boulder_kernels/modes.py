@@ -174,6 +174,12 @@ def yield_gap(displacement: float, sign: float, c: Constants) -> float:
 
 
 @inlined
+def contact_gap(u: float, g: GapFactors, c: Constants) -> float:
+    """Gap of the contact at a compression of the vehicle's spring [m]."""
+    return CONTACT_ROUNDING * c.v_0 * (1.0 + c.tau_v) + g.contact * u
+
+
+@inlined
 def gaps_of(
     A: float,
     slope_x: float,
@@ -204,7 +210,7 @@ def gaps_of(
     """
     couple = g.couple_M * M + g.couple_abs_M * abs(M) + g.couple_limit * abs(arm)
     return Gaps(
-        CONTACT_ROUNDING * c.v_0 * (1.0 + c.tau_v) + g.contact * u,
+        contact_gap(u, g, c),
         g.rotation_0 + g.rotation_abs_M * abs(M) + g.rotation_theta * theta_b + g.rotation_omega * omega_b,
         couple if g.couple_limit != 0.0 else NEVER,
         g.corner_0 + g.corner_theta * theta_b,

@@ -85,9 +85,9 @@ SIZE = DESIGN + _size(Design)
 RECORDS = {_offset_of(name): record for name, record in _LAYOUT.items()}
 
 
-GROUPS = 2
-"""Groups of lanes: one that is stepped, and one in which designs are started."""
-SOIL = GROUPS * SIZE
+GROUPS = 1
+"""Groups of lanes that are stepped in turn; behind them is one in which designs are started."""
+SOIL = (GROUPS + 1) * SIZE
 """Where the soil of a design lies that is not uniform, from its lane on: in a second half of the array, laid out as the
 first, which only the workspaces of `SOILS` have."""
 
@@ -158,8 +158,8 @@ def soil_in(ws: Any) -> LaneSoil | None:
 def room(form: type | None, parts: int) -> int:
     """Return how many numbers a workspace has, by its type and the number of parts of its soil."""
     if form is None:
-        return GROUPS * SIZE
-    return SOIL + (GROUPS - 1) * SIZE + SOILS[form].size(parts) + SOILS[form].given_size(parts)
+        return (GROUPS + 1) * SIZE
+    return SOIL + GROUPS * SIZE + SOILS[form].size(parts) + SOILS[form].given_size(parts)
 
 
 def given_offset(soil: LaneSoil, count: int) -> int:
