@@ -42,7 +42,7 @@ COUNTED_ROWS = 64
 """Designs that are simulated with the compiler off."""
 RUN_ROWS = 1000
 """Designs of the small run."""
-COUNTED = ("closed_form", "step", "work_out")
+COUNTED = ("closed_form", "step", "follow")
 """Kernels whose calls are counted one by one, beside those of all."""
 PREPARING = "interruptible work"
 """Name of the threads that prepare a run; how many designs they try depends on the clock."""

@@ -18,7 +18,7 @@ from .design import Readings, design_in, is_computable
 from .dormand_prince import step
 from .error_estimates import step_errors
 from .events import NONE
-from .following import RUNNING, Clock, Impact, begin_to_turn, first_touch, follow, go_on, outcome_of, stop_of
+from .following import RUNNING, Clock, Impact, Pace, begin_to_turn, first_touch, follow, go_on, outcome_of, stop_of
 from .numerics import field, put
 from .outcomes import STATUS, Outcome, Status, empty_outcomes, write_outcome
 from .workspace import (
@@ -126,8 +126,55 @@ def take_over_steps(ws: Any) -> int:
 
 
 @kernel
+def compute_constants(ws: Any, designs: np.ndarray, first: int, readings: Readings, control: Control) -> None:
+    """Work out constants and steps of designs, and whether they can be simulated; arguments: see `start_designs`."""
+    align_stack()
+    # Loads from another array would keep the loop from being vectorised.
+    for lane in range(LANES):
+        store(ws, DESIGN, lane, design_in(designs, first + lane))
+        store_given(ws, lane, designs, first + lane)
+    for lane in range(LANES):
+        design = load(ws, DESIGN, lane)
+        c = constants_in_lane(ws, lane, design, readings)
+        h, status = first_step(control, stop_of(control), c)
+        status = RUNNING if status == ACCEPTED else status
+        status = status if is_computable(c) else Status.INVALID.value
+        status = Status.NO_CONTACT.value if design.H - design.d <= design.e_bumper else status
+        store(ws, CONSTANTS, lane, c)
+        store(ws, PACE, lane, Pace(h, h, 0.0))
+        store(ws, ATTEMPT, lane, Attempt(0.0, 0.0, status))
+
+
+@kernel
+def stand_still(ws: Any, readings: Readings, control: Control) -> None:
+    """Put every lane at the first touch."""
+    align_stack()
+    for lane in range(LANES):
+        h = load(ws, PACE, lane).h_touching
+        i = first_touch(h, h, load(ws, CONSTANTS, lane), readings, control)
+        store(ws, PACE, lane, i.pace)
+        store_motion(ws, lane, i)
+    # In a loop of its own: with more stores in one the compiler vectorises neither.
+    for lane in range(LANES):
+        h = load(ws, PACE, lane).h_touching
+        store_modes(ws, lane, first_touch(h, h, load(ws, CONSTANTS, lane), readings, control))
+
+
+@kernel
+def take_first_steps(ws: Any, readings: Readings, control: Control) -> None:
+    """Accept the first steps that end where the boulder begins to turn; leave the others undone."""
+    align_stack()
+    for lane in range(LANES):
+        i, error, c = load_impact(ws, lane), load(ws, ATTEMPT, lane).error, load(ws, CONSTANTS, lane)
+        turns, after = begin_to_turn(i, load(ws, END_STATE, lane), load(ws, END, lane), error, c, readings, control)
+        if turns:
+            store_motion(ws, lane, after)
+            store_modes(ws, lane, after)
+
+
+@inlined
 def start_designs(ws: Any, designs: np.ndarray, first: int, readings: Readings, control: Control) -> None:
-    """Put as many designs as there are lanes into a group.
+    """Put as many designs as there are lanes into a group, and take their first step where it ends as it should.
 
     Parameters
     ----------
@@ -142,38 +189,10 @@ def start_designs(ws: Any, designs: np.ndarray, first: int, readings: Readings, 
     -----
     A lane is left with the status RUNNING, or with that of a design that needs no integration or allows none.
     """
-    align_stack()
-    # Loads from another array would keep the loop from being vectorised.
-    for lane in range(LANES):
-        store(ws, DESIGN, lane, design_in(designs, first + lane))
-        store_given(ws, lane, designs, first + lane)
-    for lane in range(LANES):
-        design = load(ws, DESIGN, lane)
-        c = constants_in_lane(ws, lane, design, readings)
-        h, status = first_step(control, stop_of(control), c)
-        status = RUNNING if status == ACCEPTED else status
-        status = status if is_computable(c) else Status.INVALID.value
-        status = Status.NO_CONTACT.value if design.H - design.d <= design.e_bumper else status
-        store(ws, CONSTANTS, lane, c)
-        store(ws, ATTEMPT, lane, Attempt(h, 0.0, float(status)))
-    for lane in range(LANES):
-        h = load(ws, ATTEMPT, lane).error
-        i = first_touch(h, h, load(ws, CONSTANTS, lane), readings, control)
-        store(ws, PACE, lane, i.pace)
-        store_motion(ws, lane, i)
-        store_modes(ws, lane, i)
-
-
-@kernel
-def begin_to_turn_in_lanes(ws: Any, readings: Readings, control: Control) -> None:
-    """Accept the first steps that end where the boulder begins to turn; leave the others undone."""
-    align_stack()
-    for lane in range(LANES):
-        i, error, c = load_impact(ws, lane), load(ws, ATTEMPT, lane).error, load(ws, CONSTANTS, lane)
-        turns, after = begin_to_turn(i, load(ws, END_STATE, lane), load(ws, END, lane), error, c, readings, control)
-        if turns:
-            store_motion(ws, lane, after)
-            store_modes(ws, lane, after)
+    compute_constants(ws, designs, first, readings, control)
+    stand_still(ws, readings, control)
+    attempt_steps(ws)
+    take_first_steps(ws, readings, control)
 
 
 @inlined
@@ -187,8 +206,6 @@ def next_design(
         rows[NEXT] += 1
         if row % LANES == 0:
             start_designs(part(ws, started), designs, row, readings, control)
-            attempt_steps(part(ws, started))
-            begin_to_turn_in_lanes(part(ws, started), readings, control)
         status = int(load(part(ws, started), ATTEMPT, row % LANES).status)
         if status == RUNNING:
             copy_lane(ws, started + row % LANES, group * SIZE + lane, STARTED)

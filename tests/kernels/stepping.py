@@ -8,14 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 import boulder_kernels as bk
-from boulder_kernels.after_step import enter_modes, keep_step
-from boulder_kernels.dormand_prince import dense_output, step
+from boulder_kernels.dormand_prince import step
 from boulder_kernels.dynamics import Modes, State, rate_of
-from boulder_kernels.events import SHORTEN
-from boulder_kernels.modes import TOLERANCE, change_mode
+from boulder_kernels.following import RUNNING, Clock, Impact, Pace, enter_modes, follow, go_on
 from boulder_kernels.outcomes import compression_at, no_maxima
+from boulder_kernels.settling import NO_PROOF
 
-from .samples import compression
+from .samples import compression, control
 
 SCALE = np.array([1.0, 30.0, 1.0, 30.0, 1.0, 30.0])
 """What an error in each component of the state is measured against: [m], [m/s], [rad], [rad/s], [m], [m/s]."""
@@ -40,27 +39,22 @@ def with_compression(y: State, u: float, c: bk.Constants) -> State:
 def advance(begin: Start, T: float, steps: int, locate_yield: bool = False) -> tuple[np.ndarray, list[int]]:
     """Follow a motion for T [s] by equal steps, cut at events; return its last state and the events met."""
     c, readings, y, modes = begin
-    switches, factors = enter_modes(modes, readings, NO_LIMIT, locate_yield, TOLERANCE, c)
-    k = rate_of(y, switches, c)
-    t, met = 0.0, []
-    h_full = T / steps
-    h_next = h_full
-    while T - t > 1e-12 * T:
-        h = min(h_next, T - t)
-        y_end, k_end, _ = step(y, k, h, switches, c)
-        dense, start = dense_output(y, k, y_end, k_end, h), compression_at(y, switches, c)
-        kept = keep_step(t, y, k.M, y_end, k_end.M, start, no_maxima(), dense, factors, switches, locate_yield, c)
-        if kept.event == SHORTEN:
-            h_next = kept.tau * h
-            continue
-        t += kept.tau * h
-        h_next, y, k = h_full, kept.y, k_end
-        if kept.event >= 0:
-            met.append(int(kept.event))
-            y, modes = change_mode(int(kept.event), y, rate_of(y, switches, c).M, modes, c)
-            switches, factors = enter_modes(modes, readings, NO_LIMIT, locate_yield, TOLERANCE, c)
-            k = rate_of(y, switches, c)
-    return np.array(y), met
+    h = T / steps
+    how = control(h, T, NO_LIMIT, stop_at_limit=True)._replace(locate_yield=locate_yield)
+    switches, factors = enter_modes(modes, readings, NO_LIMIT, locate_yield, how.event_tolerance, c)
+    clock = Clock(0.0, h, h, 0.0, NO_PROOF, T, 0.0, 0.0)
+    k, front = rate_of(y, switches, c), compression_at(y, switches, c)
+    i = Impact(Pace(h, h, 1e6), y, k, front, no_maxima(), clock, modes, switches, factors)
+    status, met = RUNNING, []
+    while status == RUNNING:
+        y_end, k_end, error = step(i.y, i.k, i.clock.h, i.switches, c)
+        plain, after = go_on(i, y_end, k_end, error, c)
+        if not plain:
+            followed = follow(i, y_end, k_end, error, c, readings, how)
+            status, after = followed.status, followed.impact
+            met += [followed.event] if followed.event >= 0 else []
+        i = after
+    return np.array(i.y), met
 
 
 def errors(

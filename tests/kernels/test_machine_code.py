@@ -13,17 +13,9 @@ import boulder_kernels as bk
 from boulder_kernels._jit import compiler
 from boulder_kernels.design import constants_of, design_in
 from boulder_kernels.heave import ROOM, Base, HeaveOptions, forces, heave_constants, prepare
-from boulder_kernels.lane_events import begin_searches, find_events, find_limits, keep_steps, search_on, start_steps
-from boulder_kernels.lane_steps import (
-    attempt_steps,
-    compute_constants,
-    stand_still,
-    take_over_first_steps,
-    take_over_steps,
-)
-from boulder_kernels.lanes import run_lanes
+from boulder_kernels.lanes import attempt_steps, compute_constants, run_lanes, stand_still, take_first_steps, take_over_steps
 from boulder_kernels.second_opinion import potential_energy
-from boulder_kernels.workspace import LANES, SIZE, SOILS, WHOLE, LayeredLanes, OutlinedLanes, TaperedLanes
+from boulder_kernels.workspace import LANES, SOILS, LayeredLanes, OutlinedLanes, TaperedLanes, room
 
 from .samples import control, random_designs, table_of
 
@@ -71,12 +63,12 @@ def widths(code: str) -> Counter[str]:
 
 @pytest.fixture(scope="module")
 def step_code() -> str:
-    return assembly(attempt_steps, np.zeros(SIZE))
+    return assembly(attempt_steps, np.zeros(room(None, 0)))
 
 
 @pytest.fixture(scope="module")
 def take_over_code() -> str:
-    return assembly(take_over_steps, np.zeros(SIZE))
+    return assembly(take_over_steps, np.zeros(room(None, 0)))
 
 
 def test_steps_are_vectorised(step_code: str) -> None:
@@ -111,23 +103,18 @@ def test_taking_over_is_vectorised(take_over_code: str) -> None:
 
 
 HOW = control(8e-3, 1.0, 0.3, stop_at_limit=True)
-OTHERS = {
-    begin_searches: (False,),
-    search_on: (),
-    find_events: (),
-    find_limits: (),
-    keep_steps: (),
-    start_steps: (),
-    compute_constants: (np.stack(table_of(random_designs(LANES, seed=142))), 0, bk.corrected(), HOW, 8e-3),
+DESIGNS = np.stack(table_of(random_designs(LANES, seed=142)))
+STARTS = {
+    compute_constants: (DESIGNS, 0, bk.corrected(), HOW),
     stand_still: (bk.corrected(), HOW),
-    take_over_first_steps: (bk.corrected(), HOW),
+    take_first_steps: (bk.corrected(), HOW),
 }
 
 
-@pytest.mark.parametrize("kernel", OTHERS, ids=lambda kernel: kernel.__name__)
-def test_events_and_starts_are_vectorised(kernel) -> None:
-    """Searches for events, peaks, fresh accelerations, constants: whole registers, next to nothing a lane at a time."""
-    code = assembly(kernel, np.zeros(WHOLE), *OTHERS[kernel])
+@pytest.mark.parametrize("kernel", STARTS, ids=lambda kernel: kernel.__name__)
+def test_starts_are_vectorised(kernel) -> None:
+    """Constants, first steps and their ends: whole registers, next to nothing a lane at a time."""
+    code = assembly(kernel, np.zeros(room(None, 0)), *STARTS[kernel])
     assert not CALL.search(code)
     found, register = widths(code), widest()
     if register and register != "xmm":
@@ -136,7 +123,7 @@ def test_events_and_starts_are_vectorised(kernel) -> None:
         assert len(SCALAR.findall(code)) < packed / 10
 
 
-IN_SOILS = (attempt_steps, take_over_steps, start_steps, compute_constants)
+IN_SOILS = (attempt_steps, take_over_steps, compute_constants)
 
 
 @pytest.mark.parametrize("kernel", IN_SOILS, ids=lambda kernel: kernel.__name__)
@@ -144,8 +131,8 @@ IN_SOILS = (attempt_steps, take_over_steps, start_steps, compute_constants)
 def test_layers_and_pieces_of_soil_are_vectorised(soil, parts: int, kernel) -> None:
     """Written out part by part, so that neither a loop nor a branch nor a logarithm keeps the lanes apart."""
     given = np.zeros((15 + SOILS[soil].given_size(parts) // LANES, LANES))
-    starting = (given, 0, bk.corrected(), HOW, 8e-3) if kernel is compute_constants else ()
-    code = assembly(kernel, soil(np.zeros(2 * WHOLE), (0,) * parts), *starting)
+    starting = (given, 0, bk.corrected(), HOW) if kernel is compute_constants else ()
+    code = assembly(kernel, soil(np.zeros(room(soil, parts)), (0,) * parts), *starting)
     assert not CALL.search(code)
     found, register = widths(code), widest()
     if register and register != "xmm":

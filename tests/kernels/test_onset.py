@@ -5,30 +5,15 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import boulder_kernels as bk
-from boulder_kernels.after_step import RUNNING, enter_modes, initial_state, passes
 from boulder_kernels.control import BEHIND, first_length, onset_of
 from boulder_kernels.design import Constants, Design, constants_of
 from boulder_kernels.dormand_prince import step
-from boulder_kernels.dynamics import SEATED, TURNING_FORWARD, Acceleration, rate_of
-from boulder_kernels.lane_steps import start_designs
-from boulder_kernels.lanes import start_again
+from boulder_kernels.dynamics import SEATED, TURNING_FORWARD, Acceleration
+from boulder_kernels.following import begin_to_turn, enter_modes, first_touch, go_on
+from boulder_kernels.lanes import start_designs
 from boulder_kernels.layered import PRESSURE, SUBGRADE, TO, uniform_layers
 from boulder_kernels.modes import AT_END, TOLERANCE, initial_modes
-from boulder_kernels.numerics import field
-from boulder_kernels.workspace import (
-    CONSTANTS,
-    EVENTS,
-    LANES,
-    MODES,
-    SIZE,
-    STARTS,
-    STATE,
-    STEP,
-    STEP_FULL,
-    TIME,
-    WHOLE,
-    load,
-)
+from boulder_kernels.workspace import CLOCK, LANES, MODES, STATE, load, room
 from tests import oracle
 from tests.kernels.samples import layered_constants
 from tests.oracle import dynamics, events, restoring
@@ -79,18 +64,20 @@ def test_the_onset_is_that_of_the_oracle() -> None:
 
 def test_a_step_to_the_onset_ends_just_behind_it() -> None:
     c = constants_of(RWG, CORRECTED, 0)
-    modes = initial_modes(CORRECTED, c)
-    assert modes.turning == SEATED
-    switches, factors = enter_modes(modes, CORRECTED, LIMIT, False, TOLERANCE, c)
-    y = initial_state(c)
-    k = rate_of(y, switches, c)
-    y_end, k_end, _ = step(y, k, onset_of(c), switches, c)
+    how = control(0.014, 1.0, LIMIT, stop_at_limit=True)
+    i = first_touch(0.014, 0.014, c, CORRECTED, how)
+    assert i.modes.turning == SEATED
+    assert i.clock.h == onset_of(c)
+    y_end, k_end, error = step(i.y, i.k, i.clock.h, i.switches, c)
     assert 1.0 < k_end.M / c.C_cos < 1.0 + AT_END * TOLERANCE
-    for beyond, passing in ((0.0, False), (AT_END * TOLERANCE * c.C_cos, True)):
-        assert passes(y, y_end, k_end, factors, switches, c, beyond)[0] == passing
+    assert not go_on(i, y_end, k_end, error, c)[0]
+    turns, after = begin_to_turn(i, y_end, k_end, error, c, CORRECTED, how)
+    assert turns
+    assert (after.y, after.modes.turning, after.clock.t) == (y_end, TURNING_FORWARD, i.clock.h)
     # Only the moment that holds the boulder may be exceeded, and by no more.
-    far = Acceleration(k_end.a_b, k_end.alpha_b, k_end.a_v, 1.01 * c.C_cos)
-    assert not passes(y, y_end, far, factors, switches, c, AT_END * TOLERANCE * c.C_cos)[0]
+    for M in (0.99, 1.01):
+        other = Acceleration(k_end.a_b, k_end.alpha_b, k_end.a_v, M * c.C_cos)
+        assert not begin_to_turn(i, y_end, other, error, c, CORRECTED, how)[0]
 
 
 def test_the_onset_is_the_same_by_every_law_of_the_soil() -> None:
@@ -130,29 +117,16 @@ def test_designs_enter_their_lanes_behind_the_onset() -> None:
     slow = RWG._replace(v_0=np.float64(0.01))  # never overcomes the weight
     below = RWG._replace(e=np.float64(-2.0))
     designs = [RWG, slow, below, *[RWG] * (LANES - 3)]
-    ws, how = np.zeros(WHOLE), control(0.014, 1.0, LIMIT, stop_at_limit=True)
+    ws, how = np.zeros(room(None, 0)), control(0.014, 1.0, LIMIT, stop_at_limit=True)
     with np.errstate(divide="ignore", invalid="ignore"):
-        start_designs(ws, np.stack(table_of(designs)), 0, CORRECTED, how, how.h)
+        start_designs(ws, np.stack(table_of(designs)), 0, CORRECTED, how)
     onset = onset_of(constants_of(RWG, CORRECTED, 0))
     for lane in (0, LANES - 1):
-        assert field(ws, TIME, lane) == pytest.approx(onset, rel=1e-12)
-        assert field(ws, STEP, lane) == 0.014
+        clock = load(ws, CLOCK, lane)
+        assert clock.t == pytest.approx(onset, rel=1e-12)
+        assert clock.h == 0.014
         assert load(ws, MODES, lane).turning == TURNING_FORWARD
         assert load(ws, STATE, lane).x_v == pytest.approx(RWG.v_0 * onset, rel=0.1)
-    assert (field(ws, TIME, 1), load(ws, MODES, 1).turning) == (0.014, SEATED)
-    assert (field(ws, TIME, 2), field(ws, STEP, 2)) == (0.0, 0.014)
-
-
-def test_a_design_is_started_again_with_shorter_steps() -> None:
-    """In a lane of its own, whichever row it is of: the same design, and none of those that wait for a lane is lost."""
-    designs, how = random_designs(2 * LANES + 3, seed=152), control(0.014, 1.0, LIMIT, stop_at_limit=True)
-    ws, table = np.zeros(WHOLE), np.stack(table_of(designs))
-    start_designs(ws[STARTS:], table, 0, CORRECTED, how, how.h)
-    waiting = ws[STARTS : STARTS + SIZE].copy()
-    for row in (0, LANES - 1, LANES, 2 * LANES + 2):
-        assert start_again(ws, EVENTS + 3, table, row, CORRECTED, how, 1e-3) == RUNNING
-        assert field(ws, STEP_FULL, EVENTS + 3) <= 1e-3
-        found, known = load(ws, CONSTANTS, EVENTS + 3), constants_of(designs[row], CORRECTED, 0)
-        for name in ("m_eff", "J_eff", "d", "K_soil", "x_yield", "k_v"):
-            assert getattr(found, name) == pytest.approx(getattr(known, name), rel=1e-14)
-    assert np.array_equal(ws[STARTS : STARTS + SIZE], waiting)
+    for lane in (1, 2):
+        clock = load(ws, CLOCK, lane)
+        assert (clock.t, clock.h, load(ws, MODES, lane).turning) == (0.0, 0.014, SEATED)
