@@ -15,6 +15,7 @@ import boulder_kernels as bk
 from boulder_kernels import Constants, lanes
 from boulder_kernels.design import design_at
 from boulder_kernels.layered import COUNTS, TO, filled_layers, uniform_layers
+from boulder_kernels.outcomes import empty_outcomes
 from boulder_kernels.outlined import HEIGHT, given_beside
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_kernels.soil import Kinematics, Reaction, closed_form, element_sums
@@ -87,7 +88,8 @@ def measure() -> Table:
     layered = {count: np.concatenate([stacked, same_soil(designs, count)]) for count in COUNTS}
 
     def in_lanes(table: np.ndarray, form: type | None, count: int) -> Callable[[], object]:
-        return partial(lanes.simulate_lanes, table, readings, control, form, count)
+        out = empty_outcomes(table.shape[1])
+        return partial(lanes.simulate_lanes, table, form, count, readings, control, bk.no_record(), out)
 
     work: dict[str, Callable[[], object]] = {
         "box": in_lanes(stacked, None, 0),

@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from boulder_kernels import SIMULATED, Control, Outcome, Readings, Record, Status, no_record
+from boulder_kernels import Control, Outcome, Readings, Record, no_record
 from boulder_kernels import simulate as simulate_impact
 from boulder_kernels._jit import plain
 from boulder_kernels.control import control_for
-from boulder_kernels.impact import simulate_last_resort
 from boulder_kernels.outcomes import FINER, NONE_NEEDED
 from boulder_kernels.soil_laws import constants_in
 from boulder_kernels.table import is_layered, is_paired, problem_at, step_of_solution
@@ -210,10 +209,7 @@ def _deciding(control: Control, how: Readings, step_s: float | None, *, layered:
 def _decided(designs: Designs, how: Readings, control: Control) -> Outcome:
     """Return the impact up to where its row ends."""
     problem = problem_at(designs.table, 0, control)
-    outcome = simulate_impact(problem, how, control, no_record())
-    if control.last_resort and problem.profile is None and outcome.status not in (*SIMULATED, Status.NO_CONTACT):
-        outcome = simulate_last_resort(problem.design, how, control, no_record())
-    return outcome
+    return simulate_impact(problem, how, control, no_record())
 
 
 def _drawn_s(row: Mapping[str, Any], horizon: float) -> float:

@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from boulder_kernels import Control, Design, Outcome, Problem, Readings, Record, simulate
+from boulder_kernels import Control, Design, Outcome, Problem, Readings, Record
 from boulder_kernels._jit import array_kernel, inlined, when_compiling
 from boulder_kernels.control import STEP_RATIO, control_for, control_in
 from boulder_kernels.design import design_in
 from boulder_kernels.error_estimates import safety_of, step_errors, take_second
 from boulder_kernels.ground import Ground, put_soil
-from boulder_kernels.impact import simulate_last_resort
+from boulder_kernels.impact import simulate_alone, simulate_last_resort
 from boulder_kernels.outcomes import NONE_NEEDED, PAIR, SECOND, STEP, outcome_in, write_outcome
 from boulder_kernels.rules import (
     ASKED_SLOWER,
@@ -148,7 +148,7 @@ def simulate_recorded(
     centre: np.ndarray,
 ) -> Outcome:
     """Simulate one design in the profile of its soil, and where `centre` has room evaluate the record."""
-    outcome = simulate(Problem(design, profile), readings, control, record)
+    outcome = simulate_alone(Problem(design, profile), readings, control, record)
     if centre.size > 0:
         c = constants_in(design, readings, control.elements, profile)
         write_history(c, design, readings, record, out, centre)

@@ -9,9 +9,9 @@ from ._cache import source_hash
 from ._jit import when_compiling
 from .control import Control
 from .design import Constants, Design, DesignTable, Readings, as_printed, constants_of, corrected
-from .impact import Problem, simulate, simulate_design
+from .impact import Problem
 from .outcomes import SIMULATED, Maxima, Outcome, OutcomeTable, Status
-from .table import simulate_table
+from .table import simulate, simulate_design, simulate_table
 from .time_history import Record, no_record
 
 __all__ = [

@@ -1,8 +1,8 @@
 """An impact from step to step: what it carries, and what follows from a step.
 
-Most steps are plain: they meet no event and pass no peak (`go_on`). What follows from any other, `follow` finds: its first
-event, the peaks of what is reported, the modes behind it, or the end. The single impact and the lanes both go by these
-two functions.
+Most steps are plain: they meet no event and pass no peak (`go_on`). What follows from any other, `follow` finds: its
+first event, the peaks of what is reported, the modes behind it, or the end. The lanes and the impact that is simulated
+alone both go by these functions.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from .design import Constants, Readings
 from .dormand_prince import dense_output, state_at
 from .dynamics import TURNING_FORWARD, Acceleration, Modes, State, Switches, rate_of, signed_arm, switches_of
 from .error_estimates import error_time
-from .events import NONE, SHORTEN, first_event
+from .events import NONE, SHORTEN, first_event, locate_limit
 from .modes import (
     AT_END,
     COUPLE,
@@ -58,6 +58,7 @@ from .outcomes import (
 )
 from .settling import NO_PROOF, barrier_energy, boulder_energy, inside_maxima, proof_is_possible, stays_below
 from .soil import soil_kinematics
+from .time_history import Exchanged, Record, add_exchanged, nothing_exchanged, write_samples
 
 FULL_TURN = math.pi
 """Rotation at which a simulation that does not stop at the limit ends [rad]: the boulder is upside down."""
@@ -245,9 +246,7 @@ def passed_maxima(
 
 
 @inlined
-def go_on(
-    i: Impact, y_end: State, k_end: Acceleration, error: float, c: Constants
-) -> tuple[bool, Impact]:
+def go_on(i: Impact, y_end: State, k_end: Acceleration, error: float, c: Constants) -> tuple[bool, Impact]:
     """Whether a step is plain, with no event, no peak and nothing to be decided; and what is carried on then.
 
     No branch, so that a loop over lanes stays vectorised. Arguments: see `follow`.
@@ -275,7 +274,7 @@ def begin_to_turn(
     clock, seated = i.clock, needs_moment(i.factors)
     beyond = AT_END * TOLERANCE * c.C_cos if seated else 0.0
     passing, _ = passes(i, y_end, k_end, beyond, c)
-    turns = passing & seated & (k_end.M > c.C_cos) & (clock.h < clock.horizon) & (y_end.v_v > 0.0)
+    turns = passing & seated & (c.C_cos < k_end.M) & (clock.h < clock.horizon) & (y_end.v_v > 0.0)
     modes = Modes(TURNING_FORWARD, True, 1.0, 1.0, 0, 0)
     switches, g = enter_modes(modes, readings, i.factors.limit, control.locate_yield, control.event_tolerance, c)
     front = compression_at(y_end, switches, c)
@@ -350,7 +349,9 @@ def follow(
     event, tau = first_event(i.y, i.k.M, gaps_at(y_end, k_end.M, g, c), dense, g, switches, c)
     if event == SHORTEN:
         t, shorter = clock.t, tau * h
-        again = Clock(t, shorter, clock.h_full, attempts, clock.barrier, clock.horizon, clock.error, clock.rotation_changes)
+        again = Clock(
+            t, shorter, clock.h_full, attempts, clock.barrier, clock.horizon, clock.error, clock.rotation_changes
+        )
         return Followed(RUNNING, event, Impact(i.pace, i.y, i.k, i.front, i.maxima, again, modes, switches, g))
     y = y_end if tau >= 1.0 else state_at(dense, tau)
     m, front = updated_maxima(i.maxima, clock.t, tau, i.front, y, dense, switches, c)
@@ -430,10 +431,54 @@ def first_touch(h_touching: float, h_apart: float, c: Constants, readings: Readi
     return Impact(pace, y, k, front, no_maxima(), clock, modes, switches, g)
 
 
+class Watched(NamedTuple):
+    """What is noted of an impact while it goes on."""
+
+    t_limit: float
+    """When it reached a limit at which it does not stop [s]; NaN before."""
+    written: int
+    """Samples of its record that have been written."""
+    exchanged: Exchanged
+    """Energies exchanged so far."""
+
+
+@inlined
+def nothing_watched() -> Watched:
+    """Return what is noted before the first step."""
+    return Watched(np.nan, 0, nothing_exchanged())
+
+
+@inlined
+def watch(
+    w: Watched,
+    i: Impact,
+    y_end: State,
+    k_end: Acceleration,
+    after: Impact,
+    c: Constants,
+    control: Control,
+    record: Record,
+) -> Watched:
+    """Note what there is of a step, from an impact at its start and after it; other arguments: see `follow`."""
+    t, h, t_end = i.clock.t, i.clock.h, after.clock.t
+    dense = dense_output(i.y, i.k, y_end, k_end, h)
+    t_limit, written, exchanged = w.t_limit, w.written, w.exchanged
+    if np.isnan(t_limit) and after.maxima.theta >= control.theta_limit:
+        gap_start, gap = control.theta_limit - abs(i.y.theta_b), control.theta_limit - after.maxima.theta
+        tau = (after.maxima.t_theta - t) / h
+        t_limit = t + h * locate_limit(gap_start, gap, dense.rotation, control.theta_limit, tau)
+    if record.times.size > 0:
+        written = write_samples(record, written, t, t_end, dense, i.modes, i.switches, c, exchanged)
+        exchanged = add_exchanged(exchanged, dense, (t_end - t) / h, i.modes, i.switches, c)
+    return Watched(t_limit, written, exchanged)
+
+
 @inlined
 def outcome_of(i: Impact, status: int, t_limit: float, control: Control) -> Outcome:
-    """Return the outcome of an impact that has ended; t_limit is when it reached its limit of rotation [s]."""
+    """Return the outcome of an impact that has ended; t_limit is of `Watched`."""
     clock = i.clock
+    if status == Status.LIMIT.value and control.stop_at_limit:
+        t_limit = clock.t
     if status == Status.UNSTABLE.value or status == Status.STEP_BUDGET.value:
         return failed(status)
     moved = error_time(clock.h_full, control.locate_yield and control.elements == 0) * clock.error

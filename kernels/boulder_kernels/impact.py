@@ -16,8 +16,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from ._jit import inlined, kernel
 from .control import (
     ACCEPTED,
@@ -31,13 +29,22 @@ from .control import (
     stable_step,
 )
 from .design import Constants, Design, Readings, constants_of, is_computable
-from .dormand_prince import dense_output, step
-from .dynamics import Acceleration, State
-from .events import locate_limit
-from .following import RUNNING, Impact, begin_to_turn, failed, first_touch, follow, go_on, outcome_of, stop_of
+from .dormand_prince import step
+from .following import (
+    RUNNING,
+    begin_to_turn,
+    failed,
+    first_touch,
+    follow,
+    go_on,
+    nothing_watched,
+    outcome_of,
+    stop_of,
+    watch,
+)
 from .outcomes import Outcome, Status
 from .soil_laws import constants_in
-from .time_history import Exchanged, Record, add_exchanged, nothing_exchanged, write_samples
+from .time_history import Record
 
 
 class Problem(NamedTuple):
@@ -50,13 +57,13 @@ class Problem(NamedTuple):
 
 
 @kernel
-def simulate_design(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
-    """Simulate one impact in a uniform soil; see `simulate`."""
-    return simulate(Problem(design, None), readings, control, record)
+def simulate_uniform(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
+    """Simulate one impact in a uniform soil; see `simulate_alone`."""
+    return simulate_alone(Problem(design, None), readings, control, record)
 
 
 @kernel
-def simulate(problem: Problem, readings: Readings, control: Control, record: Record) -> Outcome:
+def simulate_alone(problem: Problem, readings: Readings, control: Control, record: Record) -> Outcome:
     """Simulate one impact with a fixed time step, each step cut where a mode changes.
 
     Parameters
@@ -103,42 +110,13 @@ def misses(design: Design) -> bool:
     return design.H - design.d <= design.e_bumper
 
 
-class Watched(NamedTuple):
-    """What is noted of an impact while it goes on."""
-
-    t_limit: float
-    """When it reached a limit at which it does not stop [s]; NaN before."""
-    written: int
-    """Samples of its record that have been written."""
-    exchanged: Exchanged
-    """Energies exchanged so far."""
-
-
-@inlined
-def watch(
-    w: Watched, i: Impact, y_end: State, k_end: Acceleration, after: Impact, c: Constants, control: Control, record: Record
-) -> Watched:
-    """Note what there is of a step, from an impact at its start and after it; other arguments: see `follow`."""
-    t, h, t_end = i.clock.t, i.clock.h, after.clock.t
-    dense = dense_output(i.y, i.k, y_end, k_end, h)
-    t_limit, written, exchanged = w.t_limit, w.written, w.exchanged
-    if np.isnan(t_limit) and after.maxima.theta >= control.theta_limit:
-        gap_start, gap = control.theta_limit - abs(i.y.theta_b), control.theta_limit - after.maxima.theta
-        tau = (after.maxima.t_theta - t) / h
-        t_limit = t + h * locate_limit(gap_start, gap, dense.rotation, control.theta_limit, tau)
-    if record.times.size > 0:
-        written = write_samples(record, written, t, t_end, dense, i.modes, i.switches, c, exchanged)
-        exchanged = add_exchanged(exchanged, dense, (t_end - t) / h, i.modes, i.switches, c)
-    return Watched(t_limit, written, exchanged)
-
-
 @kernel
 def simulate_by_steps(
     h_touching: float, h_apart: float, c: Constants, readings: Readings, control: Control, record: Record
 ) -> Outcome:
-    """Simulate one impact with given time steps [s] while the truck touches and while not; see `simulate`."""
+    """Simulate one impact with given time steps [s] while the truck touches and while not; see `simulate_alone`."""
     watching = record.times.size > 0 or not control.stop_at_limit
-    w = Watched(np.nan, 0, nothing_exchanged())
+    w = nothing_watched()
     i = first_touch(h_touching, h_apart, c, readings, control)
     y_end, k_end, error = step(i.y, i.k, i.clock.h, i.switches, c)
     turns, after = begin_to_turn(i, y_end, k_end, error, c, readings, control)
@@ -155,7 +133,7 @@ def simulate_by_steps(
         if watching and after.clock.t > i.clock.t:
             w = watch(w, i, y_end, k_end, after, c, control, record)
         i = after
-    return outcome_of(i, status, i.clock.t if status == Status.LIMIT.value and control.stop_at_limit else w.t_limit, control)
+    return outcome_of(i, status, w.t_limit, control)
 
 
 DAMPED = 16.0
@@ -200,14 +178,14 @@ def simulate_last_resort(design: Design, readings: Readings, control: Control, r
     design
         The design, in uniform soil.
     readings, control, record
-        As of `boulder_kernels.impact.simulate`; the record keeps nothing.
+        As of `simulate_alone`; the record keeps nothing.
     """
     c = constants_of(design, readings, control.elements)
     if misses(design) or not is_computable(c):
-        return simulate_design(design, readings, control, record)
+        return simulate_uniform(design, readings, control, record)
     _, status = first_step(control, control.theta_limit, c)
     if status == ACCEPTED:
-        return simulate_design(design, readings, control, record)
+        return simulate_uniform(design, readings, control, record)
     factor = spring_to_follow(rates_of(control.theta_limit, c), control)
     c = constants_of(with_spring(design, factor), readings, control.elements)
     apart = constants_of(with_spring(design, NO_SPRING), readings, control.elements)

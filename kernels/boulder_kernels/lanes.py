@@ -18,9 +18,24 @@ from .design import Readings, design_in, is_computable
 from .dormand_prince import step
 from .error_estimates import step_errors
 from .events import NONE
-from .following import RUNNING, Clock, Impact, Pace, begin_to_turn, first_touch, follow, go_on, outcome_of, stop_of
-from .numerics import field, put
-from .outcomes import STATUS, Outcome, Status, empty_outcomes, write_outcome
+from .following import (
+    RUNNING,
+    Clock,
+    Impact,
+    Pace,
+    Watched,
+    begin_to_turn,
+    failed,
+    first_touch,
+    follow,
+    go_on,
+    nothing_watched,
+    outcome_of,
+    stop_of,
+    watch,
+)
+from .outcomes import STATUS, Outcome, Status, write_outcome
+from .time_history import Record
 from .workspace import (
     ATTEMPT,
     CLOCK,
@@ -30,14 +45,12 @@ from .workspace import (
     END_STATE,
     FACTORS,
     FRONT,
-    GROUPS,
     LANES,
     MAXIMA,
     MODES,
     PACE,
-    SIZE,
     START,
-    STARTED,
+    STARTS,
     STATE,
     SWITCHES,
     Attempt,
@@ -53,7 +66,7 @@ from .workspace import (
 
 EMPTY = -1
 """Row of a lane that holds no design."""
-NEXT = GROUPS * LANES
+NEXT = LANES
 """Behind the rows in the lanes: the next row of the table."""
 
 
@@ -115,9 +128,7 @@ def take_over_steps(ws: Any) -> int:
     others = 0
     for lane in range(LANES):
         i, error = load_impact(ws, lane), load(ws, ATTEMPT, lane).error
-        plain, after = go_on(
-            i, load(ws, END_STATE, lane), load(ws, END, lane), error, load(ws, CONSTANTS, lane)
-        )
+        plain, after = go_on(i, load(ws, END_STATE, lane), load(ws, END, lane), error, load(ws, CONSTANTS, lane))
         store(ws, ATTEMPT, lane, Attempt(error, 1.0 if plain else 0.0, RUNNING))
         others += 0 if plain else 1
         if plain:
@@ -197,24 +208,23 @@ def start_designs(ws: Any, designs: np.ndarray, first: int, readings: Readings, 
 
 @inlined
 def next_design(
-    ws: Any, rows: np.ndarray, group: int, lane: int, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray
+    ws: Any, rows: np.ndarray, lane: int, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray
 ) -> None:
     """Put the next design that needs integration into a lane; write those that need none."""
-    started = GROUPS * SIZE
     while rows[NEXT] < out.shape[1]:
         row = rows[NEXT]
         rows[NEXT] += 1
         if row % LANES == 0:
-            start_designs(part(ws, started), designs, row, readings, control)
-        status = int(load(part(ws, started), ATTEMPT, row % LANES).status)
+            start_designs(part(ws, STARTS), designs, row, readings, control)
+        status = int(load(part(ws, STARTS), ATTEMPT, row % LANES).status)
         if status == RUNNING:
-            copy_lane(ws, started + row % LANES, group * SIZE + lane, STARTED)
-            rows[group * LANES + lane] = row
+            copy_lane(ws, STARTS + row % LANES, lane, END_STATE)
+            rows[lane] = row
             return
         out[STATUS, row] = status
-    rows[group * LANES + lane] = EMPTY
+    rows[lane] = EMPTY
     # An empty lane stands still: its steps have no length, and their results are ignored.
-    store(ws, CLOCK, group * SIZE + lane, Clock(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    store(ws, CLOCK, lane, Clock(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 
 
 @kernel
@@ -238,39 +248,73 @@ def follow_lane(ws: Any, lane: int, readings: Readings, control: Control) -> int
 
 @kernel
 def write_lane(
-    ws: Any, lane: int, status: int, designs: np.ndarray, control: Control, out: np.ndarray, row: int
-) -> None:
-    """Write the outcome of a lane into its row; a design that failed leaves its row NaN."""
-    i = load_impact(part(ws, lane), 0)
-    o = outcome_of(i, status, i.clock.t if status == Status.LIMIT.value else np.nan, control)
-    write_outcome(out, row, o, step_errors(o, design_in(designs, row), control.theta_limit, control.horizon))
+    ws: Any, lane: int, status: int, t_limit: float, designs: np.ndarray, control: Control, out: np.ndarray, row: int
+) -> Outcome:
+    """Write the outcome of a lane into its row, and return it; a design that failed leaves its row NaN."""
+    o = outcome_of(load_impact(part(ws, lane), 0), status, t_limit, control)
+    if np.isnan(o.t_end):
+        out[STATUS, row] = status
+    else:
+        write_outcome(out, row, o, step_errors(o, design_in(designs, row), control.theta_limit, control.horizon))
+    return o
+
+
+@kernel
+def watch_lane(ws: Any, w: Watched, control: Control, record: Record) -> Watched:
+    """Note what there is of a step of the first lane, whose impact at its start lies in the group of starts."""
+    i, after = load_impact(part(ws, STARTS), 0), load_impact(ws, 0)
+    if after.clock.t == 0.0:
+        return nothing_watched()  # it starts again, by shorter steps
+    if after.clock.t == i.clock.t:
+        return w
+    return watch(w, i, load(ws, END_STATE, 0), load(ws, END, 0), after, load(ws, CONSTANTS, 0), control, record)
 
 
 @kernel
 def run_lanes(
-    designs: np.ndarray, readings: Readings, control: Control, ws: Any, rows: np.ndarray, out: np.ndarray
-) -> None:
-    """Simulate every design of a table; arguments: see `simulate_lanes`, and rows of the lanes, as many and one more."""
-    for group in range(GROUPS):
-        for lane in range(LANES):
-            next_design(ws, rows, group, lane, designs, readings, control, out)
-    busy = True
+    designs: np.ndarray,
+    readings: Readings,
+    control: Control,
+    ws: Any,
+    rows: np.ndarray,
+    record: Record,
+    out: np.ndarray,
+) -> Outcome:
+    """Simulate every design of a table, and return the outcome of the last that has ended.
+
+    Parameters
+    ----------
+    designs, readings, control, record, out
+        As of `simulate_lanes`, with designs for whole groups.
+    ws, rows
+        The workspace; the rows of the designs in the lanes, EMPTY before they are filled, and behind them 0.
+    """
+    for lane in range(LANES):
+        next_design(ws, rows, lane, designs, readings, control, out)
+    o, w = failed(int(out[STATUS, -1])), nothing_watched()
+    watching = out.shape[1] == 1 and (record.times.size > 0 or not control.stop_at_limit)
+    if watching:
+        copy_lane(ws, STARTS, 0, DESIGN)  # with the end of its first step
+        stand_still(part(ws, STARTS), readings, control)
+        w = watch_lane(ws, w, control, record)
+    busy = rows[0] != EMPTY
     while busy:
-        busy = False
-        for group in range(GROUPS):
-            lanes = part(ws, group * SIZE)
-            attempt_steps(lanes)
-            if take_over_steps(lanes) > 0:
-                for lane in range(LANES):
-                    slot = group * LANES + lane
-                    if rows[slot] != EMPTY and load(lanes, ATTEMPT, lane).plain == 0.0:
-                        status = follow_lane(lanes, lane, readings, control)
-                        if status != RUNNING:
-                            write_lane(lanes, lane, status, designs, control, out, rows[slot])
-                            next_design(ws, rows, group, lane, designs, readings, control, out)
-                    busy |= rows[slot] != EMPTY
-            else:
-                busy = True
+        if watching:
+            copy_lane(ws, 0, STARTS, DESIGN)
+        attempt_steps(ws)
+        busy = take_over_steps(ws) == 0
+        for lane in range(0 if busy else LANES):
+            if rows[lane] == EMPTY:
+                continue
+            busy, status = True, RUNNING
+            if load(ws, ATTEMPT, lane).plain == 0.0:
+                status = follow_lane(ws, lane, readings, control)
+            if watching:
+                w = watch_lane(ws, w, control, record)
+            if status != RUNNING:
+                o = write_lane(ws, lane, status, w.t_limit, designs, control, out, rows[lane])
+                next_design(ws, rows, lane, designs, readings, control, out)
+    return o
 
 
 def empty_workspace(soil: type | None = None, parts: int = 0) -> Any:
@@ -296,30 +340,37 @@ def filled_up(designs: np.ndarray) -> np.ndarray:
 
 
 def simulate_lanes(
-    designs: np.ndarray, readings: Readings, control: Control, soil: type | None = None, parts: int = 0
-) -> np.ndarray:
-    """Simulate every design of a table in lanes, by a closed form of the soil and stopping at the limit.
+    designs: np.ndarray,
+    soil: type | None,
+    parts: int,
+    readings: Readings,
+    control: Control,
+    record: Record,
+    out: np.ndarray,
+) -> Outcome:
+    """Simulate every design of a table in lanes, by a closed form of the soil.
 
     Parameters
     ----------
     designs
         Designs, SI, shape (15 + G, n): first the fields of `DesignTable`, then what is given of their soil, see
         `boulder_kernels.workspace.LaneSoil`.
+    soil, parts
+        As of `empty_workspace`; the parts of `boulder_kernels.layered.COUNTS`.
     readings
         Which formulas are read as printed.
     control
-        Step, horizon, limit; its choice of soil and of stopping is ignored.
-    soil, parts
-        As of `empty_workspace`; the parts of `boulder_kernels.layered.COUNTS`.
+        How they are simulated, its choice of soil ignored. One that does not stop at the limit is for one design.
+    record
+        Filled with the time history of one design at the times it names; for several, one that keeps nothing.
+    out
+        Where the outcomes go in the order of the designs, an array of `boulder_kernels.outcomes.empty_outcomes`.
 
     Returns
     -------
-    ndarray, shape (11, n)
-        Outcomes in the order of the designs, with rows in the order of `OutcomeTable`; those of errors are NaN.
+    Outcome
+        That of the design that ended last.
     """
-    out = empty_outcomes(designs.shape[1])
-    if designs.shape[1] > 0:
-        rows = np.full(NEXT + 1, EMPTY)
-        rows[NEXT] = 0
-        run_lanes(filled_up(designs), readings, control, empty_workspace(soil, parts), rows, out)
-    return out
+    rows = np.full(LANES + 1, EMPTY)
+    rows[NEXT] = 0
+    return run_lanes(filled_up(designs), readings, control, empty_workspace(soil, parts), rows, record, out)

@@ -8,9 +8,10 @@ import numpy as np
 
 from ._jit import array_kernel, kernel, plain, unless_none
 from .control import STEP_RATIO, Control, control_for
-from .design import DesignTable, Readings, design_at, design_in
+from .design import Design, DesignTable, Readings, design_at, design_in
 from .error_estimates import safety_of, step_errors, take_seconds
-from .impact import Problem, simulate, simulate_last_resort
+from .following import failed
+from .impact import Problem, simulate_alone, simulate_last_resort
 from .lanes import simulate_lanes
 from .layered import (
     LAYERED,
@@ -27,12 +28,14 @@ from .outcomes import (
     SECOND,
     STEP,
     T_END,
+    Outcome,
     OutcomeTable,
+    Status,
     empty_outcomes,
     outcome_table,
     write_outcome,
 )
-from .outlined import given_beside, with_outline
+from .outlined import given_beside, is_outlined, with_outline
 from .settling import proof_is_possible
 from .soil_laws import SoilProfile, empty_soil, profile_of
 from .time_history import Record, no_record
@@ -67,38 +70,13 @@ def run_rows(
     control: Control,
     record: Record,
     out: np.ndarray,
-) -> None:
-    """Simulate designs one by one; arguments: see `simulate_rows`, a record that keeps nothing, and its result."""
-    for row in range(designs.shape[1]):
-        profile = profile_in(row, soil_in(row, soil, outlines), layers)
-        design = design_in(designs, row)
-        outcome = simulate(Problem(design, profile), readings, control, record)
-        write_outcome(out, row, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
-
-
-@kernel
-def run_last_resort(designs: np.ndarray, readings: Readings, control: Control, record: Record, out: np.ndarray) -> None:
-    """The same for designs that need more steps than are allowed, see `boulder_kernels.impact.simulate_last_resort`."""
-    for row in range(designs.shape[1]):
-        design = design_in(designs, row)
-        outcome = simulate_last_resort(design, readings, control, record)
-        write_outcome(out, row, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
-
-
-def simulate_rows(
-    designs: np.ndarray,
-    layers: np.ndarray | None,
-    outlines: np.ndarray | None,
-    soil: Any,
-    readings: Readings,
-    control: Control,
-) -> np.ndarray:
-    """Simulate designs one by one, in any soil.
+) -> Outcome:
+    """Simulate designs one by one, in any soil, and return the last outcome.
 
     Parameters
     ----------
     designs
-        As of `simulate_lanes`.
+        Shape (15, n), at least one.
     layers
         Layers of every design, shape (n, M, 6), see `boulder_kernels.layered`; None for uniform soils.
     outlines
@@ -107,10 +85,31 @@ def simulate_rows(
         Elements or layers that every design fills anew; None for uniform soils.
     readings, control
         As of `simulate_table`.
+    record
+        Filled with the time history of one design at the times it names; for several, one that keeps nothing.
+    out
+        Where the outcomes go, an array of `empty_outcomes`.
     """
-    out = empty_outcomes(designs.shape[1])
-    run_rows(designs, layers, outlines, soil, readings, control, no_record(), out)
-    return out
+    outcome = failed(Status.INVALID.value)
+    for row in range(designs.shape[1]):
+        profile = profile_in(row, soil_in(row, soil, outlines), layers)
+        design = design_in(designs, row)
+        outcome = simulate_alone(Problem(design, profile), readings, control, record)
+        write_outcome(out, row, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
+    return outcome
+
+
+@kernel
+def run_last_resort(
+    designs: np.ndarray, readings: Readings, control: Control, record: Record, out: np.ndarray
+) -> Outcome:
+    """Do the same for designs that need more steps than are allowed, see `simulate_last_resort`."""
+    outcome = failed(Status.INVALID.value)
+    for row in range(designs.shape[1]):
+        design = design_in(designs, row)
+        outcome = simulate_last_resort(design, readings, control, record)
+        write_outcome(out, row, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
+    return outcome
 
 
 def problem_at(table: DesignTable, row: int, control: Control) -> Problem:
@@ -170,8 +169,27 @@ def is_taper(layers: np.ndarray, outlines: np.ndarray) -> bool:
     return layers.shape[1] + outlines.shape[1] == 3 and not layers[:, :, PRESSURE].any()
 
 
+def solve_rows(
+    designs: np.ndarray,
+    layers: np.ndarray | None,
+    outlines: np.ndarray | None,
+    soil: Any,
+    readings: Readings,
+    control: Control,
+    record: Record,
+    out: np.ndarray,
+) -> Outcome:
+    """Solve designs once: in lanes where they can be, else one by one; see `run_rows` for arguments and result."""
+    given = given_to_lanes(designs, layers, outlines) if control.side_by_side and control.elements == 0 else None
+    if control.last_resort and control.stop_at_limit and layers is None:
+        return run_last_resort(designs, readings, control, record, out)
+    if given is not None and (control.stop_at_limit or designs.shape[1] == 1):
+        return simulate_lanes(*given, readings, control, record, out)
+    return run_rows(designs, layers, outlines, soil, readings, control, record, out)
+
+
 def solve(table: DesignTable, readings: Readings, control: Control) -> tuple[np.ndarray, np.ndarray]:
-    """Solve every design of a table once: in lanes where they can be, else one by one.
+    """Solve every design of a table once.
 
     Returns
     -------
@@ -181,27 +199,49 @@ def solve(table: DesignTable, readings: Readings, control: Control) -> tuple[np.
         Which second solution each of them needs, see `boulder_kernels.outcomes.StepErrors`.
     """
     n = len(table.L)
-    designs = np.stack(table[: len(DesignTable._fields)])
     layers: np.ndarray | None = getattr(table, "layers", None)
     outlines: np.ndarray | None = getattr(table, "outlines", None)
-    side_by_side = control.side_by_side and control.elements == 0 and control.stop_at_limit
-    given = given_to_lanes(designs, layers, outlines) if side_by_side else None
-    if control.last_resort and layers is None:
-        out = empty_outcomes(n)
-        run_last_resort(designs, readings, control, no_record(), out)
-    elif given is not None:
-        out = simulate_lanes(given.designs, readings, control, given.soil, given.parts)
-    elif not n:
-        out = empty_outcomes(0)
-    else:
-        soil = None
-        if layers is not None:
-            outline = None if outlines is None else outlines[0]
-            soil = empty_soil(layers.shape[1], control.elements, outline)
-        out = simulate_rows(designs, layers, outlines, soil, readings, control)
+    out = empty_outcomes(n)
+    if n:
+        outline = None if outlines is None else outlines[0]
+        soil = None if layers is None else empty_soil(layers.shape[1], control.elements, outline)
+        designs = np.stack(table[: len(DesignTable._fields)])
+        solve_rows(designs, layers, outlines, soil, readings, control, no_record(), out)
     second = out[SECOND].copy()
     out[STEP] = np.where(np.isnan(out[T_END]), np.nan, step_of_solution(control))
     return out, second
+
+
+def simulate(problem: Problem, readings: Readings, control: Control, record: Record) -> Outcome:
+    """Simulate one impact: a table of one design, by the very code that computes larger ones.
+
+    Parameters
+    ----------
+    problem
+        Design and soil.
+    readings
+        Which formulas are read as printed.
+    control
+        Step, horizon, limit, representation of the soil; nothing is estimated of errors.
+    record
+        Filled with the time history at the times it names.
+
+    Returns
+    -------
+    Outcome
+        Maxima from the dense output; NaN where the status says that there is no result, see `Status`.
+    """
+    designs = np.array(problem.design, dtype=float)[:, None]
+    if problem.profile is None:
+        return solve_rows(designs, None, None, None, readings, control, record, empty_outcomes(1))
+    layers, soil = problem.profile
+    outlines = soil.outline[None] if is_outlined(soil) else None
+    return solve_rows(designs, layers[None], outlines, soil, readings, control, record, empty_outcomes(1))
+
+
+def simulate_design(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
+    """Simulate one impact in a uniform soil; see `simulate`."""
+    return simulate(Problem(design, None), readings, control, record)
 
 
 def is_layered(table: Any) -> bool:

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 
-from ._jit import function_of, overload
+from ._jit import function_of, is_plain, overload
 from .design import Body, Constants, Design, Readings, constants_of
 from .dynamics import Acceleration, Modes, State, Switches
 from .following import Clock, Pace
@@ -27,9 +27,9 @@ from .numerics import field, put
 from .outcomes import Compression, Maxima
 from .outlined import FewPieces, GivenPiece, Lean, Piece, TaperedPiece, TaperedSoil, constants_beside
 
-LANES = 8
+LANES = 1 if is_plain() else 8
 """Designs that are integrated side by side: one vector of eight doubles. More of them hide no more latency and take
-more of the fastest memory (measured: 2 to 5 % slower with 16 or 32)."""
+more of the fastest memory (measured: 2 to 5 % slower with 16 or 32). Without the compiler there is nothing to gain."""
 KNOWN: dict[str, object] = {"elements": 0, "c_x": 0.0, "c_y": 0.0, "d_N": 0.0}
 """Fields that are not kept: lanes know the closed form of the soil only; and no motion depends on three lengths from
 which other constants have been made."""
@@ -78,16 +78,12 @@ def _offset_of(name: str) -> int:
 CONSTANTS, PACE, STATE, START, FRONT, MAXIMA, CLOCK, MODES, SWITCHES, FACTORS, END_STATE, END, ATTEMPT, DESIGN = map(
     _offset_of, _LAYOUT
 )
-STARTED = END_STATE
-"""The end of what is copied when a design that has been started enters a lane."""
 SIZE = DESIGN + _size(Design)
-"""Numbers of one group."""
+"""Numbers of a group of lanes."""
+STARTS = SIZE
+"""Where the second group begins, in which designs are started."""
 RECORDS = {_offset_of(name): record for name, record in _LAYOUT.items()}
-
-
-GROUPS = 1
-"""Groups of lanes that are stepped in turn; behind them is one in which designs are started."""
-SOIL = (GROUPS + 1) * SIZE
+SOIL = 2 * SIZE
 """Where the soil of a design lies that is not uniform, from its lane on: in a second half of the array, laid out as the
 first, which only the workspaces of `SOILS` have."""
 
@@ -158,8 +154,8 @@ def soil_in(ws: Any) -> LaneSoil | None:
 def room(form: type | None, parts: int) -> int:
     """Return how many numbers a workspace has, by its type and the number of parts of its soil."""
     if form is None:
-        return (GROUPS + 1) * SIZE
-    return SOIL + GROUPS * SIZE + SOILS[form].size(parts) + SOILS[form].given_size(parts)
+        return 2 * SIZE
+    return SOIL + STARTS + SOILS[form].size(parts) + SOILS[form].given_size(parts)
 
 
 def given_offset(soil: LaneSoil, count: int) -> int:
@@ -168,7 +164,7 @@ def given_offset(soil: LaneSoil, count: int) -> int:
 
 
 for _soil in SOILS.values():
-    assert _soil.size(COUNTS[-1]) <= SIZE, "the soil of a lane reaches into that of the next group"
+    assert _soil.size(COUNTS[-1]) <= SIZE, "the soil of a lane reaches into that of the other group"
 
 
 def part(ws: Any, start: int) -> Any:

@@ -1,7 +1,8 @@
 """Many designs side by side: every row is the same whatever its neighbours, bit for bit, and is the single impact.
 
-The single impact is other machine code of the same source, in which other products are fused with a sum: it may differ
-by rounding, and so, at a knife edge of the printed readings or where a proof of rest only just holds, by more.
+The impact that is simulated alone, as in the page, is other machine code of the same source, in which other products
+are fused with a sum: it may differ by rounding, and so, at a knife edge of the printed readings or where a proof of rest
+only just holds, by more.
 """
 
 import numpy as np

@@ -13,7 +13,14 @@ import boulder_kernels as bk
 from boulder_kernels._jit import compiler
 from boulder_kernels.design import constants_of, design_in
 from boulder_kernels.heave import ROOM, Base, HeaveOptions, forces, heave_constants, prepare
-from boulder_kernels.lanes import attempt_steps, compute_constants, run_lanes, stand_still, take_first_steps, take_over_steps
+from boulder_kernels.lanes import (
+    attempt_steps,
+    compute_constants,
+    run_lanes,
+    stand_still,
+    take_first_steps,
+    take_over_steps,
+)
 from boulder_kernels.second_opinion import potential_energy
 from boulder_kernels.workspace import LANES, SOILS, LayeredLanes, OutlinedLanes, TaperedLanes, room
 
