@@ -18,7 +18,7 @@ from boulder_kernels._ahead import UnsuitableError, flatten
 from boulder_kernels._numba import call_of, examples
 from boulder_kernels.design import constants_of, is_computable
 from boulder_kernels.error_estimates import take_seconds
-from boulder_kernels.impact import simulate
+from boulder_kernels.impact import simulate_alone
 from boulder_kernels.layered import uniform_layers
 from boulder_kernels.numerics import sine_versine
 from boulder_kernels.outcomes import PAIR, empty_outcomes
@@ -55,8 +55,8 @@ def problems() -> dict[str, bk.Problem]:
 )
 def test_the_bits_are_those_of_numba(kind: str) -> None:
     """Of one impact, whatever its soil, maxima, times and status."""
-    ahead = _ahead.call(simulate, (problems()[kind], READINGS, HOW, bk.no_record()))
-    numba = simulate.for_python(problems()[kind], READINGS, HOW, bk.no_record())
+    ahead = _ahead.call(simulate_alone, (problems()[kind], READINGS, HOW, bk.no_record()))
+    numba = simulate_alone.for_python(problems()[kind], READINGS, HOW, bk.no_record())
     assert isinstance(ahead, bk.Outcome)
     assert np.array_equal(np.hstack([*ahead.maxima, ahead.t_end]), np.hstack([*numba.maxima, numba.t_end]))
     assert (ahead.status, ahead.attempts) == (numba.status, numba.attempts)

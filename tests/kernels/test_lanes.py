@@ -1,8 +1,8 @@
-"""Many designs side by side: every row is the same whatever its neighbours, bit for bit, and is the single impact.
+"""Many designs side by side: every row is the same whatever its neighbours, bit for bit, and is the impact alone.
 
-The impact that is simulated alone, as in the page, is other machine code of the same source, in which other products
-are fused with a sum: it may differ by rounding, and so, at a knife edge of the printed readings or where a proof of rest
-only just holds, by more.
+An impact that is simulated alone, as the page does, is other machine code of the same source, in which other products
+are fused with a sum: it may differ by rounding, and so, at a knife edge of the printed readings or where a proof of
+rest only just holds, by more.
 """
 
 import numpy as np
@@ -11,6 +11,7 @@ import pytest
 import boulder_kernels as bk
 from boulder_kernels import Design, OutcomeTable, Status
 from boulder_kernels.error_estimates import step_errors
+from boulder_kernels.impact import simulate_uniform
 from boulder_kernels.outcomes import STEP, T_END, empty_outcomes, outcome_table, write_outcome
 from boulder_kernels.workspace import LANES
 
@@ -50,16 +51,16 @@ def with_step(out: np.ndarray, h: float) -> OutcomeTable:
 
 
 def one_by_one(designs: list[Design], readings: bk.Readings, how: bk.Control) -> OutcomeTable:
-    """Single impacts in the columns of a table."""
+    """Impacts that are simulated alone, in the columns of a table."""
     out = empty_outcomes(len(designs))
     for row, design in enumerate(designs):
-        found = bk.simulate_design(design, readings, how, bk.no_record())
+        found = simulate_uniform(design, readings, how, bk.no_record())
         write_outcome(out, row, found, step_errors(found, design, how.theta_limit, how.horizon))
     return with_step(out, how.h)
 
 
 @pytest.mark.parametrize("readings", ALL_READINGS)
-def test_lanes_are_single_impacts(readings: bk.Readings) -> None:
+def test_lanes_are_impacts_alone(readings: bk.Readings) -> None:
     designs = random_designs(20, seed=121)
     assert_alike(bk.simulate_table(table_of(designs), readings, HOW), one_by_one(designs, readings, HOW), 1)
 
@@ -67,7 +68,7 @@ def test_lanes_are_single_impacts(readings: bk.Readings) -> None:
 @pytest.mark.compiled
 @pytest.mark.parametrize("h", [1e-3, 8e-3, 2e-2])
 @pytest.mark.parametrize("readings", PRESETS, ids=["as_printed", "corrected"])
-def test_many_lanes_are_single_impacts(readings: bk.Readings, h: float) -> None:
+def test_many_lanes_are_impacts_alone(readings: bk.Readings, h: float) -> None:
     designs = random_designs(1500, seed=122)
     how = HOW._replace(h=h)
     found = bk.simulate_table(table_of(designs), readings, how)

@@ -1,4 +1,4 @@
-"""Soils of layers side by side in lanes: as the single impact, and every row the same whatever its neighbours."""
+"""Soils of layers side by side in lanes: as the impact alone, and every row the same whatever its neighbours."""
 
 from typing import Any
 
@@ -8,6 +8,7 @@ import pytest
 import boulder_kernels as bk
 from boulder_kernels import OutcomeTable, Status
 from boulder_kernels.error_estimates import step_errors
+from boulder_kernels.impact import simulate_alone
 from boulder_kernels.layered import COUNTS, LayeredTable, filled_layers, lanes_count
 from boulder_kernels.outcomes import empty_outcomes, write_outcome
 from boulder_kernels.soil_laws import soil_potential
@@ -22,11 +23,11 @@ READINGS = bk.corrected()
 
 
 def one_by_one(table: Any, readings: bk.Readings, how: bk.Control) -> OutcomeTable:
-    """Single impacts in the columns of a table."""
+    """Impacts that are simulated alone, in the columns of a table."""
     out = empty_outcomes(len(table.L))
     for row in range(len(table.L)):
         problem = problem_at(table, row, how)
-        found = bk.simulate(problem, readings, how, bk.no_record())
+        found = simulate_alone(problem, readings, how, bk.no_record())
         write_outcome(out, row, found, step_errors(found, problem.design, how.theta_limit, how.horizon))
     return with_step(out, how.h)
 
@@ -42,7 +43,7 @@ def split(table: LayeredTable, m: int) -> LayeredTable:
 @pytest.mark.compiled
 @pytest.mark.parametrize("count", [2, 3, *(pytest.param(n, marks=pytest.mark.nightly) for n in (1, 5, 8))])
 @pytest.mark.parametrize("readings", PRESETS, ids=["as_printed", "corrected"])
-def test_lanes_are_single_impacts(readings: bk.Readings, count: int) -> None:
+def test_lanes_are_impacts_alone(readings: bk.Readings, count: int) -> None:
     """Rounding decides a row now and then, as in uniform soils."""
     table = random_layers(random_designs(300, seed=171), count, seed=count)
     found = bk.simulate_table(table, readings, HOW)

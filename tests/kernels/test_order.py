@@ -19,7 +19,7 @@ from boulder_kernels.dynamics import (
     signed_arm,
     switches_of,
 )
-from boulder_kernels.impact import Problem, simulate
+from boulder_kernels.impact import Problem
 from boulder_kernels.modes import CONTACT, CORNER, COUPLE, ROTATION, TOLERANCE
 from boulder_kernels.table import simulate_table
 from boulder_kernels.time_history import no_record
@@ -210,7 +210,7 @@ def turned(step_s: float, tolerance: float) -> float:
     )
     record.times[0] = 0.04
     how = control(step_s, 0.05, np.radians(20.0))._replace(locate_yield=True, event_tolerance=tolerance)
-    simulate(Problem(SHALLOW, None), bk.corrected(), how, record)
+    bk.simulate(Problem(SHALLOW, None), bk.corrected(), how, record)
     return float(record.states[0, 3])
 
 

@@ -1,4 +1,4 @@
-"""Boulders with an outline side by side in lanes: as the single impact, every row the same whatever is beside it."""
+"""Boulders with an outline side by side in lanes: as the impact alone, every row the same whatever is beside it."""
 
 from collections.abc import Callable
 from typing import Any
