@@ -88,7 +88,7 @@ class Clock(NamedTuple):
 
 
 class Pace(NamedTuple):
-    """What steps an impact is given."""
+    """Which steps an impact is given."""
 
     h_touching: float
     """Length of a step that nothing shortens while the truck touches [s]."""
@@ -102,7 +102,6 @@ class Impact(NamedTuple):
     """What a simulation carries from step to step."""
 
     pace: Pace
-
     y: State
     k: Acceleration
     """Acceleration at this state."""
@@ -348,10 +347,8 @@ def follow(
     dense = dense_output(i.y, i.k, y_end, k_end, h)
     event, tau = first_event(i.y, i.k.M, gaps_at(y_end, k_end.M, g, c), dense, g, switches, c)
     if event == SHORTEN:
-        t, shorter = clock.t, tau * h
-        again = Clock(
-            t, shorter, clock.h_full, attempts, clock.barrier, clock.horizon, clock.error, clock.rotation_changes
-        )
+        t, h = clock.t, tau * h
+        again = Clock(t, h, clock.h_full, attempts, clock.barrier, clock.horizon, clock.error, clock.rotation_changes)
         return Followed(RUNNING, event, Impact(i.pace, i.y, i.k, i.front, i.maxima, again, modes, switches, g))
     y = y_end if tau >= 1.0 else state_at(dense, tau)
     m, front = updated_maxima(i.maxima, clock.t, tau, i.front, y, dense, switches, c)

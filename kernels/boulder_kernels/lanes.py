@@ -303,7 +303,7 @@ def run_lanes(
             copy_lane(ws, 0, STARTS, DESIGN)
         attempt_steps(ws)
         busy = take_over_steps(ws) == 0
-        for lane in range(0 if busy else LANES):
+        for lane in range(LANES if watching or not busy else 0):
             if rows[lane] == EMPTY:
                 continue
             busy, status = True, RUNNING

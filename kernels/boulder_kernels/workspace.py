@@ -2,8 +2,8 @@
 
 A loop over lanes is vectorised only where the compiler can see that no store touches a later load. One array with
 constant offsets shows it; separate arrays do not. A field occupies LANES consecutive entries, so that neighbouring
-lanes are neighbours in memory. Several groups of lanes follow each other; a lane is known by the start of its group
-plus its number in it. The functions below are the only ones that know where a field lies.
+lanes are neighbours in memory. There are two groups of lanes; a lane is known by the start of its group plus its
+number in it. The functions below are the only ones that know where a field lies.
 
 What works on one lane takes the workspace from that lane on, as whose lane 0 it is known there: offsets are then
 constants, and no index need be checked for being negative, as one that counts from the end.
