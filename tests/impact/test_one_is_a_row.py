@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 import boulder_sweep
 from benchmarks import flips
+from benchmarks.flips import Case
 from boulder_kernels import SIMULATED, Status, no_record, simulate
 from boulder_kernels._jit import plain
 from boulder_kernels.control import control_for
@@ -23,45 +23,36 @@ pytestmark = pytest.mark.compiled
 STIFF = {"subgrade_reaction_MN_m3": (1e3, 1e6), "vehicle_damper_N_s_m": (0.1, 1e4)}
 
 
-class Kind(NamedTuple):
-    """Designs of one kind, drawn as `benchmarks.flips` draws them."""
-
-    count: int
-    settings: str
-    ranges: dict[str, tuple[float, float]] = {}
-    outlined: bool = False
-
-
 KINDS = {
-    "balanced": Kind(400, ""),
-    "fast": Kind(200, "solver: {accuracy: fast}"),
-    "fine": Kind(200, "solver: {accuracy: fine}"),
-    "as printed": Kind(250, "model: {readings: as_printed}"),
-    "layers": Kind(150, f"soil: {{{flips.LAYERS}}}"),
-    "water and slope": Kind(150, f"soil: {{{flips.WATER}, slope: 10 deg}}"),
-    "taper": Kind(150, "boulder: {taper: 0.7}"),
-    "taper, as printed": Kind(50, "boulder: {taper: 0.7}\nmodel: {readings: as_printed}"),
-    "pieces": Kind(50, flips.PROFILE, outlined=True),
-    "elements": Kind(20, "model: {soil: {elements: 50}}"),
-    "slow": Kind(150, "", {"impact_speed_m_s": (0.5, 3.0)}),
-    "fast trucks": Kind(150, "", {"impact_speed_m_s": (30.0, 60.0)}),
-    "refused": Kind(150, "", STIFF),
+    "balanced": Case(400, ""),
+    "fast": Case(200, "solver: {accuracy: fast}"),
+    "fine": Case(200, "solver: {accuracy: fine}"),
+    "as printed": Case(250, "model: {readings: as_printed}"),
+    "layers": Case(150, f"soil: {{{flips.LAYERS}}}"),
+    "water and slope": Case(150, f"soil: {{{flips.WATER}, slope: 10 deg}}"),
+    "taper": Case(150, "boulder: {taper: 0.7}"),
+    "taper, as printed": Case(50, "boulder: {taper: 0.7}\nmodel: {readings: as_printed}"),
+    "pieces": Case(50, flips.PROFILE, outlined=True),
+    "elements": Case(20, "model: {soil: {elements: 50}}"),
+    "slow": Case(150, "", {"impact_speed_m_s": (0.5, 3.0)}),
+    "fast trucks": Case(150, "", {"impact_speed_m_s": (30.0, 60.0)}),
+    "refused": Case(150, "", STIFF),
 }
 
 
 def test_there_are_two_thousand() -> None:
-    assert sum(kind.count for kind in KINDS.values()) >= 2000
+    assert sum(case.designs for case in KINDS.values()) >= 2000
 
 
 @pytest.mark.parametrize("name", KINDS)
 def test_one_impact_is_a_row_of_a_table(name: str, tmp_path: Path) -> None:
     """Status, maxima, time of the limit and of the end; whatever lies beside the row in its table."""
-    count, settings, ranges, outlined = KINDS[name]
-    flips.drawn(name, flips.Case(count, settings, ranges, outlined)).to_parquet(tmp_path / "some.parquet", index=False)
-    (tmp_path / "some.yaml").write_text(f"name: some\ntable: some.parquet\n{settings}\n")
+    case = KINDS[name]
+    flips.drawn(name, case).to_parquet(tmp_path / "some.parquet", index=False)
+    (tmp_path / "some.yaml").write_text(f"name: some\ntable: some.parquet\n{case.settings}\n")
     sweep = boulder_sweep.load(tmp_path / "some.yaml")
     evaluation = evaluation_of(sweep, accuracy_of(sweep))
-    table = evaluation.designs(sweep.block(0, count)).table
+    table = evaluation.designs(sweep.block(0, case.designs)).table
     readings, control = evaluation.readings, plain(control_for)(NONE_NEEDED, evaluation.control)
     out, _ = solve(table, readings, control)
     for row, known in enumerate(out[: T_END + 1].T):
