@@ -116,17 +116,16 @@ def test_designs_enter_their_lanes_behind_the_onset() -> None:
     """A lane whose boulder has begun to turn stands at the onset; one that met more in its step has yet to make it."""
     slow = RWG._replace(v_0=np.float64(0.01))  # never overcomes the weight
     below = RWG._replace(e=np.float64(-2.0))
-    designs = [RWG, slow, below, *[RWG] * (LANES - 3)]
-    ws, how = np.zeros(room(None, 0)), control(0.014, 1.0, LIMIT, stop_at_limit=True)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        start_designs(ws, np.stack(table_of(designs)), 0, CORRECTED, how)
-    onset = onset_of(constants_of(RWG, CORRECTED, 0))
-    for lane in (0, LANES - 1):
-        clock = load(ws, CLOCK, lane)
-        assert clock.t == pytest.approx(onset, rel=1e-12)
-        assert clock.h == 0.014
-        assert load(ws, MODES, lane).turning == TURNING_FORWARD
-        assert load(ws, STATE, lane).x_v == pytest.approx(RWG.v_0 * onset, rel=0.1)
-    for lane in (1, 2):
-        clock = load(ws, CLOCK, lane)
-        assert (clock.t, clock.h, load(ws, MODES, lane).turning) == (0.0, 0.014, SEATED)
+    how, onset = control(0.014, 1.0, LIMIT, stop_at_limit=True), onset_of(constants_of(RWG, CORRECTED, 0))
+    for first in (RWG, slow, below):
+        ws = np.zeros(room(None, 0))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            start_designs(ws, np.stack(table_of([first] + [RWG] * (LANES - 1))), 0, CORRECTED, how)
+        for lane, design in {0: first, LANES - 1: RWG if LANES > 1 else first}.items():
+            clock, turning = load(ws, CLOCK, lane), load(ws, MODES, lane).turning
+            if design is RWG:
+                assert clock.t == pytest.approx(onset, rel=1e-12)
+                assert (clock.h, turning) == (0.014, TURNING_FORWARD)
+                assert load(ws, STATE, lane).x_v == pytest.approx(RWG.v_0 * onset, rel=0.1)
+            else:
+                assert (clock.t, clock.h, turning) == (0.0, 0.014, SEATED)
