@@ -5,15 +5,15 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import boulder_kernels as bk
-from boulder_kernels.control import BEHIND, first_length, onset_of
+from boulder_kernels.control import BEHIND, RETRY, first_length, onset_of
 from boulder_kernels.design import Constants, Design, constants_of
 from boulder_kernels.dormand_prince import step
-from boulder_kernels.dynamics import SEATED, TURNING_FORWARD, Acceleration
-from boulder_kernels.following import begin_to_turn, enter_modes, first_touch, go_on
-from boulder_kernels.lanes import start_designs
+from boulder_kernels.dynamics import SEATED, TURNING_FORWARD, Acceleration, State
+from boulder_kernels.following import RUNNING, begin_to_turn, enter_modes, first_touch, go_on
+from boulder_kernels.lanes import follow_lane, start_designs
 from boulder_kernels.layered import PRESSURE, SUBGRADE, TO, uniform_layers
 from boulder_kernels.modes import AT_END, TOLERANCE, initial_modes
-from boulder_kernels.workspace import CLOCK, LANES, MODES, STATE, load, room
+from boulder_kernels.workspace import CLOCK, END_STATE, LANES, MODES, PACE, STATE, load, room, store
 from tests import oracle
 from tests.kernels.samples import layered_constants
 from tests.oracle import dynamics, events, restoring
@@ -129,3 +129,16 @@ def test_designs_enter_their_lanes_behind_the_onset() -> None:
                 assert load(ws, STATE, lane).x_v == pytest.approx(RWG.v_0 * onset, rel=0.1)
             else:
                 assert (clock.t, clock.h, turning) == (0.0, 0.014, SEATED)
+
+
+def test_a_design_whose_motion_is_no_number_is_started_again() -> None:
+    """By shorter steps, in its own lane; no other lane is touched."""
+    how, ws = control(0.014, 1.0, LIMIT, stop_at_limit=True), np.zeros(room(None, 0))
+    start_designs(ws, np.stack(table_of([RWG] * LANES)), 0, CORRECTED, how)
+    store(ws, END_STATE, 0, State(*[np.nan] * 6))
+    before, others = ws.copy(), np.arange(len(ws)) % LANES != 0
+    assert follow_lane(ws, 0, CORRECTED, how) == RUNNING
+    clock = load(ws, CLOCK, 0)
+    assert (clock.t, clock.attempts, load(ws, MODES, 0).turning) == (0.0, 0.0, SEATED)
+    assert clock.h_full == load(ws, PACE, 0).h_touching == RETRY * 0.014
+    assert np.array_equal(ws[others], before[others])
