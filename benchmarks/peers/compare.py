@@ -11,7 +11,6 @@ from functools import partial
 import numpy as np
 
 import boulder_kernels as bk
-from boulder_kernels.table import simulate_rows
 
 from ..designs import HORIZON, ROTATION_LIMIT
 from ..timing import timed
@@ -77,16 +76,12 @@ class Measured:
 
 
 def measure_kernels(problem: Problem, *, in_lanes: bool = True) -> Measured:
-    """Measure this project in lanes, or by its single impact, one design after the other; on the whole problem."""
+    """Measure this project in lanes, or one design after the other; on the whole problem."""
     name = "boulder-sweep, lanes" if in_lanes else "boulder-sweep, single impact, events located"
     measured = Measured(name, problem.size, in_steps=True)
-    designs = np.stack(problem.designs)
 
     def simulate(control: bk.Control) -> bk.OutcomeTable:
-        if in_lanes:
-            return bk.simulate_table(problem.designs, READINGS, control)
-        out = simulate_rows(designs, None, None, None, READINGS, control)
-        return bk.OutcomeTable(out[0].astype(np.int8), *out[1:])
+        return bk.simulate_table(problem.designs, READINGS, control._replace(side_by_side=in_lanes))
 
     simulate(bk.Control(0.01, HORIZON, ROTATION_LIMIT, 0, False))
     for step in KERNEL_STEPS_S:
