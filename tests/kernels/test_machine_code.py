@@ -13,6 +13,7 @@ import boulder_kernels as bk
 from boulder_kernels._jit import compiler
 from boulder_kernels.design import constants_of, design_in
 from boulder_kernels.heave import ROOM, Base, HeaveOptions, forces, heave_constants, prepare
+from boulder_kernels.impact import simulate_alone
 from boulder_kernels.lanes import (
     attempt_steps,
     compute_constants,
@@ -172,7 +173,7 @@ def test_wide_vectors_are_asked_for() -> None:
 
 def test_kernels_leave_the_interpreter_lock_free() -> None:
     """All kernels are compiled without the interpreter: they run side by side in threads."""
-    for kernel in (run_lanes, bk.simulate_design, attempt_steps, take_over_steps):
+    for kernel in (run_lanes, simulate_alone, attempt_steps, take_over_steps):
         assert kernel.options["nogil"]
 
 
