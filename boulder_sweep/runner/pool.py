@@ -202,8 +202,8 @@ def _local_cluster(distributed: Any, jobs: int) -> Any:
 
 
 def _end_worker(cluster: Any, worker: Any, timeout: float) -> None:
-    """End a worker of this process, without waiting for what it computes."""
-    cluster.sync(worker.close, timeout=timeout, executor_wait=False, callback_timeout=timeout)
+    """End a worker of this process; wait for what its threads have in hand, so that no unfinished file is left."""
+    cluster.sync(worker.close, timeout=timeout, callback_timeout=timeout)
 
 
 def _connected(distributed: Any, scheduler: str) -> Any:
