@@ -332,7 +332,7 @@ def follow(
     i
         The impact at the start of the step.
     y_end, k_end, error
-        State and acceleration at its end, and its error, as of `boulder_kernels.dormand_prince.step`.
+        State and acceleration at its end, and its error, from `boulder_kernels.dormand_prince.step`.
     c
         Constants of the design.
     readings, control

@@ -178,7 +178,7 @@ def simulate_last_resort(design: Design, readings: Readings, control: Control, r
     design
         The design, in uniform soil.
     readings, control, record
-        As of `simulate_alone`; the record keeps nothing.
+        The same as in `simulate_alone`; the record keeps nothing.
     """
     c = constants_of(design, readings, control.elements)
     if misses(design) or not is_computable(c):

@@ -192,13 +192,13 @@ def start_designs(ws: Any, designs: np.ndarray, first: int, readings: Readings, 
     ws
         The workspace, from the group on.
     designs, first
-        Designs as of `simulate_lanes`, and the row of that in the first lane.
+        The designs of `simulate_lanes`, and the row of the design in the first lane.
     readings, control
-        As of `simulate_lanes`.
+        How they are simulated.
 
     Notes
     -----
-    A lane is left with the status RUNNING, or with that of a design that needs no integration or allows none.
+    A lane is left with the status RUNNING, or with the status of a design that needs no integration or allows none.
     """
     compute_constants(ws, designs, first, readings, control)
     stand_still(ws, readings, control)
@@ -285,7 +285,7 @@ def run_lanes(
     Parameters
     ----------
     designs, readings, control, record, out
-        As of `simulate_lanes`, with designs for whole groups.
+        The same as in `simulate_lanes`, with designs for whole groups.
     ws, rows
         The workspace; the rows of the designs in the lanes, EMPTY before they are filled, and behind them 0.
     """
@@ -356,7 +356,7 @@ def simulate_lanes(
         Designs, SI, shape (15 + G, n): first the fields of `DesignTable`, then what is given of their soil, see
         `boulder_kernels.workspace.LaneSoil`.
     soil, parts
-        As of `empty_workspace`; the parts of `boulder_kernels.layered.COUNTS`.
+        The same as in `empty_workspace`; a number of parts in `boulder_kernels.layered.COUNTS`.
     readings
         Which formulas are read as printed.
     control

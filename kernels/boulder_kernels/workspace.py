@@ -164,7 +164,7 @@ def given_offset(soil: LaneSoil, count: int) -> int:
 
 
 for _soil in SOILS.values():
-    assert _soil.size(COUNTS[-1]) <= SIZE, "the soil of a lane reaches into that of the other group"
+    assert _soil.size(COUNTS[-1]) <= SIZE, "the soil of a lane reaches into the other group"
 
 
 def part(ws: Any, start: int) -> Any:
