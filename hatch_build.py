@@ -1,13 +1,11 @@
-"""What a build adds: the text for a package index, and the name of a wheel that carries compiled kernels."""
+"""What a build adds: the text for a package index."""
 
 from __future__ import annotations
 
-import platform
 import re
 from pathlib import Path
 from typing import Any
 
-from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from hatchling.metadata.plugin.interface import MetadataHookInterface
 
 LINK = re.compile(r"(!?)\[([^\]]*)\]\((?!https?:|#)([^)]+)\)")
@@ -28,13 +26,3 @@ class ReadmeHook(MetadataHookInterface):
 
         text = LINK.sub(absolute, Path(self.root, "README.md").read_text(encoding="utf-8"))
         metadata["readme"] = {"content-type": "text/markdown", "text": text}
-
-
-class KernelsBuildHook(BuildHookInterface[Any]):
-    """Names architecture and oldest C library of a wheel with compiled kernels (see boulder_sweep/release.py)."""
-
-    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Change what is built, before it is built."""
-        if any(Path(self.root, "kernels", "boulder_kernels", "compiled").glob("*/*.so")):
-            build_data["pure_python"] = False
-            build_data["tag"] = f"py3-none-manylinux_2_17_{platform.machine()}"

@@ -89,7 +89,7 @@ def announced(say_so: Callable[[str], None], resume: Callable[[], None]) -> Iter
     resume
         Called whenever one has been compiled.
     """
-    from boulder_kernels import _ahead
+    from boulder_kernels import _jit
 
     kernels: dict[str, float] = {}
 
@@ -105,11 +105,11 @@ def announced(say_so: Callable[[str], None], resume: Callable[[], None]) -> Iter
             kernels[kernel] = time.monotonic() - begun
             resume()
 
-    before, _ahead.announce = _ahead.announce, compiling
+    before, _jit.announce = _jit.announce, compiling
     try:
         yield
     finally:
-        _ahead.announce = before
+        _jit.announce = before
         for first in list(kernels)[:1]:
             _remember(first, sum(kernels.values()))
 

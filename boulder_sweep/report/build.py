@@ -33,6 +33,8 @@ PORTABLE = {
 """Numba settings under which the LLVM code does not depend on this machine's processor."""
 MATHEMATICS = {"sqrt", "tan", "atan2", "hypot", "pow", "sin", "cos"}
 """C library functions that the kernels call."""
+COUNTING = re.compile(r"^(define .*@NRT_(?:incref|decref)\(.*)$[\s\S]*?^\}$", re.MULTILINE)
+"""Functions that count references: arrays are only views of the page's memory, and nothing need be counted."""
 
 
 SOURCES = ("build.py", "entry_points.py", "page_records.py")
@@ -82,9 +84,9 @@ def intermediate_code() -> str:
         The code depends on this machine: Numba was imported before it could be configured, or a structure in memory
         holds addresses, whose length differs in WebAssembly.
     """
+    import llvmlite.binding as llvm
     import numba
 
-    from boulder_kernels._numba import module_of
     from boulder_sweep.report import entry_points
 
     if {name: os.environ.get(name) for name in PORTABLE} != PORTABLE:
@@ -98,7 +100,9 @@ def intermediate_code() -> str:
         code = compiled.library.get_llvm_str()
         code = re.sub(r"^target triple = .*$", f'target triple = "{TRIPLE}"', code, flags=re.MULTILINE)
         code = re.sub(r"^target datalayout = .*$", f'target datalayout = "{LAYOUT}"', code, flags=re.MULTILINE)
-        modules.append(module_of(code, compiled.fndesc.llvm_func_name, name))
+        module = llvm.parse_assembly(COUNTING.sub(r"\1\n ret void\n}", code))
+        module.get_function(compiled.fndesc.llvm_func_name).name = name
+        modules.append(module)
     whole, *others = modules
     for other in others:
         whole.link_in(other)
@@ -116,9 +120,18 @@ def _keep_only(module: Any, names: Collection[str]) -> None:
     """
     import llvmlite.binding as llvm
 
-    from boulder_kernels._numba import keep_only
-
-    strange = keep_only(module, names, llvm.Target.from_triple(TRIPLE).create_target_machine()) - MATHEMATICS
+    for function in module.functions:
+        if not function.is_declaration and function.name not in names:
+            function.linkage = "internal"
+    for variable in module.global_variables:
+        variable.linkage = "internal"
+    passes = llvm.create_new_module_pass_manager()
+    passes.add_global_dead_code_eliminate_pass()
+    passes.add_strip_dead_prototype_pass()
+    options = llvm.create_pipeline_tuning_options(speed_level=3)
+    passes.run(module, llvm.create_pass_builder(llvm.Target.from_triple(TRIPLE).create_target_machine(), options))
+    called = {function.name for function in module.functions if function.is_declaration}
+    strange = {name for name in called if not name.startswith("llvm.")} - MATHEMATICS
     structures = [line for line in str(module).splitlines() if re.search(r"alloca [\[{].*\bptr\b", line)]
     if strange or structures:
         raise RuntimeError(f"this code cannot be compiled for WebAssembly: it needs {sorted(strange)} and {structures}")

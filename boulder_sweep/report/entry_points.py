@@ -9,9 +9,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import carray
 
 from boulder_kernels import Control, Design, Outcome, Problem, Readings, Record
-from boulder_kernels._jit import array_kernel, inlined, when_compiling
+from boulder_kernels._jit import inlined, kernel
 from boulder_kernels.control import STEP_RATIO, control_for, control_in
 from boulder_kernels.design import design_in
 from boulder_kernels.error_estimates import safety_of, step_errors, take_second
@@ -63,18 +64,9 @@ from boulder_sweep.report.page_records import (
 
 EXPORTS = {"rows": "pippipipipppippppp", "history": "pppipipipppipppppp"}
 """The functions that the page calls, and their arguments: p for a pointer to doubles, i for a whole number."""
-carray: Any = None
-"""`numba.carray`, which is there when kernels are compiled: a report is written without Numba."""
 
 
-@when_compiling
-def _import_carray() -> None:
-    """Import what the kernels below make arrays with."""
-    global carray
-    from numba import carray
-
-
-@array_kernel
+@kernel
 def put_soils(
     designs: np.ndarray,
     ground_at: Any,
@@ -155,7 +147,7 @@ def simulate_recorded(
     return outcome
 
 
-@array_kernel
+@kernel
 def simulate_in_soil(
     layers: np.ndarray,
     outline: np.ndarray,
@@ -199,7 +191,7 @@ class Given(NamedTuple):
     soil_at: Any
 
 
-@array_kernel
+@kernel
 def solve(out: np.ndarray, row: int, given: Given, readings: Readings, control: Control) -> int:
     """Simulate one design, write its outcome with the error of its steps, and return which second one it needs."""
     design, soil_at = design_in(given.designs, row), given.soil_at
@@ -214,7 +206,7 @@ def solve(out: np.ndarray, row: int, given: Given, readings: Readings, control: 
     return second
 
 
-@array_kernel
+@kernel
 def solve_with_error(
     out: np.ndarray, other: np.ndarray, row: int, given: Given, readings: Readings, control: Control
 ) -> None:
@@ -229,7 +221,7 @@ def solve_with_error(
         second = take_second(out, row, other, row, second, design_in(given.designs, row), safety_of(readings))
 
 
-@array_kernel
+@kernel
 def decide(rows: Rows, room: np.ndarray, row: int, given: Given, settings: np.ndarray, limits: VerdictLimits) -> None:
     """Simulate one design until it is decided; `room` has room for two solutions, shape (2, len(OUTCOME), n)."""
     number, controls = 0, settings[:, READINGS_COUNT:]
@@ -240,7 +232,7 @@ def decide(rows: Rows, room: np.ndarray, row: int, given: Given, settings: np.nd
         number = int(rows.courses[WANTED, row])
 
 
-@array_kernel
+@kernel
 def rows(
     designs_at: Any,
     n: int,
@@ -316,7 +308,7 @@ def rows(
         rulings[0, -1, row] = flags_of(o, overlap, flag_inputs_in(flag_inputs, row), tested)
 
 
-@array_kernel
+@kernel
 def history(
     design_from: Any,
     ground_at: Any,

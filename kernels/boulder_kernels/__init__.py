@@ -5,8 +5,8 @@ equation numbers in this package are theirs. Everything here is plain numbers in
 subgrade reaction beta in MN/m^3 as in Eq 24), and nothing here knows of files, units or tables on disk.
 """
 
+from . import _lowering
 from ._cache import source_hash
-from ._jit import when_compiling
 from .control import Control
 from .design import Constants, Design, DesignTable, Readings, as_printed, constants_of, corrected
 from .impact import Problem
@@ -36,9 +36,3 @@ __all__ = [
     "simulate_table",
     "source_hash",
 ]
-
-
-@when_compiling
-def _lower() -> None:
-    """Tell Numba of loads and stores in the workspace, see there."""
-    from . import _lowering  # noqa: F401

@@ -9,6 +9,7 @@ import hashlib
 import importlib.util
 import os
 import platform
+import shutil
 import stat
 import tempfile
 import warnings
@@ -36,7 +37,7 @@ def source_hash() -> str:
 def _cache_folder() -> str | None:
     """Return a folder for these kernels on this processor that only this user can write, or None with a warning.
 
-    Libraries run as the user who loads them.
+    Compiled code runs as the user who loads it.
     """
     named = os.environ.get(CACHE_VARIABLE)
     user_caches = os.environ.get("XDG_CACHE_HOME")
@@ -100,6 +101,13 @@ def _make_private_folder(folder: Path) -> Path:
     return folder
 
 
+def empty(folder: Path) -> None:
+    """Remove what is in a folder of compiled kernels."""
+    for path in folder.iterdir():
+        shutil.rmtree(path, ignore_errors=True)
+        path.unlink(missing_ok=True)
+
+
 def target() -> str:
     """Return what the bits of results depend on beside the sources.
 
@@ -120,41 +128,6 @@ def processor() -> tuple[str, ...]:
     except OSError:
         return (platform.processor(),)
     return tuple(line for line in first.splitlines() if line.startswith(("model name", "flags", "Features", "CPU ")))
-
-
-_V3 = {"x86_64", "avx2", "fma", "bmi1", "bmi2", "f16c", "abm", "movbe"}
-LEVELS = {
-    "x86-64-v4": _V3 | {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"},
-    "x86-64-v3": _V3,
-    "aarch64": {"aarch64"},
-}
-"""Targets that a wheel may carry libraries for, the fastest first, and the architecture and features each needs."""
-SHIPPED = Path(__file__).with_name("compiled")
-"""Folder of such libraries: for each target a folder with the hash of the sources that they were compiled from."""
-SOURCES = "sources"
-"""Name of the file with that hash."""
-
-
-def levels() -> list[str]:
-    """Return the targets whose code this processor can run, the fastest first."""
-    features = {word for line in processor() if line.startswith(("flags", "Features")) for word in line.split()}
-    return [level for level, needed in LEVELS.items() if needed <= features | {platform.machine()}]
-
-
-@functools.cache
-def shipped_folder() -> Path | None:
-    """Return the folder of libraries that came with the package for this processor; None where there is none.
-
-    One that was compiled from other sources is left alone, and so are all where Numba is told to compile for another
-    processor.
-    """
-    if any(os.environ.get(name) for name in ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES")):
-        return None
-    for level in levels():
-        with contextlib.suppress(OSError):
-            if (SHIPPED / level / SOURCES).read_text() == source_hash():
-                return SHIPPED / level
-    return None
 
 
 @functools.cache

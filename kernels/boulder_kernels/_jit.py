@@ -1,8 +1,5 @@
 """The one decorator every kernel is compiled with, and the reasons for its flags.
 
-Numba is imported when the first kernel is called or compiled (`boulder_kernels._numba`), not before: where everything
-that is called has been compiled ahead, a process does without it.
-
 ``nogil``
     Blocks of designs run in threads of one process, which share the compiled code and the tables.
 ``error_model="numpy"``
@@ -12,35 +9,36 @@ that is called has been compiled ahead, a process does without it.
     Fused multiply-add, and the sign of zero does not matter. Nothing may assume that NaN or infinity never
     occur: a state that has become non-finite must be seen and reported. Nor may sums be reordered, so that a design
     gives the same bits wherever in a block, and with whatever vectors, it is computed (see `boulder_kernels.numerics`).
-``_nrt``
-    Off but for what makes arrays: kernels borrow those that they are given, and do not count references to them.
-    The counters are atomic, and cost a fifth of the time of short simulations.
 ``no_cfunc_wrapper``, ``no_cpython_wrapper``
-    Nothing calls a kernel by Numba's wrappers, which would have to be compiled, too: from Python, kernels are called by
-    libraries (`boulder_kernels._ahead`).
+    Most kernels are called by kernels only. A wrapper takes the tuples among the arguments apart, number by number: it
+    would be a third of the work of compiling them.
 
-Compiled code is kept in a folder named by a hash of all kernel sources, because what is kept of one function does not
-notice that a function it calls has changed in another file. Only a folder that nobody else can write is used.
+Numba keeps compiled code in a folder named by a hash of all kernel sources, because what it keeps of one function does
+not notice that a function it calls has changed in another file. What is kept is compiled by another process
+(`boulder_kernels.compiling`), so every process runs the code that it finds on the disk: code that was compiled in the
+same process may fuse other products and differ in the last bits.
 """
 
 from __future__ import annotations
 
 import contextlib
 import functools
-import os
-import sys
+import hashlib
+import inspect
 import threading
 from collections.abc import Callable
-from types import ModuleType
+from pathlib import Path
 from typing import Any
 
-from . import _ahead
-from ._ahead import UnsuitableError, function_of
+import llvmlite.binding
+import numba
+from numba.extending import lower_builtin, type_callable
+
+from . import _cache, compiling
 from ._cache import source_hash
 
 __all__ = [
     "Kernel",
-    "array_kernel",
     "exact_inlined",
     "exact_kernel",
     "function_of",
@@ -49,10 +47,34 @@ __all__ = [
     "kernel",
     "overload",
     "plain",
+    "rows_of",
     "source_hash",
     "unless_none",
-    "when_compiling",
 ]
+
+SETTINGS: Any = numba.config
+"""Numba's settings, which it fills in at run time."""
+IS_PLAIN = bool(SETTINGS.DISABLE_JIT)
+"""Whether kernels stay plain Python: NUMBA_DISABLE_JIT is set."""
+_LOCK = threading.RLock()
+announce: Callable[[str], contextlib.AbstractContextManager[Any]] = contextlib.nullcontext
+"""Called with the name of a kernel when it must be compiled, which is done within what it returns."""
+
+
+def _ask_for_wide_vectors() -> None:
+    """Let the compiler use 512-bit registers where the processor has them.
+
+    For many of these processors LLVM prefers half the width, because ordinary code lowers their clock for little
+    gain. The loops over lanes are dense in multiply-adds and gain a third. The choice is Numba's, for the whole
+    process, made at its first compilation; one that the user has made (NUMBA_CPU_FEATURES) stands.
+    """
+    if SETTINGS.CPU_FEATURES is None and SETTINGS.CPU_NAME is None and SETTINGS.ENABLE_AVX:
+        features = llvmlite.binding.get_host_cpu_features()
+        if features.get("avx512f", False):
+            SETTINGS.CPU_FEATURES = f"{features.flatten()},-prefer-256-bit"
+
+
+_ask_for_wide_vectors()
 
 
 class Kernel:
@@ -66,50 +88,77 @@ class Kernel:
         The function itself.
     options : dict
         What Numba is asked for.
-    natives : dict
-        What it was compiled to ahead, by the types of its arguments, see `boulder_kernels._ahead`.
     """
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         self.py_func, self.options = function, options
-        self._dispatcher: Any = None
-        self._for_python: Any = None
-        self._is_of_the_package = function.__module__.startswith(f"{__package__}.")
-        self.natives: dict[str, Any] = {}
+        self._ready: dict[tuple[Any, ...], Any] = {}
+        self._kept: Any = None
+        self._fresh: Any = None
         functools.update_wrapper(self, function)
 
-    @property
-    def compiler(self) -> Any:
-        """The module `boulder_kernels._numba`."""
-        return compiler()
-
-    @property
+    @functools.cached_property
     def dispatcher(self) -> Any:
         """What compiles the function for other kernels."""
-        with _MAKING:
-            if self._dispatcher is None:
-                self._dispatcher = self.compiler.dispatcher_of(self.py_func, self.options)
-        return self._dispatcher
-
-    @property
-    def is_compiled(self) -> bool:
-        """Whether there is anything that other kernels were compiled with."""
-        return self._dispatcher is not None
-
-    @property
-    def for_python(self) -> Any:
-        """Numba's dispatcher of the function for calls from Python, for which it is compiled in every process."""
-        with _MAKING:
-            if self._for_python is None:
-                self._for_python = self.compiler.dispatcher_for_python(self.py_func, self.options)
-        return self._for_python
+        options: Any = {**self.options, "no_cpython_wrapper": True}
+        return numba.njit(**options)(self.py_func)
 
     def __call__(self, *args: Any, **named: Any) -> Any:
-        """Call the compiled function: its library, or by Numba where it has none."""
-        if self._is_of_the_package and not named:
-            with contextlib.suppress(UnsuitableError):
-                return _ahead.call(self, args)
-        return self.for_python(*args, **named)
+        """Call the compiled function."""
+        if named:
+            args = inspect.signature(self.py_func).bind(*args, **named).args
+        kinds = tuple(map(numba.typeof, args))
+        return (self._ready.get(kinds) or self._made_ready(kinds))(*args)
+
+    def _made_ready(self, kinds: tuple[Any, ...]) -> Any:
+        """Return what runs the code for arguments of some types: kept on the disk, or compiled for this process."""
+        with _LOCK:
+            folder = _cache.CACHE_FOLDER
+            if kinds not in self._ready and folder and self.__module__.startswith(f"{__package__}."):
+                with contextlib.suppress(Exception):  # what is kept may be damaged in any way, and the disk full
+                    self._ready[kinds] = self._loaded(kinds, Path(folder))
+            if kinds not in self._ready:
+                with announce(self.__qualname__):
+                    self._fresh = self._fresh or numba.njit(**self.options)(self.py_func)
+                    self._fresh.compile(kinds)
+                self._ready[kinds] = self._fresh
+            return self._ready[kinds]
+
+    def _loaded(self, kinds: tuple[Any, ...], folder: Path) -> Any:
+        """Load what is kept for arguments of some types, and have it compiled first if there is nothing.
+
+        Raises
+        ------
+        OSError
+            It cannot be compiled by another process, or not be kept.
+        Exception
+            It is damaged.
+        """
+        if not self.mark(kinds, folder).exists():
+            with announce(self.__qualname__):
+                compiling.compile_elsewhere(self, kinds, folder)
+        try:
+            return self.keep(kinds, folder)
+        except Exception:
+            _cache.empty(folder)  # the next process makes it anew
+            raise
+
+    def mark(self, kinds: tuple[Any, ...], folder: Path) -> Path:
+        """Return the path of a file that is there once the code for arguments of some types is kept in a folder."""
+        source = Path(inspect.getfile(self.py_func))
+        digest = hashlib.sha256(f"{source} {source.stat().st_mtime_ns} {kinds}".encode()).hexdigest()
+        return folder / f"{source.stem}-{self.__qualname__}-{digest[:16]}"
+
+    def keep(self, kinds: tuple[Any, ...], folder: Path) -> Any:
+        """Load the code for arguments of some types from a folder, or compile it and keep it there."""
+        if self._kept is None:
+            before, SETTINGS.CACHE_DIR = SETTINGS.CACHE_DIR, str(folder)
+            try:
+                self._kept = numba.njit(cache=True, **self.options)(self.py_func)
+            finally:
+                SETTINGS.CACHE_DIR = before
+        self._kept.compile(kinds)
+        return self._kept
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__") or name in vars(type(self)):  # the latter: a property that has failed itself
@@ -121,43 +170,15 @@ class Kernel:
         return self.py_func.__qualname__
 
 
-_MAKING = threading.RLock()
-_REGISTRATIONS: list[Callable[[], None]] = []
-"""What Numba must be told of before it compiles the first kernel."""
-
-
-def when_compiling(register: Callable[[], None]) -> Callable[[], None]:
-    """Call a function before the first kernel is compiled; it tells Numba of what is called and is no kernel."""
-    _REGISTRATIONS.append(register)
-    return register
-
-
-def compiler() -> ModuleType:
-    """Return the module that compiles, and tell Numba first of what is called and is no kernel."""
-    from . import _numba
-
-    with _MAKING:
-        while _REGISTRATIONS:
-            _REGISTRATIONS.pop(0)()
-    return _numba
+def function_of(source: str, **names: Any) -> Callable[..., Any]:
+    """Return the function that a source text defines, with the names it refers to: for what `overload` writes out."""
+    exec(source, names)
+    return names[source[len("def ") : source.index("(")]]
 
 
 def overload(function: Callable[..., Any]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Decorate what returns the implementation of a function inside kernels, for arguments of some Numba types."""
-
-    def registered(choose: Callable[..., Any]) -> Callable[..., Any]:
-        """Register it when Numba is there."""
-
-        def register() -> None:
-            """Register it."""
-            from numba import extending
-
-            extending.overload(function, inline="always", strict=False)(choose)
-
-        when_compiling(register)
-        return choose
-
-    return registered
+    return numba.extending.overload(function, inline="always", strict=False)
 
 
 def in_columns(record: Any) -> Callable[[Any, int], Any]:
@@ -167,32 +188,46 @@ def in_columns(record: Any) -> Callable[[Any, int], Any]:
         """Return the record, numbers in place of columns."""
         return record(*array[: len(record._fields), row])
 
-    def lower() -> None:
-        """Tell Numba of it."""
-        from ._numba import lower_take
-
-        lower_take(take, record)
-
-    when_compiling(lower)
+    lower_take(take, record)
     return take
 
 
-def is_plain() -> bool:
-    """Whether kernels stay plain Python: NUMBA_DISABLE_JIT is set, or Numba, already imported, is configured so."""
-    known: Any = sys.modules.get("numba")
-    if known is not None:
-        return bool(known.config.DISABLE_JIT)
-    return os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+def rows_of(context: Any, builder: Any, kinds: Any, values: Any, first: int, count: int) -> list[Any]:
+    """Load the numbers of a column of an array from some of its rows."""
+    array = context.make_array(kinds[0])(context, builder, values[0])
+    columns = builder.extract_value(array.shape, 1)
+    index, numbers = context.cast(builder, values[1], kinds[1], numba.types.intp), []
+    if first:
+        index = builder.add(index, builder.mul(columns, context.get_constant(numba.types.intp, first)))
+    for _ in range(count):
+        numbers.append(builder.load(builder.gep(array.data, [index], inbounds=True)))
+        index = builder.add(index, columns)
+    return numbers
 
 
-def _compiled(
-    function: Callable[..., Any], fastmath: set[str], *, inline: bool = False, arrays: bool = False
-) -> Callable[..., Any]:
+def lower_take(take: Any, record: Any) -> None:
+    """Tell Numba of a function of `boulder_kernels._jit.in_columns`.
+
+    It is one load for every field: an index that need not be checked lets a loop over rows be vectorised.
+    """
+
+    def result(array: Any, row: Any) -> Any:
+        """Return the type of the result, or None where a column is not one piece of memory."""
+        return numba.types.NamedUniTuple(array.dtype, len(record._fields), record) if array.layout == "C" else None
+
+    def loads(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        """Load its numbers."""
+        numbers = rows_of(context, builder, sig.args, args, 0, len(record._fields))
+        return context.make_tuple(builder, sig.return_type, numbers)
+
+    type_callable(take)(lambda context: result)
+    lower_builtin(take, numba.types.Array, numba.types.Any)(loads)
+
+
+def _compiled(function: Callable[..., Any], fastmath: set[str], *, inline: bool = False) -> Callable[..., Any]:
     """Decorate one function."""
     options: dict[str, Any] = {"nogil": True, "no_cfunc_wrapper": True, "error_model": "numpy"}
-    options |= {"fastmath": fastmath, "forceinline": inline}
-    options |= {} if arrays else {"_nrt": False}
-    return function if is_plain() else Kernel(function, options)
+    return function if IS_PLAIN else Kernel(function, options | {"fastmath": fastmath, "forceinline": inline})
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -201,7 +236,7 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     Parameters
     ----------
     function
-        Plain Python on scalars, NamedTuples and NumPy arrays; it makes no array.
+        Plain Python on scalars, NamedTuples and NumPy arrays.
 
     Returns
     -------
@@ -209,11 +244,6 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
         A `Kernel`; ``.py_func`` is the function itself.
     """
     return _compiled(function, {"contract", "nsz"})
-
-
-def array_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile as `kernel` does what makes arrays or views of memory."""
-    return _compiled(function, {"contract", "nsz"}, arrays=True)
 
 
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -271,9 +301,7 @@ def unless_none(names: str, function: Callable[..., Any], otherwise: str, **know
 
     def choose(*given: Any) -> Callable[..., Any]:
         """Return the one for arguments of these Numba types."""
-        from numba import types
-
-        return when_none if isinstance(given[-1], types.NoneType) else unless
+        return when_none if isinstance(given[-1], numba.types.NoneType) else unless
 
     overload(call)(choose)
     return call

@@ -16,7 +16,7 @@ from numba.core import cgutils
 from numba.extending import lower_builtin, type_callable
 from numba.np import arrayobj
 
-from ._numba import rows_of
+from ._jit import rows_of
 from .design import Constants, Design
 from .layered import LayeredConstants
 from .numerics import WIDTH, field, partial_sums, put

@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import array_kernel, exact_inlined, exact_kernel
+from ._jit import exact_inlined, exact_kernel, kernel
 from .design import DesignTable, G
 from .layered import PRESSURE, PRESSURE_SLOPE, TO
 from .outlined import FAR, HEIGHT, NEAR, WIDTH, at_height
@@ -176,7 +176,7 @@ def put_slices(table: DesignTable, row: int, slices: int, profile: np.ndarray, l
             cut += 1
 
 
-@array_kernel
+@kernel
 def put_soil(
     table: DesignTable,
     ground: Ground,

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import array_kernel, exact_inlined, exact_kernel, function_of, overload
+from ._jit import exact_inlined, exact_kernel, function_of, kernel, overload
 from .design import Body, Constants, Design, G, SoilMass, body_of_box, constants_with, design_in, wedge_slope
 from .layered import (
     DENSITY,
@@ -333,7 +333,7 @@ def fill_outlined_pieces(design: Design, layers: np.ndarray, soil: OutlinedPiece
     return so_far
 
 
-@array_kernel
+@kernel
 def write_given(designs: np.ndarray, layers: np.ndarray, outlines: np.ndarray, out: np.ndarray) -> None:
     """Write what lanes are given of designs beside outlines: the body, and the pieces one after another.
 

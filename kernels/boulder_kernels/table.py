@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import array_kernel, kernel, plain, unless_none
+from ._jit import kernel, plain, unless_none
 from .control import STEP_RATIO, Control, control_for
 from .design import Design, DesignTable, Readings, design_at, design_in
 from .error_estimates import safety_of, step_errors, take_seconds
@@ -42,13 +42,13 @@ from .time_history import Record, no_record
 from .workspace import LayeredLanes, OutlinedLanes, TaperedLanes
 
 
-@array_kernel
+@kernel
 def take_profile(row: int, soil: Any, layers: np.ndarray) -> SoilProfile:
     """Return the soil of one design of a table in layers, shape (n, M, 6)."""
     return SoilProfile(layers[row], soil)
 
 
-@array_kernel
+@kernel
 def take_outline(row: int, soil: Any, outlines: np.ndarray) -> Any:
     """Return the soil to fill for one design of a table of boulders with outlines, shape (n, P, 4)."""
     return with_outline(soil, outlines[row])
@@ -60,7 +60,7 @@ profile_in = unless_none("row soil layers", take_profile, "None")
 """The soil of one design of a table; None for the uniform soil of the design."""
 
 
-@array_kernel
+@kernel
 def run_rows(
     designs: np.ndarray,
     layers: np.ndarray | None,

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 
-from ._jit import function_of, is_plain, overload
+from ._jit import IS_PLAIN, function_of, overload
 from .design import Body, Constants, Design, Readings, constants_of
 from .dynamics import Acceleration, Modes, State, Switches
 from .following import Clock, Pace
@@ -27,7 +27,7 @@ from .numerics import field, put
 from .outcomes import Compression, Maxima
 from .outlined import FewPieces, GivenPiece, Lean, Piece, TaperedPiece, TaperedSoil, constants_beside
 
-LANES = 1 if is_plain() else 8
+LANES = 1 if IS_PLAIN else 8
 """Designs that are integrated side by side: one vector of eight doubles. More of them hide no more latency and take
 more of the fastest memory (measured: 2 to 5 % slower with 16 or 32). Without the compiler there is nothing to gain."""
 KNOWN: dict[str, object] = {"elements": 0, "c_x": 0.0, "c_y": 0.0, "d_N": 0.0}

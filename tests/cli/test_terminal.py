@@ -55,7 +55,7 @@ def test_a_terminal_gets_a_bar_with_the_time_left(possible_grid):
 COLD_START = """
 import sys
 from pathlib import Path
-from boulder_kernels import _ahead
+from boulder_kernels import _jit
 from boulder_sweep.cli import main, output
 from boulder_sweep.judge.evaluation import Evaluation
 from tests.waiting import wait_until
@@ -63,7 +63,7 @@ enough = Path(sys.argv[1])
 output._took_s = lambda kernel: 2.0
 output._remember = lambda *_: None
 def warm_up(evaluation):
-    with _ahead.announce("lanes-run_lanes-0"):
+    with _jit.announce("lanes-run_lanes-0"):
         wait_until(enough.exists, "the bar has moved")
 Evaluation.warm_up = warm_up
 main.main(sys.argv[2:])

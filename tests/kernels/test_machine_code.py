@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import boulder_kernels as bk
-from boulder_kernels._jit import compiler
 from boulder_kernels.design import constants_of, design_in
 from boulder_kernels.heave import ROOM, Base, HeaveOptions, forces, heave_constants, prepare
 from boulder_kernels.impact import simulate_alone
@@ -56,9 +55,7 @@ def assembly(kernel, *arguments: object) -> str:
 
     Code that comes out of the cache has no listing, so it is compiled afresh.
     """
-    compiler()  # tells Numba of what is called and is no kernel
-    options = {name: value for name, value in kernel.options.items() if name not in ("nopython", "cache")}
-    fresh = numba.njit(**options)(kernel.py_func)
+    fresh = numba.njit(**kernel.options)(kernel.py_func)
     fresh(*arguments)
     return "\n".join(fresh.inspect_asm().values())
 

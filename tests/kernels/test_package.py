@@ -10,18 +10,18 @@ from pathlib import Path
 import pytest
 
 import boulder_kernels
-from boulder_kernels import _ahead, _cache, _jit
+from boulder_kernels import _cache, _jit
 
 SOURCES = sorted(Path(boulder_kernels.__file__).parent.glob("*.py"))
 ALLOWED = {"numpy", "numba", "llvmlite"}  # llvmlite is a part of Numba
 RUN = """
-import sys
 import numpy as np
 import boulder_kernels as bk
 boulder, soil, truck = (1.65, 1.68, 3.44, 2596.0), (1859.9, 0.754, 95.0, 1.0), (6722.0, 14.5, 3103.3e3, 138.91e3)
 table = bk.DesignTable(*(np.array([x]) for x in (*boulder, 2.03, 0.938, *soil, *truck, 0.5)))
-found = bk.simulate_table(table, bk.corrected(), bk.Control(8e-3, 0.5, 0.35, 0, False))
-print(found.theta_max[0].hex(), "numba" in sys.modules)
+for elements in (0, 50):
+    found = bk.simulate_table(table, bk.corrected(), bk.Control(8e-3, 0.5, 0.35, elements, False))
+    print(*(float(column[0]).hex() for column in found))
 """
 
 
@@ -43,11 +43,11 @@ def test_imports_are_few(source: Path) -> None:
 
 
 def test_nothing_else_is_loaded() -> None:
-    """Nor by way of others: importing the kernels loads no package of a table, a plot or a settings file, nor Numba."""
+    """Nor by way of others: importing the kernels loads no package of a table, a plot or a settings file."""
     script = "import sys, boulder_kernels; print(*{name.partition('.')[0] for name in sys.modules})"
     loaded = run(script, {}).split()
     foreign = {"pandas", "pyarrow", "matplotlib", "joblib", "pint", "pydantic", "click", "boulder_sweep"}
-    assert not (foreign | {"numba", "llvmlite", "scipy"}) & set(loaded)
+    assert not foreign & set(loaded)
 
 
 def run(script: str, environment: dict[str, str]) -> str:
@@ -65,25 +65,16 @@ def run(script: str, environment: dict[str, str]) -> str:
 
 
 @pytest.mark.compiled
-@pytest.mark.nightly
 def test_a_second_process_compiles_nothing(tmp_path: Path) -> None:
-    """It finds all machine code on the disk: no new file, none written again, no Numba; and the same bits come out."""
+    """It finds all machine code on the disk, as the first one did: no new file, none written again, the same bits."""
     environment = {_cache.CACHE_VARIABLE: str(tmp_path)}
-    theta, has_numba = run(RUN, environment).split()
-    assert has_numba == "True"
+    bits = run(RUN, environment)
     files = {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*") if file.is_file()}
-    assert sum(file.suffix in (_ahead.LIBRARY, _ahead.OBJECT) for file in files) == 1
+    assert files
     folder = f"kernels-{_cache.source_hash()[:16]}"
     assert {file.relative_to(tmp_path).parts[0] for file in files} == {folder}
-    assert run(RUN, environment).split() == [theta, "False"]
+    assert run(RUN, environment) == bits
     assert {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*") if file.is_file()} == files
-
-
-@pytest.mark.compiled
-def test_a_warm_start_is_without_numba() -> None:
-    """The same of the folder that these tests run with, which they have warmed."""
-    run(RUN, {})
-    assert run(RUN, {}).split()[1:] == ["False"]
 
 
 def test_the_hash_tells_sources_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -182,7 +173,7 @@ MORE = """
 import numpy as np
 from called import _jit, half
 
-@_jit.array_kernel
+@_jit.kernel
 def halves(x):
     y = np.empty_like(x)
     for i in range(x.size):
@@ -212,14 +203,3 @@ def test_a_kernel_is_called_from_python_and_by_kernels(tmp_path: Path) -> None:
     for _ in range(2):
         printed = run(script, {_cache.CACHE_VARIABLE: str(tmp_path / "cache")})
         assert printed.split() == ["0.25", "0.5", "1.5", "0.25"]
-
-
-@pytest.mark.compiled
-def test_what_kernels_call_is_no_machine_code_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_cache, "CACHE_FOLDER", None)
-    third = _jit.kernel(lambda x: x / 3.0)
-    ninth = _jit.kernel(lambda x: third(third(x)))
-    assert ninth(27.0) == 3.0
-    (inside,) = third.overloads.values()
-    assert inside.library.get_pointer_to_function(inside.fndesc.llvm_func_name) == 0
-    assert third(27.0) == 9.0

@@ -1,0 +1,142 @@
+"""Compiled code on the disk: made by a process of its own, loaded by every other, made anew where it is damaged."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+from boulder_kernels import _cache, _jit, compiling
+from boulder_kernels.numerics import sine_versine
+
+pytestmark = pytest.mark.compiled
+
+
+def forget(kernel: _jit.Kernel, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a kernel be as in a process that has not called it yet."""
+    for name, value in {"_ready": {}, "_kept": None, "_fresh": None}.items():
+        monkeypatch.setattr(kernel, name, value)
+
+
+@pytest.fixture
+def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A kernel of the package that was not called before, and an empty folder for what it is compiled to."""
+    tmp_path.chmod(0o700)
+    monkeypatch.setattr(_cache, "CACHE_FOLDER", str(tmp_path))
+    forget(sine_versine, monkeypatch)
+    return tmp_path
+
+
+@pytest.fixture
+def compiled(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The names of the kernels that were compiled."""
+    names: list[str] = []
+    monkeypatch.setattr(_jit, "announce", lambda name: contextlib.nullcontext(names.append(name)))
+    return names
+
+
+def marks(folder: Path) -> list[Path]:
+    return [path for path in folder.iterdir() if path.is_file() and path.suffix != ".lock"]
+
+
+def test_the_process_that_calls_compiles_nothing(fresh: Path, compiled: list[str]) -> None:
+    """It loads what another one has compiled, once for arguments of each type."""
+    expected = tuple(np.float64(x) for x in sine_versine.py_func(0.3))
+    for argument in (0.3, 0.3, np.float64(0.3)):
+        assert sine_versine(argument) == pytest.approx(expected, rel=1e-15)
+    assert compiled == ["sine_versine"]
+    assert sum(sine_versine._kept.stats.cache_hits.values()) == 1
+    assert not sine_versine._kept.stats.cache_misses
+    assert len(marks(fresh)) == 1
+    assert sine_versine(1)[0] == pytest.approx(np.sin(1.0))
+    assert len(marks(fresh)) == 2
+
+
+def test_numbas_own_folder_is_left_as_it_was(fresh: Path) -> None:
+    before = numba.config.CACHE_DIR
+    sine_versine(0.3)
+    assert before == numba.config.CACHE_DIR
+
+
+def damage_index(folder: Path) -> None:
+    """Write something else in place of the list of what is kept."""
+    for path in folder.rglob("*.nbi"):
+        path.write_bytes(b"no list")
+
+
+def damage_code(folder: Path) -> None:
+    """Cut the code short."""
+    for path in folder.rglob("*.nbc"):
+        path.write_bytes(path.read_bytes()[:100])
+
+
+@pytest.mark.parametrize("damage", [damage_index, damage_code])
+def test_what_is_damaged_is_made_anew(
+    fresh: Path, compiled: list[str], monkeypatch: pytest.MonkeyPatch, damage: Callable[[Path], None]
+) -> None:
+    """At once for this process, and on the disk with the next."""
+    expected = sine_versine(0.3)
+    damage(fresh)
+    for times in (2, 3, 3):
+        forget(sine_versine, monkeypatch)
+        assert sine_versine(0.3) == expected
+        assert len(compiled) == times
+    assert not sine_versine._kept.stats.cache_misses
+
+
+def test_where_nothing_can_be_kept_the_kernel_is_compiled_once_for_this_process(
+    fresh: Path, compiled: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on a full disk, or where no process can be started."""
+
+    def fail(*_: object) -> None:
+        raise OSError
+
+    expected = sine_versine(0.3)
+    monkeypatch.setattr(_cache, "CACHE_FOLDER", str(fresh / "other"))
+    monkeypatch.setattr(compiling, "compile_elsewhere", fail)
+    forget(sine_versine, monkeypatch)
+    compiled.clear()
+    assert sine_versine(0.3) == sine_versine(0.3) == expected
+    assert compiled == ["sine_versine"] * 2  # tried elsewhere, and done here
+    monkeypatch.setattr(_cache, "CACHE_FOLDER", None)
+    forget(sine_versine, monkeypatch)
+    assert sine_versine(0.3) == expected
+
+
+def test_a_process_that_has_ended_is_started_again(fresh: Path) -> None:
+    """It ends when nothing was asked for a while, perhaps just when something is."""
+    sine_versine(0.3)
+    assert compiling._process is not None
+    compiling._process.kill()
+    assert sine_versine(2)[0] == pytest.approx(np.sin(2.0))
+    assert len(marks(fresh)) == 2
+
+
+def test_wrong_arguments_are_told_by_numba(fresh: Path) -> None:
+    with pytest.raises(numba.TypingError):
+        sine_versine("0.3")
+    assert sine_versine(theta=0.3) == sine_versine(0.3)
+
+
+def test_code_is_kept_by_processor_and_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A home folder that machines share holds code for each of them."""
+    before = _cache.machine_hash.__wrapped__()
+    assert _cache.machine_hash.__wrapped__() == before
+    monkeypatch.setenv("NUMBA_CPU_NAME", "generic")
+    named = _cache.machine_hash.__wrapped__()
+    monkeypatch.delenv("NUMBA_CPU_NAME")
+    monkeypatch.setattr(_cache, "processor", lambda: ("model name : another",))
+    assert len({before, named, _cache.machine_hash.__wrapped__()}) == 3
+
+
+@pytest.mark.parametrize(("features", "ending"), [("sse2 fma avx2", "+fma"), ("sse2", "")])
+def test_a_table_says_whether_products_are_fused(monkeypatch: pytest.MonkeyPatch, features: str, ending: str) -> None:
+    for name in ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(_cache, "processor", lambda: ("model name : any", f"flags : {features}"))
+    assert _cache.target() == f"{_cache.platform.machine()}{ending}"
