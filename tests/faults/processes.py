@@ -13,7 +13,7 @@ from typing import Any
 from tests.waiting import HANG_GUARD_S, wait_until
 
 ROOT = Path(__file__).parents[2]
-_MARK = "TEST_MARK"
+MARK = "TEST_MARK"
 
 
 class Driver:
@@ -24,7 +24,7 @@ class Driver:
         self.process = subprocess.Popen(
             [sys.executable, "-m", "tests.faults.driver", str(out), *options],
             cwd=ROOT,
-            env={**os.environ, **environment, _MARK: self.mark},
+            env={**os.environ, **environment, MARK: self.mark},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -52,7 +52,7 @@ class Driver:
 
     def leaves_nothing_behind(self) -> None:
         """Wait until no process with the mark is alive."""
-        wait_until(lambda: not _marked(self.mark), "no process of the run is left")
+        wait_until(lambda: not marked(self.mark), "no process of the run is left")
 
 
 def run_driver(out: Path, *options: str, **environment: str) -> tuple[int, dict[str, Any], str]:
@@ -66,7 +66,7 @@ def signalled(process: subprocess.Popen[str], number: int) -> bool:
     return process.poll() is not None
 
 
-def _marked(mark: str) -> list[str]:
+def marked(mark: str) -> list[str]:
     """Command lines of all processes whose environment holds the mark."""
     found = []
     for process in Path("/proc").iterdir():

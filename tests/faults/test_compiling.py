@@ -7,20 +7,19 @@ import random
 import signal
 import subprocess
 import sys
-from pathlib import Path
+import time
+import uuid
 from typing import NamedTuple
 
 import pytest
 
-from tests.faults.processes import ROOT, signalled
+from tests.faults.processes import MARK, ROOT, marked, signalled
 from tests.waiting import HANG_GUARD_S, wait_until
 
 pytestmark = [pytest.mark.faults, pytest.mark.compiled]
 
-LAST = 40
-"""The signal arrives when so many functions are compiled at the most, of more than a hundred."""
-MORE = 25
-"""No more functions are compiled after it, of those that are still missing."""
+LONGEST_S = 6.0
+"""Before a signal [s]; compiling takes longer."""
 GRID = """\
 name: small grid
 boulder: {length: 1.65 m, width: 1.68 m, height: [1.6, 2.6, 3.4] m, density: 2596 kg/m^3}
@@ -30,67 +29,53 @@ vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*
 """
 
 
-COMMAND = """
-import os, sys
-from numba.core import event
-
-compiled = os.open(sys.argv[1], os.O_WRONLY | os.O_CREAT | os.O_APPEND)
-
-class Told(event.Listener):
-    def on_start(self, started):
-        pass
-
-    def on_end(self, ended):
-        os.write(compiled, b".")
-
-event.register("numba:compile", Told())
-from boulder_sweep.cli.main import main
-main(sys.argv[2:])
-"""
-"""A command of sweep that writes a dot into a file for every function that it has compiled."""
-
-
 class Compiling(NamedTuple):
-    """A command that compiles, and the file with a dot for every function."""
+    """A command whose kernels are compiled, and the mark of its processes."""
 
     process: subprocess.Popen[str]
-    compiled: Path
+    mark: str
 
-    def count(self) -> int:
-        """How many functions are compiled."""
-        return self.compiled.stat().st_size if self.compiled.exists() else 0
+    def compiles(self) -> bool:
+        """Whether a process of its own compiles."""
+        return any("boulder_kernels.compiling" in command for command in marked(self.mark))
 
-    def stop(self, number: int, again: bool = False) -> tuple[int, str, int]:
-        """Send a signal; exit code, what was told on stderr, and how many functions were compiled afterwards."""
-        before = self.count()
+    def stop(self, number: int, again: bool = False) -> tuple[int, str]:
+        """Send a signal; exit code, and what was told on stderr. No process is left."""
         self.process.send_signal(number)
         if again:
             wait_until(lambda: signalled(self.process, number), "the process has ended")
         _, told = self.process.communicate(timeout=HANG_GUARD_S)  # hang guard
-        return self.process.returncode, told, self.count() - before
+        wait_until(lambda: not marked(self.mark), "nothing is compiled any more")
+        return self.process.returncode, told
 
 
 @pytest.fixture
 def start(tmp_path):
-    """Start a command with no compiled kernels on the disk, and wait until it has compiled some functions."""
+    """Start a command with no compiled kernels on the disk, and wait until it has them compiled for a while [s]."""
     (tmp_path / "grid.yaml").write_text(GRID)
     started = []
 
-    def begin(*words, functions=1):
-        cache, compiled = tmp_path / f"cache-{len(started)}", tmp_path / f"compiled-{len(started)}"
+    def begin(*words, after=0.0):
+        mark = uuid.uuid4().hex
         process = subprocess.Popen(
-            [sys.executable, "-c", COMMAND, str(compiled), *words],
+            [sys.executable, "-m", "boulder_sweep", *words],
             cwd=tmp_path,
-            env={**os.environ, "PYTHONPATH": f"{ROOT}:{ROOT / 'kernels'}", "BOULDER_SWEEP_CACHE_DIR": str(cache)},
+            env={
+                **os.environ,
+                "PYTHONPATH": f"{ROOT}:{ROOT / 'kernels'}",
+                "BOULDER_SWEEP_CACHE_DIR": str(tmp_path / f"cache-{len(started)}"),
+                MARK: mark,
+            },
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
         )
         started.append(process)
-        compiling = Compiling(process, compiled)
-        wait_until(lambda: compiling.count() >= functions or process.poll() is not None, "functions are compiled")
+        command = Compiling(process, mark)
+        wait_until(lambda: command.compiles() or process.poll() is not None, "kernels are compiled")
+        time.sleep(after)
         assert process.poll() is None, process.communicate()
-        return compiling
+        return command
 
     yield begin
     for process in started:
@@ -103,11 +88,10 @@ def test_the_first_signal_stops_a_run_soon_and_without_a_traceback(start, tmp_pa
     seed = int(os.environ.get("TEST_SEED", "20260"))
     chance = random.Random(seed)
     for attempt in range(tries):
-        command = start("run", "grid.yaml", "-o", f"out-{attempt}", functions=chance.randint(1, LAST))
+        command = start("run", "grid.yaml", "-o", f"out-{attempt}", after=chance.uniform(0.0, LONGEST_S))
         number = chance.choice([signal.SIGINT, signal.SIGTERM])
-        code, told, more = command.stop(number)
+        code, told = command.stop(number)
         assert code == 128 + number, f"TEST_SEED={seed}: {told}"
-        assert more < MORE, f"TEST_SEED={seed}"
         assert told.splitlines()[-1].startswith(f"interrupted by {signal.Signals(number).name}; 0 of 6 rows are safe.")
         assert "Traceback" not in told
         assert "ignored" not in told
@@ -115,13 +99,15 @@ def test_the_first_signal_stops_a_run_soon_and_without_a_traceback(start, tmp_pa
 
 
 def test_a_command_that_is_no_run_stops_as_soon(start):
-    code, told, more = start("simulate", "grid.yaml").stop(signal.SIGINT)
+    code, told = start("simulate", "grid.yaml").stop(signal.SIGINT)
     assert (code, told.splitlines()[-1]) == (130, "interrupted by SIGINT")
-    assert more < MORE
 
 
 def test_the_second_signal_ends_it_at_once(start):
-    code, told, more = start("run", "grid.yaml").stop(signal.SIGINT, again=True)
+    code, told = start("run", "grid.yaml").stop(signal.SIGINT, again=True)
     assert code == 130
-    assert more < MORE
     assert "Traceback" not in told
+
+
+def test_what_compiles_ends_with_a_process_that_is_killed(start):
+    assert start("simulate", "grid.yaml").stop(signal.SIGKILL)[0] == -signal.SIGKILL
