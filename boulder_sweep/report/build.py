@@ -33,8 +33,8 @@ PORTABLE = {
 """Numba settings under which the LLVM code does not depend on this machine's processor."""
 MATHEMATICS = {"sqrt", "tan", "atan2", "hypot", "pow", "sin", "cos"}
 """C library functions that the kernels call."""
-COUNTING = re.compile(r"^(define .*@NRT_(?:incref|decref)\(.*)$[\s\S]*?^\}$", re.MULTILINE)
-"""Functions that count references: arrays are only views of the page's memory, and nothing need be counted."""
+COUNTING = re.compile(r"^ .*\bcall void @NRT_(?:incref|decref)\(.*$", re.MULTILINE)
+"""Calls that count references: arrays are only views of the page's memory, and nothing need be counted."""
 
 
 SOURCES = ("build.py", "entry_points.py", "page_records.py")
@@ -100,7 +100,7 @@ def intermediate_code() -> str:
         code = compiled.library.get_llvm_str()
         code = re.sub(r"^target triple = .*$", f'target triple = "{TRIPLE}"', code, flags=re.MULTILINE)
         code = re.sub(r"^target datalayout = .*$", f'target datalayout = "{LAYOUT}"', code, flags=re.MULTILINE)
-        module = llvm.parse_assembly(COUNTING.sub(r"\1\n ret void\n}", code))
+        module = llvm.parse_assembly(COUNTING.sub("", code))
         module.get_function(compiled.fndesc.llvm_func_name).name = name
         modules.append(module)
     whole, *others = modules
