@@ -105,7 +105,8 @@ def _is_compiled(module: str, name: str, kinds: tuple[Any, ...], folder: Path) -
         kernel = getattr(importlib.import_module(module), name)
         mark = kernel.mark(kinds, folder)
         with (folder / f"{module}-{name}.lock").open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+            with contextlib.suppress(OSError):  # a file system without locks: the same may be compiled twice
+                fcntl.flock(lock, fcntl.LOCK_EX)
             if not mark.exists():
                 kernel.keep(kinds, folder)
                 mark.touch()

@@ -369,7 +369,7 @@ def simulate_lanes(
     Returns
     -------
     Outcome
-        That of the design that ended last.
+        The outcome of the design that ended last.
     """
     rows = np.full(LANES + 1, EMPTY)
     rows[NEXT] = 0
