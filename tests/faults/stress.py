@@ -169,7 +169,7 @@ def on_workers(
                 told["ended by itself"] += 1
             except BoulderSweepError as problem:
                 told["ended in words"] += 1
-                if "resume=True" not in str(problem):
+                if "--resume" not in str(problem):
                     faults.append(f"{number}: {problem}")
         if not disturb.done:
             faults.append(f"{number}: the run was done before")
