@@ -60,6 +60,13 @@ class Table(NamedTuple):
         """Everything that must be equal for rows to belong to one table."""
         return self.identity | {"rows": self.ranges.rows, "parts": self.ranges.count}
 
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns, which follow from the settings."""
+        settings = self.identity["settings"]
+        more = (*(name for name in OPTIONAL_COLUMNS if name in settings["inputs"]), *settings.get("labels", ()))
+        return (*(spec.name for spec in COLUMNS), *more)
+
 
 class Described(NamedTuple):
     """What a part says of itself."""
@@ -130,7 +137,7 @@ def _described(folder: Location, part: PartFile, known: dict[frozenset[Any], Tab
         common = frozenset(common_in(file.schema.metadata).items())
         table = known.get(common) or _table_of(folder, part, file)
         known[common] = table
-        return Described(table, _own(folder, part, file, table.ranges), len(content))
+        return Described(table, _own(folder, part, file, table), len(content))
     except (failures.DamagedError, ParquetError) as problem:
         return problem.what if isinstance(problem, failures.ImpossibleRecordsError) else str(problem)
 
@@ -171,14 +178,15 @@ def _table_of(folder: Location, part: PartFile, file: TableFile) -> Table:
     return Table(said, Ranges(rows, count))
 
 
-def _own(folder: Location, part: PartFile, file: TableFile, ranges: Ranges) -> dict[str, int]:
-    """Return the rows of an opened part by verdict, once it holds the rows that its name says.
+def _own(folder: Location, part: PartFile, file: TableFile, table: Table) -> dict[str, int]:
+    """Return the rows of an opened part by verdict, once it holds the rows that its name says, in all columns.
 
     Raises
     ------
     ImpossibleRecordsError
         It holds others.
     """
+    ranges = table.ranges
     try:
         said = identity_in({key: value for key, value in (file.schema.metadata or {}).items() if is_own(key)})
         bounds, verdicts = (part.first, part.stop), said.get("verdicts")
@@ -186,6 +194,8 @@ def _own(folder: Location, part: PartFile, file: TableFile, ranges: Ranges) -> d
             raise ValueError(f"the rows {said.get('range')}, {file.rows} of {ranges.rows}")
         if not isinstance(verdicts, dict) or sum(_counts(verdicts)) != file.rows:
             raise ValueError("impossible counts")
+        if {*file.schema.names} != {*table.columns}:
+            raise ValueError("its columns do not follow from its settings")
     except (ValueError, RecursionError) as problem:
         raise failures.ImpossibleRecordsError(folder / part.name, str(problem)) from None
     return verdicts
@@ -301,9 +311,7 @@ class FinishedRows:
             raise self._damaged(strange, f"its rows are no part of a table of {ranges.rows:,} rows")
         refuse_two(folder, self._parts)
         self.rows, self.rows_done = ranges.rows, sum(part.stop - part.first for part in self._parts)
-        settings = self.identity["settings"]
-        more = (*(name for name in OPTIONAL_COLUMNS if name in settings["inputs"]), *settings.get("labels", ()))
-        self.columns = (*(spec.name for spec in COLUMNS), *more)
+        self.columns = self._table.columns
         self.judged_by = judged_by(self.identity)
         if self.judged_by:
             warnings.warn(f"{folder} was {self.judged_by}", OlderRulesWarning, stacklevel=2)
@@ -390,10 +398,10 @@ class FinishedRows:
                     other = _table_of(self._folder, part, file)
                     if unlike := differences(self._table.described, other.described):
                         raise self._damaged(part, f"of another run: {unlike[0]}")
-                if {*file.schema.names} != {*self.columns} or not file.schema.equals(self._schema):
-                    raise self._damaged(part, "its columns do not follow from its settings")
+                _own(self._folder, part, file, self._table)
+                if not file.schema.equals(self._schema):
+                    raise self._damaged(part, "its columns are of other types than in the first part")
                 table = file.read(columns)
-                _own(self._folder, part, file, self._table.ranges)
             except ParquetLimitError as problem:
                 raise failures.ImpossibleRecordsError(self._folder / part.name, str(problem)) from problem
             except (OSError, ParquetError) as problem:

@@ -19,7 +19,7 @@ MARK = "TEST_MARK"
 class Driver:
     """A process that runs a sweep (see `driver`), in a session of its own, with a mark that its children inherit."""
 
-    def __init__(self, out: Path, *options: str, **environment: str):
+    def __init__(self, out: Path | str, *options: str, **environment: str):
         self.mark = uuid.uuid4().hex
         self.process = subprocess.Popen(
             [sys.executable, "-m", "tests.faults.driver", str(out), *options],

@@ -1,4 +1,4 @@
-"""kill -9, resumed again and again: the table is that of an undisturbed run."""
+"""Kills, failing stores, dying workers and damage, each again and again: the table is that of an undisturbed run."""
 
 from __future__ import annotations
 
@@ -35,3 +35,27 @@ def test_many_kills_lose_no_row_and_double_none(tmp_path, kills, by_time):
     assert found["tables"]
     for table in found["tables"]:
         assert table == {"lost": 0, "double": 0, "different": 0}, f"TEST_SEED={seed}"
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("tests.store.damages", "320"),
+        ("tests.faults.stress s3", "3"),
+        ("tests.faults.stress killed", "3"),
+        ("tests.faults.stress stopped", "1"),
+    ],
+    ids=lambda command: command[0],
+)
+def test_what_disturbs_a_table_or_a_run_does_no_harm(tmp_path, command):
+    (words, times), seed = command, os.environ.get("TEST_SEED", "20261")
+    done = subprocess.run(
+        [sys.executable, "-m", *words.split(), str(tmp_path), times, seed],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=HANG_GUARD_S,  # hang guard
+    )
+    assert done.returncode == 0, f"TEST_SEED={seed}: {done.stderr[-3000:]}"
+    assert json.loads(done.stdout.splitlines()[-1])["faults"] == [], f"TEST_SEED={seed}"

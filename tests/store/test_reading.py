@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import threading
 import warnings
 
@@ -27,6 +28,7 @@ from boulder_sweep.store.folder import WRITING
 from boulder_sweep.store.provenance import judged_by, versions
 from boulder_sweep.store.reading import FinishedRows, contents, finished_table, read_row
 from tests.runner.grids import grid, plausible, same_bits
+from tests.store.damages import DAMAGES
 from tests.store.folders import (
     IDENTITY,
     OTHER_VERSIONS,
@@ -115,78 +117,28 @@ def test_no_result(out, tmp_path, name, words):
         read(path)
 
 
-def flip(out):
-    path = out / part_of(out, 1).name
-    content = bytearray(path.read_bytes())
-    content[2000] ^= 1
-    path.write_bytes(content)
-
-
-def cut(out):
-    path = out / part_of(out, 1).name
-    path.write_bytes(path.read_bytes()[:3000])
-
-
-def renamed(out):
-    """Rows of one range under the name of another."""
-    part, other = part_of(out, 1), part_of(out, 2)
-    (out / other.name).unlink()
-    (out / part.name).rename(out / part._replace(first=other.first, stop=other.stop).name)
-
-
-def other_rows(out):
-    part = part_of(out, 1)
-    (out / part.name).rename(out / part._replace(stop=part.stop + 5).name)
-
-
-def other_hash(out):
-    part = part_of(out, 1)
-    (out / part.name).rename(out / part._replace(hash="0" * 16).name)
-
-
-def of_another_run(out):
-    rewrite(out, lambda said: said["settings"].update(name="another"), 1)
-
-
-def of_a_longer_table(out):
-    rewrite(out, lambda said: said.update(rows=10 * ROWS), 1)
-
-
-def other_columns(out):
-    part = part_of(out, 1)
-    table = pq.read_table(out / part.name)
-    (out / part.name).unlink()
-    put(out, part, table.drop_columns(["margin"]))
-
-
-def fewer_rows(out):
-    part = part_of(out, 1)
-    table = pq.read_table(out / part.name)
-    (out / part.name).unlink()
-    put(out, part, table.slice(1))
-
-
-DAMAGES = [flip, cut, renamed, other_rows, other_hash, of_another_run, of_a_longer_table, other_columns, fewer_rows]
-
-
-@pytest.mark.parametrize("damage", DAMAGES, ids=lambda damage: damage.__name__)
-def test_damage_is_never_read_as_data(out, damage):
-    damage(out)
+@pytest.mark.parametrize("kind", DAMAGES)
+def test_damage_is_never_read_as_data_and_computed_again(out, kind):
+    """Once by every kind; ``python -m tests.store.damages`` damages as often as asked for."""
+    whole = parts_of(out)
+    DAMAGES[kind](out, random.Random(7))
     for act in (read, finished_table, lambda folder: list(FinishedRows(folder).tables())):
-        with pytest.raises(DamagedError) as told:
+        if kind == "gone":
+            continue
+        with pytest.raises(StoreError) as told:
             act(out)
+        assert isinstance(told.value, DamagedError) or kind == "a_link_to_nothing"
         assert str(told.value).isprintable()
         assert "rows-" in str(told.value)
-
-
-@pytest.mark.parametrize("damage", [flip, cut, renamed, other_hash, fewer_rows], ids=lambda damage: damage.__name__)
-def test_damaged_parts_are_computed_again(out, damage, tmp_path):
-    whole = parts_of(out)
-    damage(out)
+    if kind in ("of_another_run", "twice", "a_folder"):
+        with pytest.raises(StoreError):
+            run(grid(), out, resume=True, simulate=plausible)
+        return
     summary = run(grid(), out, resume=True, simulate=plausible)
     assert parts_of(out) == whole
-    assert summary.rows == ROWS > summary.rows_computed > 100
-    assert [note for note in summary.notes if "was damaged" in note]
+    assert summary.rows == ROWS > summary.rows_computed
+    assert summary.rows_computed > 100 or kind == "overlapping"
+    assert kind == "gone" or [note for note in summary.notes if "was damaged" in note]
 
 
 def test_two_results_for_the_same_rows_are_refused_with_both_names(out):
