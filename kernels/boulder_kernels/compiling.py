@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 DONE, FAILED = b"+", b"-"
-IDLE_S = 3.0
+IDLE_S = 20.0
 """How long the process waits for a request: what it has compiled for one kernel it need not compile for the next."""
 _process: subprocess.Popen[bytes] | None = None
 _owner = 0
