@@ -1,9 +1,9 @@
 """Second opinions: impacts with heave and friction, from the first touch to a verdict that is proved.
 
 Nothing jumps in this motion, but forces bend where the truck comes off, where a strip of the foot touches or leaves and
-where a slip turns. So the step follows the embedded error of its method (`boulder_kernels.runge_kutta`), and is cut where
-the truck comes off or touches again, where the rotation reaches its limit, and where a strip of the foot that is being
-pressed in comes back.
+where a slip turns. So the step follows the embedded error of its method (`boulder_kernels.runge_kutta`), and is cut at
+some instants: where the truck comes off or touches again, where the rotation reaches its limit, and where a strip of the
+foot that is being pressed in comes back.
 
 Once the truck no longer drives forward, the energy of boulder, soil, base and crush can only fall. If it is below the
 least potential energy at the limit of rotation, forward and back, the boulder never gets there, and the motion ends.
@@ -84,7 +84,7 @@ class HeaveControl(NamedTuple):
     """Limit of rotation [rad]."""
     longest: float
     """Longest simulated time [s]; a motion that is not proved to stay below the limit by then is not decided."""
-    tolerance: float = 1e-4
+    tolerance: float = 2e-4
     """Error of one step [m]: of velocities times its length, that of the rotation at `error_arm`."""
     fineness: int = 1
     """1 for 16 parts of the soil, strips of the foot and points of the sides, up to 4 for 256."""
