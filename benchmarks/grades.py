@@ -1,9 +1,9 @@
 """Grades of passes against a fine solution of each: ``python -m benchmarks.grades``.
 
 Passes of the M30 grid at 30 and at 40 mph, of random designs, of shallow boulders and of soil of 30 degrees are graded
-as `sweep run --second-opinion` grades them. Each is then simulated under every law of a second opinion with 256 parts of
-the soil, strips of the foot and points of the sides, and errors of a step of 1e-8 m. Exit code 1 if a pass that stands
-overturns in one of these.
+as `sweep run --second-opinion` grades them. Each is then simulated under every law of a second opinion with 256 parts
+of the soil, strips of the foot and points of the sides, and errors of a step of 1e-8 m. Exit code 1 if a pass that
+stands overturns in one of these.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Found(NamedTuple):
     unsafe: int
     """Those of them that overturn in a fine solution."""
     cautious: int
-    """Passes that do not stand, but do in the fine solutions."""
+    """Passes that do not stand, though no fine solution overturns them."""
     cpu_s: float
     """CPU time of the grades [s]."""
 
@@ -83,14 +83,14 @@ def sets(grid: Path, count: int) -> Iterator[tuple[str, Evaluation, Designs]]:
         yield name, evaluation, designs.rows(np.flatnonzero(evaluation.judged(designs).verdict == PASS)[:count])
 
 
-def stands_finely(passes: Designs, evaluation: Evaluation) -> np.ndarray:
-    """Return which passes stand under every law in a fine solution, bool, shape (n,)."""
+def overturned(passes: Designs, evaluation: Evaluation) -> np.ndarray:
+    """Return which passes a fine solution under one of the laws overturns, bool, shape (n,)."""
     control = HeaveControl(evaluation.limits.rotation, evaluation.longest_s, TOLERANCE_M, FINEST)
-    found = np.ones(passes.size, dtype=bool)
+    found = np.zeros(passes.size, dtype=bool)
     for law in SECOND_OPINIONS:
         outcome = second_opinions(with_law(passes.table, law), control)
         penetration = outcome.x_v_max - passes.bed_offset - passes.table.L
-        found &= (outcome.status == Status.BELOW_LIMIT.value) & (penetration <= evaluation.limits.penetration)
+        found |= (outcome.status == Status.LIMIT.value) | ~(penetration <= evaluation.limits.penetration)
     return found
 
 
@@ -102,8 +102,8 @@ def held(evaluation: Evaluation, passes: Designs) -> Found:
         judged, passes, (DECISIVE,), model.resistance, evaluation.limits, evaluation.longest_s
     )
     cpu_s = time.process_time() - begun
-    stand, fine = standing(graded), stands_finely(passes, evaluation)
-    unsafe, cautious = (int(np.count_nonzero(which)) for which in (stand & ~fine, fine & ~stand))
+    stand, lost = standing(graded), overturned(passes, evaluation)
+    unsafe, cautious = (int(np.count_nonzero(which)) for which in (stand & lost, ~stand & ~lost))
     return Found(passes.size, int(np.count_nonzero(stand)), unsafe, cautious, cpu_s)
 
 

@@ -227,6 +227,8 @@ class Parts(NamedTuple):
     """Stiffness of its springs per depth [N/m^2]."""
     drag: float
     """Its drag at a velocity of 1 m/s [N s^2/m^2]."""
+    inverse_cover: float
+    """What its depth is multiplied by for the share of its drag: it drags in full where half of it is covered [1/m]."""
 
 
 @inlined
@@ -235,7 +237,10 @@ def parts_of_soil(sin: float, k: Kinematics, f: HeaveConstants) -> Parts:
     share = 1.0 / f.pieces
     w = max(abs(k.slope_x) * share, LEAST_DIFFERENCE)
     slope_w = math.copysign(k.lever_d * share, sin)
-    return Parts(share, w, 1.0 / w, slope_w, f.c.K_soil * share / f.c.d, f.c.R_soil * share)
+    inverse_d = 1.0 / f.c.d
+    return Parts(
+        share, w, 1.0 / w, slope_w, f.c.K_soil * share * inverse_d, f.c.R_soil * share, 2.0 * f.pieces * inverse_d
+    )
 
 
 class Beyond(NamedTuple):
@@ -282,7 +287,7 @@ def pressed(u: float, drag: float, z: float, p: Parts, f: HeaveConstants) -> Pre
     all_of_it, yielded = beyond(u, 0.0, p), beyond(u, f.c.x_yield, p)
     depth = max(z, 0.0)
     energy = p.stiffness * (all_of_it.energy - yielded.energy)
-    covered = min(depth / (0.5 * f.c.d * p.share), 1.0)
+    covered = min(depth * p.inverse_cover, 1.0)
     return Pressed(
         p.stiffness * depth * (all_of_it.slope - yielded.slope),
         all_of_it.share * covered * drag,
@@ -407,10 +412,14 @@ def forces(
         X, Y = a * cos + b * sin, b * cos - a * sin
         v_x, v_y = v_b + omega_b * Y, w_b - omega_b * X
         held = field(work, SIDE, n) * max(depth - f.heave * y_b, 0.0)
-        share = -held / math.sqrt(v_x * v_x + v_y * v_y + f.v_s * f.v_s)
+        side_slip = math.sqrt(v_x * v_x + v_y * v_y + f.v_s * f.v_s)
         s = foot_strip(work, n, y_b, w_b, omega_b, sin, versin, f)
-        push = f.heave * s.total
-        rub = -f.friction * push * slipping(v_b + omega_b * s.Y, f)
+        slip = v_b + omega_b * s.Y
+        foot_slip = math.sqrt(slip * slip + f.v_s * f.v_s)
+        # One division for both shares of the full friction (Eq 134).
+        inverse = 1.0 / (side_slip * foot_slip)
+        share, push = -held * foot_slip * inverse, f.heave * s.total
+        rub = -f.friction * push * slip * side_slip * inverse
         put(work, ALONG_X, n, e.far + e.near + share * v_x + rub)
         put(work, TURNING, n, e.turning + share * (v_x * Y - v_y * X) + rub * s.Y - push * s.X)
         put(work, LIFTING, n, e.lift + share * v_y + push)

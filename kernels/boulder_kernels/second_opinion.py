@@ -2,8 +2,8 @@
 
 Nothing jumps in this motion, but forces bend where the truck comes off, where a strip of the foot touches or leaves and
 where a slip turns. So the step follows the embedded error of its method (`boulder_kernels.runge_kutta`), and is cut at
-some instants: where the truck comes off or touches again, where the rotation reaches its limit, and where a strip of the
-foot that is being pressed in comes back.
+some instants: where the truck comes off or touches again, where the rotation reaches its limit, and where a strip of
+the foot that is being pressed in comes back.
 
 Once the truck no longer drives forward, the energy of boulder, soil, base and crush can only fall. If it is below the
 least potential energy at the limit of rotation, forward and back, the boulder never gets there, and the motion ends.
