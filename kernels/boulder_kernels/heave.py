@@ -26,7 +26,7 @@ from ._jit import inlined, kernel
 from .design import Constants, Design, G, boulder_mass, passive_pressure_coefficient, soil_mass
 from .dynamics import contact_displacement, contact_lever, spring_compression
 from .numerics import field, put, sine_versine
-from .soil import Kinematics, soil_kinematics
+from .soil import TINY, Kinematics, soil_kinematics
 
 GROUP, FINEST = 16, 4
 """Pieces of the coarsest solution: two of the widest registers; and what their number may be multiplied by, twice."""
@@ -42,8 +42,6 @@ SIDE_POINTS = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9
 """Gauss's four points of a length 1,"""
 SIDE_WEIGHTS = (0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692)
 """and their weights: the sides are four points by four."""
-LEAST_DIFFERENCE = 1e-12
-"""Least difference of the displacements at the ends of a part of the soil, so that none is divided by zero [m]."""
 
 
 class Base(NamedTuple):
@@ -235,7 +233,7 @@ class Parts(NamedTuple):
 def parts_of_soil(sin: float, k: Kinematics, f: HeaveConstants) -> Parts:
     """Return what the parts of the soil have in common."""
     share = 1.0 / f.pieces
-    w = max(abs(k.slope_x) * share, LEAST_DIFFERENCE)
+    w = max(abs(k.slope_x) * share, TINY)
     slope_w = math.copysign(k.lever_d * share, sin)
     inverse_d = 1.0 / f.c.d
     return Parts(
