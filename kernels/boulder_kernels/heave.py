@@ -334,10 +334,8 @@ def soil_element(n: int, y_b: float, sin: float, versin: float, k: Kinematics, p
 class Strip(NamedTuple):
     """One strip of the foot (Eq 133)."""
 
-    elastic: float
-    """Force of the base's spring [N]."""
-    total: float
-    """With its dashpot: what the base pushes up with [N]."""
+    push: float
+    """What the base pushes up with, spring and dashpot [N]."""
     X: float
     """Position of the strip right of the common centre of mass [m]."""
     Y: float
@@ -364,7 +362,7 @@ def foot_strip(
     elastic = min(max(f.k_foot * strip_depth(work, j, y_b, sin, versin, f), 0.0), f.q_foot)
     on = min(elastic * (1.0 / (f.k_foot * f.s_0)), 1.0)
     total = min(max(elastic - on * f.c_foot * (w_b - omega_b * X), 0.0), f.q_foot)
-    return Strip(share * elastic, share * total, X, Y)
+    return Strip(share * total, X, Y)
 
 
 @inlined
@@ -416,7 +414,7 @@ def forces(
         foot_slip = math.sqrt(slip * slip + f.v_s * f.v_s)
         # One division for both shares of the full friction (Eq 134).
         inverse = 1.0 / (side_slip * foot_slip)
-        share, push = -held * foot_slip * inverse, f.heave * s.total
+        share, push = -held * foot_slip * inverse, f.heave * s.push
         rub = -f.friction * push * slip * side_slip * inverse
         put(work, ALONG_X, n, e.far + e.near + share * v_x + rub)
         put(work, TURNING, n, e.turning + share * (v_x * Y - v_y * X) + rub * s.Y - push * s.X)

@@ -1,11 +1,12 @@
-"""One step of a second opinion by the pair of Bogacki and Shampine, with coefficients that check themselves.
+"""One step of a second opinion by the pair of Bogacki and Shampine, and the instants within it at which it is cut.
 
 Source: P. Bogacki and L. F. Shampine, A 3(2) pair of Runge-Kutta formulas, Appl. Math. Lett. 2 (1989), 321-325.
 
 Forces that bend at the pieces of soil, foot and sides gain nothing by a higher order. As in
 `boulder_kernels.dormand_prince`, stage displacements need the stage accelerations only, and within a step the motion is
-given by the polynomials of degree five through both of its ends. What a step needs lies in one workspace, behind what
-`boulder_kernels.heave` keeps there.
+given by the polynomials of degree five through both of its ends. A step is cut where the truck comes off or touches
+again, where the rotation reaches its limit, and where a strip of the foot that is being pressed in comes back. What a
+step needs lies in one workspace, behind what `boulder_kernels.heave` keeps there.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from ._jit import inlined, kernel
 from .design import Constants, error_arm
 from .dormand_prince import Track, displacement_at, slope_at, track
 from .dynamics import contact_displacement, spring_compression
-from .heave import ROOM, HeaveConstants, accelerations, forces
+from .heave import FOOT, ROOM, SETS, HeaveConstants, accelerations, forces, strip_depth
 from .numerics import ITERATIONS, Bracket, field, narrowed, next_guess, put, sine_versine
 
 _A = (
@@ -60,6 +61,8 @@ AA = tuple(
     for i in range(STAGES)
 )
 """Weights of the accelerations in the stage displacements, A A, shape (4, 4)."""
+LEAST_SINKING = 1e-9
+"""Velocity below which a strip has come to rest, so that no step is cut twice where one turns back [m/s]."""
 AXES = 4
 """Displacements: x_b, theta_b, y_b, x_v."""
 START, TRIAL, RATES = ROOM, ROOM + 2 * AXES, ROOM + 4 * AXES
@@ -175,3 +178,73 @@ def time_of_limit(q: Track, limit: float, tau_end: float) -> float:
         beyond = abs(displacement_at(q, middle)) >= limit
         low, high = (low, middle) if beyond else (middle, high)
     return high
+
+
+@kernel
+def foot_rises(work: np.ndarray, q: Tracks, tau_end: float, h: float, f: HeaveConstants) -> float:
+    """Fraction of a step at which the first strip that is pressed in comes back; tau_end if none does.
+
+    What is pressed in is kept at the end of a step (`press_in`), so no step may go on from where a strip is deepest.
+    """
+    tau, capacity = tau_end, f.q_foot / f.k_foot
+    start, end = foot_at(q, 0.0), foot_at(q, tau)
+    coming_back = 0
+    for j in range(f.pieces):
+        sinking, at_end = sinking_in(work, j, start, f), sinking_in(work, j, end, f)
+        coming_back += int((sinking > LEAST_SINKING * h) & (at_end < 0.0))
+    if coming_back == 0:
+        return tau
+    for j in range(f.pieces):
+        sinking, at_end = sinking_in(work, j, start, f), sinking_in(work, j, end, f)
+        # A strip that slows down gets no deeper than it would at the speed that it has.
+        reach = strip_depth(work, j, start.y, start.sin, start.versin, f) + sinking * tau
+        if sinking > LEAST_SINKING * h and at_end < 0.0 and reach > capacity:
+            b, at, middle = Bracket(0.0, sinking, tau, at_end, 0.0), tau, end
+            for _ in range(ITERATIONS):
+                at = next_guess(b)
+                middle = foot_at(q, at)
+                there = sinking_in(work, j, middle, f)
+                if abs(there) < 0.1 * LEAST_SINKING * h or b.high - b.low < 1e-12:
+                    break
+                b = narrowed(b, at, there)
+            if strip_depth(work, j, middle.y, middle.sin, middle.versin, f) > capacity:
+                tau, end = at, middle
+    return tau
+
+
+class FootMotion(NamedTuple):
+    """Rotation and rise at an instant within a step, and how fast they change, times its length."""
+
+    sin: float
+    versin: float
+    turning: float
+    """Change of the rotation [rad]."""
+    y: float
+    rising: float
+    """Change of the rise [m]."""
+
+
+@inlined
+def foot_at(q: Tracks, tau: float) -> FootMotion:
+    """Rotation and rise at the fraction tau of a step."""
+    sin, versin = sine_versine(displacement_at(q.theta_b, tau))
+    return FootMotion(sin, versin, slope_at(q.theta_b, tau), displacement_at(q.y_b, tau), slope_at(q.y_b, tau))
+
+
+@inlined
+def sinking_in(work: np.ndarray, j: int, m: FootMotion, f: HeaveConstants) -> float:
+    """Velocity at which strip j of the foot sinks, times the length of the step [m]."""
+    return (field(work, FOOT, j) * (1.0 - m.versin) - f.c.c_y * m.sin) * m.turning - m.rising
+
+
+@kernel
+def press_in(work: np.ndarray, f: HeaveConstants) -> bool:
+    """Keep what a strip of the foot is pressed in beyond its bearing capacity as its set; whether any was."""
+    sin, versin = sine_versine(field(work, START, 1))
+    any_pressed = False
+    for j in range(f.pieces):
+        over = strip_depth(work, j, field(work, START, 2), sin, versin, f) - f.q_foot / f.k_foot
+        if over > 0.0 and f.heave > 0.0:
+            put(work, SETS, j, field(work, SETS, j) + over)
+            any_pressed = True
+    return any_pressed

@@ -22,9 +22,7 @@ from .dormand_prince import displacement_at, slope_at, turning_point
 from .heave import (
     ALONG_X,
     FINEST,
-    FOOT,
     LIFTING,
-    SETS,
     STRIP,
     TURNING,
     Base,
@@ -53,7 +51,9 @@ from .runge_kutta import (
     compression_in,
     contact_change,
     first_rate,
+    foot_rises,
     keep,
+    press_in,
     step,
     time_of_limit,
     track_of,
@@ -71,10 +71,8 @@ CAUTION = 0.01
 """Share of the least energy by which the energy must be below it: the errors of integrator and search, and more."""
 TURNS = 3
 """How often the least energy is looked for along x_b and along y_b in turn."""
-PLACED = 1e-3
+PLACED = 1e-4
 """How precisely, as a share of the energy that lifts the boulder by its length."""
-LEAST_SINKING = 1e-9
-"""Velocity below which a strip has come to rest, so that no step is cut twice where one turns back [m/s]."""
 
 
 class HeaveControl(NamedTuple):
@@ -205,7 +203,7 @@ def least_energy(theta: float, work: np.ndarray, f: HeaveConstants) -> float:
     Along x_b alone, and along y_b alone, the energy is convex: its least is where its slope is zero, in either in turn.
     Along x_b it is between the positions where the uppermost and the lowest soil are as they were; along y_b between
     those where all strips carry what they can, which is more than the weight, and where the boulder is out of the soil.
-    There may be several: the search starts from the middle, and `CAUTION` covers what another start finds.
+    There may be several, of large rotations: the search starts from both ends along x_b.
     """
     sin, versin = sine_versine(theta)
     upper = f.c.l_n * versin - f.c.z_0 * sin
@@ -213,12 +211,15 @@ def least_energy(theta: float, work: np.ndarray, f: HeaveConstants) -> float:
     bottom, top = 0.0, f.L + 3.0 * f.c.d + f.s_0
     for n in range(f.pieces):
         bottom = min(bottom, strip_depth(work, n, 0.0, sin, versin, f) - f.q_foot / f.k_foot)
-    position = Equilibrium(0.5 * (left + right), 0.0, np.inf)
-    for _ in range(TURNS):
-        if f.heave > 0.0:
-            position = move_to_least_energy(position, False, bottom, top, theta, work, f)
-        position = move_to_least_energy(position, True, left, right, theta, work, f)
-    return position.energy
+    least = np.inf
+    for x in (left, right):
+        position = Equilibrium(x, 0.0, np.inf)
+        for _ in range(TURNS):
+            if f.heave > 0.0:
+                position = move_to_least_energy(position, False, bottom, top, theta, work, f)
+            position = move_to_least_energy(position, True, left, right, theta, work, f)
+        least = min(least, position.energy)
+    return least
 
 
 @kernel
@@ -258,76 +259,6 @@ def move_to_least_energy(
         at = next_guess(b)
         x, y = (at, y) if sideways else (x, at)
     return Equilibrium(x, y, energy)
-
-
-@kernel
-def foot_rises(work: np.ndarray, q: Tracks, tau_end: float, h: float, f: HeaveConstants) -> float:
-    """Fraction of a step at which the first strip that is pressed in comes back; tau_end if none does.
-
-    What is pressed in is kept at the end of a step (`press_in`), so no step may go on from where a strip is deepest.
-    """
-    tau, capacity = tau_end, f.q_foot / f.k_foot
-    start, end = foot_at(q, 0.0), foot_at(q, tau)
-    coming_back = 0
-    for j in range(f.pieces):
-        sinking, at_end = sinking_in(work, j, start, f), sinking_in(work, j, end, f)
-        coming_back += int((sinking > LEAST_SINKING * h) & (at_end < 0.0))
-    if coming_back == 0:
-        return tau
-    for j in range(f.pieces):
-        sinking, at_end = sinking_in(work, j, start, f), sinking_in(work, j, end, f)
-        # A strip that slows down gets no deeper than it would at the speed that it has.
-        reach = strip_depth(work, j, start.y, start.sin, start.versin, f) + sinking * tau
-        if sinking > LEAST_SINKING * h and at_end < 0.0 and reach > capacity:
-            b, at, middle = Bracket(0.0, sinking, tau, at_end, 0.0), tau, end
-            for _ in range(ITERATIONS):
-                at = next_guess(b)
-                middle = foot_at(q, at)
-                there = sinking_in(work, j, middle, f)
-                if abs(there) < 0.1 * LEAST_SINKING * h or b.high - b.low < 1e-12:
-                    break
-                b = narrowed(b, at, there)
-            if strip_depth(work, j, middle.y, middle.sin, middle.versin, f) > capacity:
-                tau, end = at, middle
-    return tau
-
-
-class FootMotion(NamedTuple):
-    """Rotation and rise at an instant within a step, and how fast they change, times its length."""
-
-    sin: float
-    versin: float
-    turning: float
-    """Change of the rotation [rad]."""
-    y: float
-    rising: float
-    """Change of the rise [m]."""
-
-
-@inlined
-def foot_at(q: Tracks, tau: float) -> FootMotion:
-    """Rotation and rise at the fraction tau of a step."""
-    sin, versin = sine_versine(displacement_at(q.theta_b, tau))
-    return FootMotion(sin, versin, slope_at(q.theta_b, tau), displacement_at(q.y_b, tau), slope_at(q.y_b, tau))
-
-
-@inlined
-def sinking_in(work: np.ndarray, j: int, m: FootMotion, f: HeaveConstants) -> float:
-    """Velocity at which strip j of the foot sinks, times the length of the step [m]."""
-    return (field(work, FOOT, j) * (1.0 - m.versin) - f.c.c_y * m.sin) * m.turning - m.rising
-
-
-@kernel
-def press_in(work: np.ndarray, f: HeaveConstants) -> bool:
-    """Keep what a strip of the foot is pressed in beyond its bearing capacity as its set; whether any was."""
-    sin, versin = sine_versine(field(work, START, 1))
-    any_pressed = False
-    for j in range(f.pieces):
-        over = strip_depth(work, j, field(work, START, 2), sin, versin, f) - f.q_foot / f.k_foot
-        if over > 0.0 and f.heave > 0.0:
-            put(work, SETS, j, field(work, SETS, j) + over)
-            any_pressed = True
-    return any_pressed
 
 
 @inlined

@@ -13,7 +13,17 @@ from boulder_kernels import Status
 from boulder_kernels.design import G, constants_of
 from boulder_kernels.dormand_prince import Track
 from boulder_kernels.dynamics import contact_displacement, spring_compression
-from boulder_kernels.heave import FINEST, GROUP, SETS, Base, HeaveConstants, HeaveOptions, heave_constants, prepare
+from boulder_kernels.heave import (
+    FINEST,
+    GROUP,
+    SETS,
+    STRIP,
+    Base,
+    HeaveConstants,
+    HeaveOptions,
+    heave_constants,
+    prepare,
+)
 from boulder_kernels.runge_kutta import START, WORKSPACE, Tracks
 from boulder_kernels.second_opinion import (
     CAUTION,
@@ -207,13 +217,13 @@ def test_what_is_pressed_in_does_not_depend_on_where_steps_end() -> None:
     for design in some_designs(24, seed=262):
         exact, usual = (
             simulate(design, RISE, HeaveControl(1.2, 0.3, tolerance, stop=False)).work[SETS : SETS + GROUP]
-            for tolerance in (1e-11, HeaveControl(1.2, 0.3).tolerance)
+            for tolerance in (1e-11, 1e-6)
         )
         if exact.max() > 1e-4:
             gaps.append(np.abs(usual - exact).max())
     assert len(gaps) >= 12
-    assert np.mean(gaps) < 3e-5
-    assert np.max(gaps) < 2e-4
+    assert np.mean(gaps) < 1e-5
+    assert np.max(gaps) < 6e-5
 
 
 def test_a_step_ends_where_a_strip_that_is_pressed_in_comes_back() -> None:
@@ -260,7 +270,8 @@ def test_a_strip_pressed_beyond_its_capacity_takes_energy() -> None:
         how = HeaveControl(1.2, 0.2, 1e-12)
         m = simulate(design, RISE, how, Base(wave_speed=0.0), record, planar={"R_soil": 1e-9, "tau_v": 0.0})
         energy = energies(design, record)
-        taken = m.f.q_foot * m.work[SETS : SETS + GROUP].sum() / (0.5 * design.m_v * design.v_0**2)
+        pressed = m.work[SETS : SETS + GROUP] @ m.work[STRIP : STRIP + GROUP]
+        taken = m.f.q_foot * pressed / (0.5 * design.m_v * design.v_0**2)
         if taken > 1e-4:
             found += 1
         assert energy[0] - energy[-1] == pytest.approx(taken, rel=0.02, abs=1e-5)
@@ -291,7 +302,7 @@ def test_on_a_stiff_base_it_turns_about_the_far_end_of_its_foot(number: int) -> 
     design = under([RWG, ABG, *random_designs(6, seed=263)][number], "broms")
     record = empty_record(0.16, 81)
     how = HeaveControl(1.2, 0.16, 1e-9, stop=False)
-    simulate(design, RISE, how, Base(stiffness=1e13, wave_speed=0.0), record, q_foot=1e18)
+    simulate(design, RISE, how, Base(stiffness=1e14, wave_speed=0.0), record, q_foot=1e18)
     known = rolling(Body(inputs_of(design), True, False, OracleBase()), record.times)
     assert len(known) > 30
     found = record.states[: len(known)]
@@ -385,10 +396,10 @@ def shallow(design: bk.Design) -> bk.Design:
 
 @pytest.mark.compiled
 def test_rotation_converges_with_the_tolerance() -> None:
-    """By the default tolerance within 0.01 degrees, and no verdict depends on it."""
+    """By the default tolerance within 0.2 degrees, and no verdict depends on it."""
     table = table_of(some_designs(100, seed=264))
-    exact = second_opinions(table, HeaveControl(1.0, 1.0, 1e-10))
-    within = {1e-5: 0.1, 1e-6: 0.01, 1e-8: 0.001}
+    exact = second_opinions(table, HeaveControl(1.0, 1.0, 1e-11))
+    within = {2e-4: 0.2, 1e-5: 0.03, 1e-7: 0.003}
     mean = []
     for tolerance, degrees in within.items():
         found = second_opinions(table, HeaveControl(1.0, 1.0, tolerance))
@@ -397,7 +408,7 @@ def test_rotation_converges_with_the_tolerance() -> None:
         assert gaps.max() < degrees
         mean.append(gaps.mean())
     assert mean[0] > 3 * mean[1] > 9 * mean[2]
-    assert HeaveControl(1.0, 1.0).tolerance == 1e-6
+    assert HeaveControl(1.0, 1.0).tolerance == 2e-4
 
 
 @pytest.mark.compiled
@@ -444,7 +455,7 @@ def test_a_boulder_that_the_base_cannot_carry_has_no_second_opinion() -> None:
     ("change", "statuses"),
     [
         ({"c_v": 1e-3}, {Status.STEP_BUDGET}),
-        ({"rho_b": 1e-3}, {Status.STEP_BUDGET}),
+        ({"rho_b": 1e-3}, {Status.LIMIT}),
         ({"k_v": 1e18}, {Status.UNSTABLE, Status.STEP_BUDGET}),
         ({"v_0": 0.0}, {Status.BELOW_LIMIT}),
         ({"v_0": 200.0}, {Status.LIMIT}),
