@@ -312,7 +312,8 @@ class Model:
     second_opinion: tuple[str, ...] = setting(
         "model.second_opinion",
         "",
-        "laws of the soil's resistance under which every pass is simulated again, with friction and vertical motion",
+        "laws of the soil's resistance under which passes are simulated again, with friction and vertical motion; "
+        "width_capped decides, and alone asks broms only of what it overturns",
         (),
         kind="a law for a second opinion",
         shown_default=NO_OPINION,

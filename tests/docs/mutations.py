@@ -106,7 +106,7 @@ MUTATIONS = (
     Mutation((132,), _HEAVE, "all_of_it.share * covered * drag", "all_of_it.share * drag"),
     Mutation((132,), _HEAVE, "share * length * (0.25 - (1.0 / 6.0) * share)", "share * length * 0.25"),
     Mutation((132,), _HEAVE, "0.5 * mean * mean + (1.0 / 24.0) * length * length", "0.5 * mean * mean"),
-    Mutation((132,), _HEAVE, "(far.widening + near.widening) * p.slope_w", "(far.widening - near.widening) * p.slope_w"),
+    Mutation((132,), _HEAVE, "(far.widening + near.widening) * p", "(far.widening - near.widening) * p"),
     Mutation(
         (133,),
         _HEAVE,
