@@ -1,10 +1,10 @@
 """Robust or sensitive: what a pass is worth when the model has another form.
 
 A second opinion is the same impact with friction and vertical motion, under a law of the soil that resists less
-(`boulder_kernels.second_opinion`). A pass that stands under the weakest law (`DECISIVE`) is *robust*, one that does not
-under a law that was asked *sensitive*. A pass that stands, but lies outside the ranges from which the study of the
-documentation draws, is *open*: nobody has looked at what second opinions are worth there. Where no second opinion was
-asked for, a pass is robust if it lies where that study has found none that is not (`FREE`), and otherwise open, too.
+(`boulder_kernels.second_opinion`). A pass that stands under the weakest law, mostly `DECISIVE`, is *robust*, one that
+does not under a law that was asked *sensitive*. A pass that stands, but lies outside the ranges from which the study of
+the documentation draws, is *open*: nobody has looked at what second opinions are worth there. Where no second opinion
+was asked for, a pass is robust if it lies where that study has found none that is not (`FREE`), and otherwise open, too.
 
 No pass stands that a finer solution overturns: where a second opinion comes near to the limit, or is not proved to stay
 well below it, a fine solution decides, and it must stand with its own error taken off.
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 ROBUST, SENSITIVE, OPEN = range(len(GRADES))
 DECISIVE = "width_capped"
-"""The law that decides. In none of 47,557 passes did it stand where ``broms`` did not."""
+"""The law that decides: it resists least, but for slender boulders in dense soil, which are asked of others, too."""
 IN_WORDS = (
     "stands with friction and vertical motion under the weakest of three laws; not tested: soil on one side only, "
     "rounded stones"
@@ -195,9 +195,9 @@ def stands(designs: Designs, law: str, present: str, limits: Any, longest_s: flo
 
 
 def standing(judged: Judged) -> np.ndarray:
-    """Return which judged rows stand under the law that decides, or are robust without asking, bool, shape (n,)."""
-    asked, bit = judged["stands_under"], 1 << SECOND_OPINIONS.index(DECISIVE)
-    return (judged["robustness"] == ROBUST) | ((asked >= 0) & ((asked & bit) > 0))
+    """Return which judged rows are robust, or would be inside the ranges of the study, bool, shape (n,)."""
+    grade, under, bit = judged["robustness"], judged["stands_under"], 1 << SECOND_OPINIONS.index(DECISIVE)
+    return (grade == ROBUST) | ((grade == OPEN) & (under >= 0) & ((under & bit) > 0))
 
 
 def with_second_opinions(
@@ -207,7 +207,7 @@ def with_second_opinions(
 
     Where `DECISIVE` is asked and a pass stands, it is robust, or open outside the study; where a law overturns it, it
     is sensitive. If `DECISIVE` alone is asked, passes that are robust without asking are not simulated, and those that
-    it overturns are simulated under the other laws, too.
+    it overturns, and those of which another law resists less, are simulated under that law, too.
 
     Parameters
     ----------
@@ -235,9 +235,12 @@ def with_second_opinions(
 
     for law in laws:
         ask(law, np.arange(len(passing)))
-    for law in SECOND_OPINIONS if laws == (DECISIVE,) else ():
-        if law not in laws:
-            ask(law, np.flatnonzero(turned))
+    if laws == (DECISIVE,):
+        resistance = with_law(passes.table, DECISIVE, present).K_epsilon
+        for law in SECOND_OPINIONS:
+            if law != DECISIVE:
+                weaker = with_law(passes.table, law, present).K_epsilon < resistance
+                ask(law, np.flatnonzero(turned | weaker))
     grade[passing[turned]] = SENSITIVE
     if DECISIVE in laws:
         studied = are_studied(passes, limits)

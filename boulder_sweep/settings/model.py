@@ -313,7 +313,7 @@ class Model:
         "model.second_opinion",
         "",
         "laws of the soil's resistance under which passes are simulated again, with friction and vertical motion; "
-        "width_capped decides, and alone asks broms only of what it overturns",
+        "width_capped alone decides, and broms is asked where that overturns a pass or resists more",
         (),
         kind="a law for a second opinion",
         shown_default=NO_OPINION,
