@@ -4,7 +4,7 @@ A second opinion is the same impact with friction and vertical motion, under a l
 (`boulder_kernels.second_opinion`). A pass that stands under the weakest law, mostly `DECISIVE`, is *robust*, one that
 does not under a law that was asked *sensitive*. A pass that stands, but lies outside the ranges from which the study of
 the documentation draws, is *open*: nobody has looked at what second opinions are worth there. Where no second opinion
-was asked for, a pass is robust if it lies where that study has found none that is not (`FREE`), and otherwise open, too.
+was asked for, a pass is robust if it lies where that study has found none that is not (`FREE`), otherwise open, too.
 
 No pass stands that a finer solution overturns: where a second opinion comes near to the limit, or is not proved to stay
 well below it, a fine solution decides, and it must stand with its own error taken off.
