@@ -97,9 +97,9 @@ def test_the_lowest_versions_are_those_that_are_tested() -> None:
 
 
 def test_numba_is_admitted_up_to_the_version_that_is_tested() -> None:
-    """Not the next one: the compiler and the loader of `boulder_kernels` use what Numba and llvmlite may change.
+    """Not the next one: the lowerings of `boulder_kernels` use what Numba may change.
 
-    To admit it, put it into the lock, and make `tests/kernels/test_ahead.py` pass.
+    To admit it, put it into the lock, and make `tests/kernels` pass.
     """
     major, minor, _ = pins("requirements-dev.lock")["numba"].split(".")
     assert bounds()["numba"].partition(",")[2] == f"<{major}.{int(minor) + 1}"

@@ -2,7 +2,7 @@
 
 As code to be compiled and inlined wherever it is called this would take a third of the time of all kernels to compile.
 A copy of a lane by a loop would be compiled to vectors gathered and scattered, which take three times as long. Numba is
-told of it when the first kernel is compiled, see `boulder_kernels._jit.when_compiling`.
+told of it when the package is imported.
 """
 
 from __future__ import annotations
