@@ -87,8 +87,8 @@ class LogLayer(NamedTuple):
     ----------
     from_m, to_m : float
         Its boundaries [m].
-    count : int
-        Number of its readings.
+    readings : int
+        Their number.
     angles : dict of str to float
         Friction angles [deg] by the sources of the correlations.
     scatter_deg : float
@@ -97,7 +97,7 @@ class LogLayer(NamedTuple):
 
     from_m: float
     to_m: float
-    count: int
+    readings: int
     angles: dict[str, float]
     scatter_deg: float
 
@@ -132,12 +132,13 @@ def layers_of(readings: list[dict[str, Any]], foot_m: float, scatter_deg: float,
     for (upper, below), cut in zip(pairwise(means), cuts, strict=True):
         bounds.append(depths[cut - 1] + reach if upper > below else max(0.0, depths[cut] - reach))
     bounds.append(last)
-    layers: list[LogLayer] = []
-    for group, top, bottom in zip(groups, bounds, bounds[1:], strict=False):
-        if bottom - top < 0.5 * WINDOW_M:  # a strong reading alone between weaker ones
-            continue
-        layers.append(_layer(readings[group], weights[group], float(top) if layers else 0.0, float(bottom)))
-    return layers
+    spans = list(pairwise(bounds))
+    firm = [group for group, (top, bottom) in zip(groups, spans, strict=True) if bottom - top >= 0.5 * WINDOW_M]
+    if firm and len(firm) < len(groups):  # without what is strong alone between weaker ones
+        kept = [reading for group in firm for reading in readings[group]]
+        return layers_of(kept, foot_m, scatter_deg, is_cone=is_cone)
+    each = zip(groups, spans, strict=True)
+    return [_layer(readings[group], weights[group], float(top), float(bottom)) for group, (top, bottom) in each]
 
 
 def _cuts(angles: np.ndarray, edges: np.ndarray, scatter_deg: float) -> list[int]:

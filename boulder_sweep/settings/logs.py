@@ -342,7 +342,7 @@ def _read_gef(path: Location, found: _Hole) -> None:
         if not record.strip():
             continue
         cells = [cell.strip() for cell in record.split(separator)]
-        if len(cells) <= max(depth, cone):
+        if len(cells) <= max(at.values()):
             raise refuse(label, f"has {len(cells)} cells; the header names more", number)
         z, q = (
             "" if found.number(cells[k], key, number) == voids.get(str(k + 1), math.nan) else cells[k]

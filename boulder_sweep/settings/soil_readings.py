@@ -52,6 +52,8 @@ _AT_LEAST = re.compile(
     r"|(?P<blows>\d+)\s*(?:/|\b(?:blows?\s+)?(?:for|in)\b)\s*(?P<driven>[\d.].*)|(?P<refusal>R|ref\.?|refusal)",
     re.IGNORECASE | re.ASCII,
 )
+_FIRST_M = 1.0
+"""Depth above which the first reading of a log is expected."""
 REFUSAL_BLOWS = 50
 """Blows at which a test is given up where the log has no count: within 150 mm, by ASTM D1586."""
 _DRIVEN_M = 0.3048
@@ -327,6 +329,7 @@ def _constants(
     if scatter_deg is not None:
         data |= {"correlation_sd_deg": sd, "scatter_sd_deg": scatter_deg}
         sd = math.ceil(100.0 * math.hypot(sd, scatter_deg) - 1e-9) / 100.0
+        data["total_sd_deg"] = sd
     if "friction_angle" in lacking:
         data |= {"friction_angle_deg": angle, "friction_angle_sd_deg": sd}
     if "density" in lacking:
@@ -359,22 +362,28 @@ def _of_log(
     layers: list[dict[str, Any]] = []
     for layer in found:
         constants = _constants(node, method, lacking, layer.angles, layer.scatter_deg)
-        said: dict[str, Any] = {"from_m": layer.from_m, "to_m": layer.to_m, "readings": layer.count}
+        said: dict[str, Any] = {"from_m": layer.from_m, "to_m": layer.to_m, "readings": layer.readings}
         layers.append(said | {"friction_angles_deg": layer.angles} | constants)
     data: dict[str, Any] = {"layers": layers}
     if not log.may_be_layered and len(layers) > 1:
-        weakest = min(layers, key=lambda layer: min(layer["friction_angles_deg"].values()))
+        weakest = min(layers, key=_weak_angle)
         return data | {"weakest_layer": layers.index(weakest)} | _taken(weakest)
-    for layer in layers[1:]:
-        spread = math.sqrt(math.log1p(layer["subgrade_reaction_cov"] ** 2))
-        low, high = layer.get("density_low_kg_m3", density_kg_m3), layer.get("density_high_kg_m3", density_kg_m3)
-        layer["weak"] = {
+    for deeper in layers[1:]:
+        spread = math.sqrt(math.log1p(deeper["subgrade_reaction_cov"] ** 2))
+        share = math.exp(-0.5 * spread * spread - FRACTILE_5 * spread)
+        low, high = (deeper.get(f"density_{end}_kg_m3", density_kg_m3 or 0.0) for end in ("low", "high"))
+        deeper["weak"] = {
             "density_kg_m3": low + 0.05 * (high - low),
-            "friction_angle_deg": layer["friction_angle_deg"] - FRACTILE_5 * layer["friction_angle_sd_deg"],
-            "subgrade_reaction_MN_m3": layer["subgrade_reaction_MN_m3"]
-            * math.exp(-0.5 * spread * spread - FRACTILE_5 * spread),
+            "friction_angle_deg": _weak_angle(deeper),
+            "subgrade_reaction_MN_m3": deeper["subgrade_reaction_MN_m3"] * share,
         }
     return data | _taken(layers[0])
+
+
+def _weak_angle(layer: dict[str, Any]) -> float:
+    """Return the friction angle [deg] that 5 % fall below."""
+    angle: float = min(layer["friction_angles_deg"].values())
+    return angle - FRACTILE_5 * float(layer["total_sd_deg"])
 
 
 def _taken(layer: dict[str, Any]) -> dict[str, Any]:
@@ -454,7 +463,7 @@ def _log_words(data: dict[str, Any], units: str) -> list[str]:
 
 
 def _remarks(data: dict[str, Any], units: str) -> list[str]:
-    """Return which readings are left out, and which are taken at the end of a range."""
+    """Return which readings are left out, which are taken at the end of a range, and where a log has none."""
     foot = quantity_text("m", units, data.get("foot_m", 0.0))
     kinds = (
         ("above_range", True, "above the range of the correlation, taken as its end"),
@@ -468,6 +477,11 @@ def _remarks(data: dict[str, Any], units: str) -> list[str]:
             depths = sorted(reading["depth_m"] for reading in some if "depth_m" in reading)
             where = f" at {_span(depths, units)}" if depths else ""
             remarks.append(f"{counted(len(some), 'reading')}{where} {words}")
+    depths = sorted(reading["depth_m"] for reading in _counting(data["readings"])) if "log" in data else []
+    if depths and depths[0] > _FIRST_M:
+        remarks.append(f"begins at {_span(depths[:1], units)}; its first reading stands for the soil above")
+    if depths and depths[-1] < data.get("foot_m", 0.0):
+        remarks.append(f"ends at {_span(depths[-1:], units)}; its last reading stands for the soil down to the foot")
     return remarks
 
 
@@ -522,7 +536,7 @@ def unfold_soils(
             with mistakes:
                 topsoil_m = read_single(topsoil.value, TOPSOIL)
                 if not set(given) & {*READING_FIELDS, LOG}:
-                    message = "topsoil says which readings are left out; give it with spt, cpt or log"
+                    message = "topsoil says which readings are left out; give it with spt or cpt, or with a log"
                     raise wrong(topsoil.position, message)
         beside = {key: soil.entries.pop(key) for key in (HOLE, ENERGY) if key in soil.entries}
         for key, one in beside.items():

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from boulder_sweep.settings.soil_readings import BELOW_FOOT
+from boulder_sweep.text import counted
+
 MOST_ROWS = 18
 """Most rows of readings."""
 _BAR = 30
@@ -15,31 +18,28 @@ def log_lines(data: dict[str, Any]) -> list[str]:
     Parameters
     ----------
     data
-        One of ``derived["soil"]`` of `boulder_sweep.settings.Sweep.derived`, made of a log. Readings below the first one
-        under the deepest foot are counted only, and of many the weaker ones stand for their neighbours.
+        One of ``derived["soil"]`` of `boulder_sweep.settings.Sweep.derived`, made of a log. Readings below the first
+        one under the deepest foot are counted only, and of many the weaker ones stand for their neighbours.
     """
     shown = sorted(
-        (one for one in data["readings"] if one.get("left_out") != "below the foot"), key=lambda one: one["depth_m"]
+        (one for one in data["readings"] if one.get("left_out") != BELOW_FOOT), key=lambda one: one["depth_m"]
     )
     each = -(-len(shown) // MOST_ROWS)
-    groups = [shown[at : at + each] for at in range(0, len(shown), each)]
-    rows = [min(group, key=_strength) for group in groups]
-    most = max(max(map(_strength, rows)), 1e-9)
-    marks: list[tuple[float, str]] = [(one["depth_m"], _row(one, most)) for one in rows]
+    rows = [min(shown[at : at + each], key=_strength) for at in range(0, len(shown), each)]
+    most = max(*map(_strength, rows), 1e-9)
+    marks = [(one["depth_m"], 1, _row(one, most)) for one in rows]
     for at, layer in enumerate(data.get("layers", ())):
-        marks.append((layer["from_m"], f"{'--- ' + _layer(data, layer, at):-<78}"))
+        marks.append((layer["from_m"], 0, f"--- {_layer(data, layer, at)} ".ljust(78, "-")))
     if "foot_m" in data:
-        marks.append(
-            (data["foot_m"], f"{'=== deepest foot of a boulder, ' + format(data['foot_m'], '.4g') + ' m ':=<78}")
-        )
+        marks.append((data["foot_m"], 2, f"=== deepest foot of a boulder, {data['foot_m']:.4g} m ".ljust(78, "=")))
     name = "q_c [MPa]" if data["method"] == "cpt" else "N" if "n" in shown[0] else "(N1)60"
     left = len(data["readings"]) - len(shown)
     hole = data["log"]["hole"] and f", hole {data['log']['hole']}"
     return [
         f"{data['log']['file']}{hole}",
         f"{'depth [m]':>9} {name:>9} {'angle [deg]':>11}",
-        *(line for _, line in sorted(marks, key=lambda mark: mark[0])),
-        *([f"{left} deeper readings do not count"] if left else []),
+        *(line for *_, line in sorted(marks)),
+        *([f"{counted(left, 'deeper reading')} left out"] if left else []),
     ]
 
 
@@ -63,6 +63,6 @@ def _layer(data: dict[str, Any], layer: dict[str, Any], at: int) -> str:
         return words
     mean = f"{layer['friction_angle_deg']:.1f} deg, sd {layer['friction_angle_sd_deg']:.1f} deg"
     if data.get("weakest_layer", at) != at:
-        return f"{words}{mean}, not taken "
+        return f"{words}{mean}, not taken"
     weak = f"taken as {layer['weak']['friction_angle_deg']:.1f} deg, the 5 % of " if "weak" in layer else ""
-    return f"{words}{weak}{mean} "
+    return f"{words}{weak}{mean}"
