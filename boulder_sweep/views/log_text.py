@@ -9,7 +9,7 @@ from boulder_sweep.text import counted
 
 MOST_ROWS = 18
 """Most rows of readings."""
-_BAR = 30
+_BAR = 24
 
 
 def log_lines(data: dict[str, Any]) -> list[str]:
