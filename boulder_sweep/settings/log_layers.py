@@ -18,6 +18,8 @@ from boulder_sweep.settings.problems import Position
 CONE = "q_c"
 WINDOW_M = 0.25
 """Thickness over which a cone is averaged: a boulder of a metre or two does not feel a thinner seam."""
+TEST_M = 0.45
+"""What a test with blow counts drives the sampler."""
 CORRELATION_LENGTH_M = 1.0
 """Depth within which readings tell of the same soil, so that a layer has one independent reading a metre."""
 FEWEST = 3
@@ -110,7 +112,8 @@ def layers_of(readings: list[dict[str, Any]], foot_m: float, scatter_deg: float,
     readings
         What counts, with depths and friction angles, see `boulder_sweep.settings.soil_readings`.
     foot_m
-        The deepest foot [m]; the last reading stands for the soil down to it.
+        The deepest foot [m]; the last reading stands for the soil down to it. One below it counts in full where it is
+        weaker than the one above, else for its share of the soil down to the foot.
     scatter_deg
         Standard deviation of the correlation [deg]: means that differ by more are those of two layers.
     is_cone
@@ -121,13 +124,15 @@ def layers_of(readings: list[dict[str, Any]], foot_m: float, scatter_deg: float,
     readings = list({round(one["depth_m"], 3): one for one in by_depth}.values())  # of one depth the weakest
     depths = np.array([reading["depth_m"] for reading in readings])
     angles = np.array([reading["friction_angle_deg"] for reading in readings])
-    last = max(foot_m if math.isfinite(foot_m) else 0.0, depths[-1] + 0.5 * WINDOW_M)
+    reach = 0.5 * WINDOW_M if is_cone else 0.0
+    last = max(foot_m if math.isfinite(foot_m) else 0.0, depths[-1] + (reach or TEST_M))
     edges = np.concatenate([[0.0], 0.5 * (depths[1:] + depths[:-1]), [last]])
-    weights = 0.5 * np.diff(edges**2)
+    adds_strength = len(depths) > 1 and depths[-1] > foot_m and angles[-1] >= angles[-2]
+    ends = np.append(edges[:-1], max(foot_m, edges[-2])) if adds_strength else edges
+    weights = 0.5 * np.diff(ends**2)
     cuts = _cuts(angles, edges, scatter_deg)
     groups = [slice(*ends) for ends in pairwise([0, *cuts, len(readings)])]
-    means = [float(np.average(angles[group], weights=weights[group])) for group in groups]
-    reach = 0.5 * WINDOW_M if is_cone else 0.0
+    means = [float(np.average(angles[group], weights=np.diff(edges**2)[group])) for group in groups]
     bounds = [0.0]
     for (upper, below), cut in zip(pairwise(means), cuts, strict=True):
         bounds.append(depths[cut - 1] + reach if upper > below else max(0.0, depths[cut] - reach))

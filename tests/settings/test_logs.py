@@ -278,6 +278,13 @@ def test_a_layer_has_the_mean_weighted_by_depth_and_its_scatter():
     assert (layer.from_m, layer.to_m, layer.readings) == (0.0, 3.0, 3)
 
 
+@pytest.mark.parametrize(("below", "weight"), [(36.5, 0.5 * (2.2**2 - 2.0**2)), (35.5, 0.5 * (2.95**2 - 2.0**2))])
+def test_a_reading_below_the_foot_adds_no_strength(below, weight):
+    """Its share above the foot counts where it is stronger than the one above, all of it where it is weaker."""
+    (layer,) = layers_of([reading(0.5, 34.0), reading(1.5, 36.0), reading(2.5, below)], 2.2, 3.0, is_cone=False)
+    assert layer.angles["a"] == pytest.approx((0.5 * 34.0 + 1.5 * 36.0 + weight * below) / (2.0 + weight))
+
+
 @pytest.mark.parametrize(
     ("angles", "tops"),
     [
@@ -293,7 +300,7 @@ def test_layers_are_parted_where_they_differ_by_more_than_the_scatter(angles, to
     rows = [reading(0.25 + 0.5 * at, float(angle)) for at, angle in enumerate(angles)]
     layers = layers_of(rows, 2.9, 3.0, is_cone=False)
     assert [layer.from_m for layer in layers] == tops
-    assert [layer.to_m for layer in layers] == [*tops[1:], 2.9]
+    assert [layer.to_m for layer in layers] == [*tops[1:], 2.75 + 0.45]
 
 
 def test_the_weakest_counts_of_few_readings():
