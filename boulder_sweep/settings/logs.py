@@ -43,15 +43,18 @@ _UNITS = {"depth": "m", CONE: "MPa"}
 _SAMPLES = {"depth": "Depth (m)", "n": "N", CONE: "qc (MPa)"}
 _NAMES = {
     "depth": "depth z top from depthfrom depthtop topdepth testdepth depthbgl depthbgs depthbelowground",
-    "n": "n spt sptn nspt nvalue sptnvalue sptvalue blows blowcount blowcounts sptblows sptblowcount nfield fieldn",
+    "n": "n spt sptn nspt nvalue sptnvalue sptvalue blows blowcount blowcounts sptblows sptblowcount nfield fieldn "
+    "uncorrectedn blowsft blowsfoot blowsperft blowsperfoot",
     "n60": "n60 sptn60",
     "n1_60": "n160",
-    CONE: "qc coneresistance tipresistance conetipresistance",
+    CONE: "qc coneresistance coneresistanceqc tipresistance conetipresistance",
     "energy_ratio": "energyratio er energy hammerenergy hammerefficiency",
     "hole": "hole borehole boring bh holeid boreholeid boringid locaid pointid",
 }
 """Names of the columns of a table by what they give, in small letters, without signs and units."""
 _KEYS = {name: key for key, names in _NAMES.items() for name in names.split()}
+_SPELLINGS = {unit.lower(): unit for unit in ("m", "cm", "ft", "in", "MPa", "kPa", "Pa", "tsf", "ksf", "psf", "psi")}
+"""Units as they are written by their small letters: real headers are often in capitals."""
 _COUNTS = ("n", "n60", "n1_60")
 _READINGS = (CONE, *_COUNTS)
 _OF_A_COUNT = {"1", "12", "30", "30.5", "300", "305", "0.3", "0.305"}
@@ -168,7 +171,8 @@ def _log_of(found: _Hole, node: Scalar, hole: Scalar) -> Log:
     remarks = [f"not used: {', '.join([shorten(name, 30) for name in unused[:_SHOWN]] + more)}"] if unused else []
     if len(readings) < len(given):
         remarks.append(f"{counted(len(given) - len(readings), 'row')} without a depth or a reading left out")
-    return Log(key, tuple(readings), node.text.strip(), names[0] if found.name is None else found.name, tuple(remarks))
+    name = shorten(next(iter(found.names)) if found.name is None else found.name)
+    return Log(key, tuple(readings), node.text.strip(), name, tuple(remarks))
 
 
 def _read_table(path: Location, found: _Hole) -> None:
@@ -210,8 +214,8 @@ def _column(name: str) -> tuple[str, str]:
     key = _KEYS.get(re.sub(r"[^a-z0-9]", "", stem.lower()), "")
     if not key and match is None:  # depth_m, qc MPa
         first, _, unit = re.sub(r"[\s,;/]+", "_", name.strip()).partition("_")
-        key = _KEYS.get(first.lower(), "")
-        key = key if unit and key in _UNITS and suffix_unit(unit, _UNITS[key]) else ""
+        key, unit = _KEYS.get(first.lower(), ""), unit.removeprefix("in_")
+        key = key if key in _UNITS and suffix_unit(_SPELLINGS.get(unit.lower(), unit), _UNITS[key]) else ""
     if key in _COUNTS and set(re.findall(r"[\d.]+", unit)) - _OF_A_COUNT:
         key = ""
     return key, unit if key else ""
@@ -223,7 +227,7 @@ def _size(unit: str, key: str, position: Position) -> float:
         return 0.01 if "%" in unit else 1.0
     plain = re.sub(r"\s*(bgl|bgs|below.*)$", "", unit, flags=re.IGNORECASE)
     try:
-        return float(factor(plain, _UNITS[key]))
+        return float(factor(_SPELLINGS.get(plain.lower(), plain), _UNITS[key]))
     except UnitError as error:
         words = str(error) if plain else f"the unit is missing; write {_SAMPLES[key]}"
         raise refuse(position.file, f"{key}: {words}", position.line or 1, position.column) from None

@@ -74,6 +74,9 @@ FILES = {
     "names.csv": table("Depth [m bgl];SPT N-value", COUNTS, ";"),
     "suffix.csv": table("depth_m,N_value", COUNTS),
     "feet.csv": table("Depth (ft),Blows (per ft)", [(z / 0.3048, n) for z, n in COUNTS]),
+    "capitals.csv": table("DEPTH (FT),BLOWS/FT", [(z / 0.3048, n) for z, n in COUNTS]),
+    "words.csv": table("Depth in ft,Uncorrected N", [(z / 0.3048, n) for z, n in COUNTS]),
+    "quoted.csv": table('"Depth, m","SPT ""N"" value"', COUNTS),
     "commas.csv": "Depth (m);N\n" + "".join(f"{z:.2f};{n}\n".replace(".", ",") for z, n in COUNTS),
     "increments.csv": table("Depth (m),Blow Count", [(z, f"4-{n - 9}-9") for z, n in COUNTS]),
     "tabs.csv": "# comment\n" + table("Depth (m)\tN\n", COUNTS, "\t"),
@@ -86,6 +89,7 @@ FILES = {
 def test_blow_counts_are_read_of_every_format(site, name):
     sweep = site(f"log: {name}\n  energy_ratio: 60 %", name, FILES[name])
     assert readings_of(sweep, "n") == COUNTS
+    assert derived_words(sweep.derived)[0].startswith(f"soil: {name}{', hole BH1' * name.endswith('.ags')}; friction")
     assert {reading["energy_ratio"] for reading in log_of(sweep)["readings"]} == {0.6}
 
 
@@ -95,6 +99,7 @@ CONES = {
     "tsf.csv": table("Depth (ft),qc (tsf)", [(z / 0.3048, q / 0.0957605179586737) for z, q in CONE]),
     "suffix.csv": table("depth_m,qc_MPa", CONE),
     "spaces.csv": table("depth m,qc MPa", CONE),
+    "capitals.csv": table("DEPTH (M),CONE RESISTANCE QC (MPA)", CONE),
     "cone.ags": ags_cone({"CPT1": CONE}),
     "kilo.ags": ags_cone({"CPT1": CONE}, unit="kPa", size=1e-3),
     "cone.gef": gef(CONE),
@@ -301,6 +306,19 @@ def test_layers_are_parted_where_they_differ_by_more_than_the_scatter(angles, to
     layers = layers_of(rows, 2.9, 3.0, is_cone=False)
     assert [layer.from_m for layer in layers] == tops
     assert [layer.to_m for layer in layers] == [*tops[1:], 2.75 + 0.45]
+
+
+def test_of_two_readings_at_one_depth_the_weaker_counts():
+    rows = [reading(0.5, 36.0), reading(1.0, 37.0), reading(1.0, 36.0), reading(1.0, 38.0), reading(1.5, 36.0)]
+    for order in (rows, rows[::-1]):
+        (layer,) = layers_of(order, 2.0, 3.0, is_cone=False)
+        assert (layer.readings, layer.scatter_deg) == (3, pytest.approx(0.0, abs=1e-6))
+        assert layer.angles["a"] == pytest.approx(36.0)
+
+
+def test_there_are_no_more_layers_than_are_simulated_side_by_side():
+    rows = [reading(1.0 + at, 4.0 * at) for at in range(12)]
+    assert len(layers_of(rows, 12.0, 3.0, is_cone=False)) == 8
 
 
 def test_the_weakest_counts_of_few_readings():
