@@ -30,8 +30,10 @@ from boulder_sweep.settings.problems import (
     unknown_word,
     wrong,
 )
+from boulder_sweep.settings.soil_readings import READING_FIELDS
 from boulder_sweep.settings.tree import Scalar
 from boulder_sweep.settings.units import UnitError, factor, suffix_unit
+from boulder_sweep.settings.values import outside
 from boulder_sweep.text import counted, why
 
 MOST_BYTES = 50_000_000
@@ -55,6 +57,8 @@ _NAMES = {
 _KEYS = {name: key for key, names in _NAMES.items() for name in names.split()}
 _SPELLINGS = {unit.lower(): unit for unit in ("m", "cm", "ft", "in", "MPa", "kPa", "Pa", "tsf", "ksf", "psf", "psi")}
 """Units as they are written by their small letters: real headers are often in capitals."""
+_DRIFT_MPA = 1.0
+"""How far below 0 a cone may drift."""
 _COUNTS = ("n", "n60", "n1_60")
 _READINGS = (CONE, *_COUNTS)
 _OF_A_COUNT = {"1", "12", "30", "30.5", "300", "305", "0.3", "0.305"}
@@ -88,29 +92,43 @@ class _Hole:
         self.readings: dict[str, list[LogReading]] = {}
         self.unused: list[str] = []
 
-    def add(self, hole: str, key: str, line: int, depth: str, text: str, ratio: str = "", unit: float = 1.0) -> None:
-        """Add a reading; depth in units of so many metres."""
+    def add(self, hole: str, key: str, at: Position, depth: str, text: str, ratio: str = "", unit: float = 1.0) -> None:
+        """Add a reading that stands at a place; depth in units of so many metres."""
         self.names[hole] = None
         if self.name not in (None, hole) or (self.name is None and len(self.names) > 1):
             return
         kind = self.readings.setdefault(key, [])
         if len(kind) >= MOST_READINGS:
-            raise refuse(self.label, f"has more than {MOST_READINGS:,} readings of a hole", line)
-        kind.append(LogReading(Position(self.label, line), unit * self.number(depth, "depth", line), text, ratio))
+            raise refuse(self.label, f"has more than {MOST_READINGS:,} readings of a hole", at.line)
+        line = Position(self.label, at.line)
+        metres = unit * self.number(depth, "depth", line)
+        self.check(metres, "depth", line)
+        kind.append(LogReading(at, metres, text, ratio))
 
-    def number(self, text: str, key: str, line: int) -> float:
+    def number(self, text: str, key: str, at: Position) -> float:
         """Return a number; NaN for an empty cell."""
         try:
             value = float(text) if text.strip() else math.nan
         except ValueError:
             value = math.inf
         if math.isinf(value) or (math.isnan(value) and text.strip()):
-            raise refuse(self.label, f"{key}: '{shorten(text)}' is not a number", line)
+            raise refuse(self.label, f"{key}: '{shorten(text)}' is not a number", at.line, at.column)
         return value
 
-    def cone(self, text: str, size: float, line: int) -> str:
+    def cone(self, text: str, size: float, at: Position) -> str:
         """Return a resistance in MPa; empty for an empty cell."""
-        return repr(size * self.number(text, CONE, line)) if text.strip() else ""
+        if not text.strip():
+            return ""
+        value = size * self.number(text, CONE, at)
+        self.check(value if value < -_DRIFT_MPA else max(0.0, value), CONE, at)
+        return repr(value)
+
+    def check(self, value: float, key: str, at: Position) -> None:
+        """Refuse a value that no reading has; NaN stands for none."""
+        if wrong_with := "" if math.isnan(value) else outside(value, READING_FIELDS["cpt"][key]):
+            raise refuse(
+                self.label, f"{key}: {wrong_with}; leave the cell empty where there is no reading", at.line, at.column
+            )
 
 
 def read_log(node: Scalar, hole: Scalar | None, folder: Path) -> Log:
@@ -198,12 +216,12 @@ def _read_table(path: Location, found: _Hole) -> None:
                     numbers = table.numbers(rows, columns[one], one, _UNITS[one], may_be_empty=True)
                     cells[one] = ["" if math.isnan(value) else repr(float(value)) for value in numbers]
             for at, row in enumerate(rows):
-                text, line = cells[key][at].strip(), row[1]
-                text = found.cone(text, sizes[key], line) if key == CONE else count_of(text)
+                text, place = cells[key][at].strip(), table.position(row, columns[key])
+                text = found.cone(text, sizes[key], place) if key == CONE else count_of(text)
                 ratio = cells["energy_ratio"][at].strip() if "energy_ratio" in cells else ""
                 ratio += "%" if ratio and sizes["energy_ratio"] < 1.0 and "%" not in ratio else ""
                 hole = cells["hole"][at].strip() if "hole" in cells else ""
-                found.add(hole, key, line, cells["depth"][at], text, ratio, sizes["depth"])
+                found.add(hole, key, place, cells["depth"][at], text, ratio, sizes["depth"])
     problems.raise_if_any()
 
 
@@ -286,26 +304,26 @@ def _read_ags(path: Location, found: _Hole) -> None:
                 }
             elif kind == "DATA":
                 row = {name: cell.strip() for name, cell in zip(names, cells, strict=True)}
-                _take_ags(found, group, row, sizes, line)
+                _take_ags(found, group, row, sizes, Position(label, line))
     except csv.Error:
         raise refuse(label, "cannot be read as AGS 4; is a quotation mark not closed?", rows.line_num) from None
 
 
-def _take_ags(found: _Hole, group: str, row: dict[str, str], sizes: dict[str, float], line: int) -> None:
+def _take_ags(found: _Hole, group: str, row: dict[str, str], sizes: dict[str, float], at: Position) -> None:
     """Take one row of a group."""
     cells = {key: row.get(name, "") for key, name in _AGS[group].items()}
     hole, unit = row.get("LOCA_ID", ""), sizes["depth"]
     if group == "SCPT":
-        found.add(hole, CONE, line, cells["depth"], found.cone(cells[CONE], sizes[CONE], line), unit=unit)
+        found.add(hole, CONE, at, cells["depth"], found.cone(cells[CONE], sizes[CONE], at), unit=unit)
         return
     text, reported = cells["n"], row.get("ISPT_REP", "")
     given_up = re.findall(r"(\d{1,4})\s*(?:/|for)\s*\d+\s*mm", reported, re.ASCII)
-    if found.number(row.get("ISPT_NPEN", ""), "ISPT_NPEN", line) < _WHOLE_MM or (given_up and not text):
+    if found.number(row.get("ISPT_NPEN", ""), "ISPT_NPEN", at) < _WHOLE_MM or (given_up and not text):
         text = f">{row.get('ISPT_MAIN') or ''.join(given_up[-1:]) or text or 50}"
     elif not text and (named := re.search(r"N\s*([=>])\s*(\d{1,4})", reported, re.ASCII)):
         text = named[2] if named[1] == "=" else f">{named[2]}"
     ratio = cells["energy_ratio"] and f"{cells['energy_ratio']}%"
-    found.add(hole, "n", line, cells["depth"], count_of(text), ratio, unit)
+    found.add(hole, "n", at, cells["depth"], count_of(text), ratio, unit)
 
 
 def _read_gef(path: Location, found: _Hole) -> None:
@@ -327,7 +345,7 @@ def _read_gef(path: Location, found: _Hole) -> None:
                 kind = CONE if values[-1] == _GEF_CONE else "depth"
                 sizes[column] = _size(values[1], kind, Position(label, end))
         elif key == "COLUMNVOID" and len(values) > 1:
-            voids[values[0]] = found.number(values[1], "COLUMNVOID", end)
+            voids[values[0]] = found.number(values[1], "COLUMNVOID", Position(label, end))
         elif key == "TESTID":
             hole = rest
         elif key == "COLUMNSEPARATOR":
@@ -342,6 +360,7 @@ def _read_gef(path: Location, found: _Hole) -> None:
     if depth is None or cone is None or min(depth, cone) < 0:
         raise refuse(label, "has no columns (#COLUMNINFO) of depth and cone resistance, quantities 1 and 2")
     for number, line in enumerate(lines[end:], end + 1):
+        place = Position(label, number)
         record = line.replace(ending, "") if ending else line
         if not record.strip():
             continue
@@ -349,10 +368,10 @@ def _read_gef(path: Location, found: _Hole) -> None:
         if len(cells) <= max(at.values()):
             raise refuse(label, f"has {len(cells)} cells; the header names more", number)
         z, q = (
-            "" if found.number(cells[k], key, number) == voids.get(str(k + 1), math.nan) else cells[k]
+            "" if found.number(cells[k], key, place) == voids.get(str(k + 1), math.nan) else cells[k]
             for k, key in ((depth, "depth"), (cone, CONE))
         )
-        found.add(hole, CONE, number, z, found.cone(q, sizes[cone], number), unit=sizes[depth])
+        found.add(hole, CONE, place, z, found.cone(q, sizes[cone], place), unit=sizes[depth])
 
 
 def _read_bro(path: Location, found: _Hole) -> None:
@@ -373,6 +392,7 @@ def _read_bro(path: Location, found: _Hole) -> None:
     depth = "depth" if "depth" in taken else "penetrationLength"
     if not {depth, "coneResistance"} <= set(taken):
         raise refuse(label, "has no depth, or no cone resistance")
+    place = Position(label, 1)
     hole = "".join(parts["broId"].itertext()).strip() if "broId" in parts else ""
     for record in values.text.strip().split(way.get("blockSeparator") or ";"):
         cells = [cell.strip() for cell in record.split(way.get("tokenSeparator") or ",")]
@@ -381,7 +401,7 @@ def _read_bro(path: Location, found: _Hole) -> None:
         if len(cells) != len(measured):
             raise refuse(label, f"has {len(cells)} values in a row; {len(measured)} are declared", 1)
         row = dict(zip(measured, ("" if cell == _BRO_EMPTY else cell for cell in cells), strict=True))
-        found.add(hole, CONE, 1, row[depth], found.cone(row["coneResistance"], 1.0, 1))
+        found.add(hole, CONE, place, row[depth], found.cone(row["coneResistance"], 1.0, place))
 
 
 _READERS: dict[str, Callable[[Location, _Hole], None]] = {

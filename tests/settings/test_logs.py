@@ -185,9 +185,10 @@ def test_tests_of_ags_that_were_given_up_are_at_least_so_much(site, row, n, is_l
 
 
 def test_the_energy_of_the_file_counts_before_that_of_the_settings(site):
-    text = "Depth (m),N,Energy ratio (%)\n0.5,17,72\n1.0,18,\n"
-    sweep = site("log: log.csv\n  energy_ratio: 60 %", "log.csv", text)
-    assert readings_of(sweep, "energy_ratio") == [(0.5, 0.72), (1.0, 0.6)]
+    for column, ratio in (("Energy ratio (%)", "72"), ("ER", "0.72"), ("ER", "72 %")):
+        text = f"Depth (m),N,{column}\n0.5,17,{ratio}\n1.0,18,\n"
+        sweep = site("log: log.csv\n  energy_ratio: 60 %", "log.csv", text)
+        assert readings_of(sweep, "energy_ratio") == [(0.5, 0.72), (1.0, 0.6)]
 
 
 @pytest.mark.parametrize(("column", "name"), [("N60", "n"), ("(N1)60", "n1_60")])
@@ -377,13 +378,18 @@ def test_deeper_layers_have_what_5_percent_fall_below(site):
     assert "ft" in derived_words(sweep.derived, "us")[0]
 
 
-@pytest.mark.parametrize("given_too", ["subgrade_reaction: 40 MN/m^3", "friction_angle: 36", "density: [1800, 1900]"])
+BELOW_IT = "layers: [{from: 3 m, density: 2000, friction_angle: 36, subgrade_reaction: 40}]"
+
+
+@pytest.mark.parametrize(
+    "given_too", ["subgrade_reaction: 40 MN/m^3", "friction_angle: 36", "density: [1800, 1900]", BELOW_IT]
+)
 def test_where_there_can_be_no_layers_the_weakest_stands_for_all_depths(site, given_too):
     sweep = site(f"log: log.csv\n  energy_ratio: 60 %\n  {given_too}", "log.csv", table("Depth (m),N", WEAK_BELOW))
-    assert not sweep.model.ground.layers
+    assert len(sweep.model.ground.layers) == int(given_too == BELOW_IT)
     data = log_of(sweep)
     assert data["weakest_layer"] == 1
-    if "friction_angle:" not in given_too:
+    if given_too != "friction_angle: 36":
         assert sweep.constants[ANGLE] == data["layers"][1]["friction_angle_deg"]
     assert "the weakest of 2 layers stands for all depths" in derived_words(sweep.derived)[0]
 
@@ -454,6 +460,9 @@ def test_what_a_log_does_not_reach_is_said(site):
         ("log.csv", "Depth (m),N60\n1,5-6\n", "'5-6'", 2),
         ("log.csv", "Depth (m),N60\n1,nan\n", "'nan' is not a finite number", 2),
         ("log.csv", "Depth (m),N60\n-1,20\n", "depth: -1 m is outside", 2),
+        ("log.csv", "Depth (m),qc (MPa)\n1,9\n2,-999.99\n", "q_c: -999.99 MPa is outside", 3),
+        ("log.csv", "Depth (m),qc (kPa)\n1,9000\n2,9e6\n", "q_c: 9000 MPa is outside", 3),
+        ("log.gef", gef([(0.5, 9), (1e9, 9)]), "depth: 1e+09 m is outside", 14),
         ("log.csv", "Depth (m),N60\nx,20\n", "depth: 'x' is not a number", 2),
         ("log.csv", "Depth (m),N60\n1,2000\n", "n60: 2000 is outside", 2),
         ("log.csv", "Depth (m),N60\n1,20,3\n", "has 3 cells", 2),
@@ -518,16 +527,16 @@ def test_voids_of_a_cone_are_left_out(site):
     sweep = site("log: log.gef", "log.gef", gef(rows))
     assert min(one["q_c_MPa"] for one in log_of(sweep)["readings"]) >= 9.0
     assert "80 rows without a depth or a reading left out" in derived_words(sweep.derived)[0]
+    rows = [(z, "-999999" if at % 5 == 0 else q) for at, (z, q) in enumerate(CONE)]
+    assert readings_of(site("log: log.xml", "log.xml", bro(rows)), "q_c_MPa") == readings_of(sweep, "q_c_MPa")
 
 
 def test_every_reading_that_is_wrong_is_named_once(site):
     text = table("Depth (m),N60", [(0.5, "abc"), (0.6, "abc"), (0.7, 5000), (0.8, 20)])
     with pytest.raises(SettingsError) as caught:
         site("log: log.csv", "log.csv", text)
-    assert [(problem.file.endswith("log.csv"), problem.line) for problem in caught.value.problems] == [
-        (True, 2),
-        (True, 4),
-    ]
+    problems = caught.value.problems
+    assert [(one.file[-7:], one.line, one.column) for one in problems] == [("log.csv", 2, 5), ("log.csv", 4, 5)]
 
 
 def test_sizes_are_capped(site, refusal, monkeypatch):
