@@ -44,7 +44,7 @@ _SHOWN = 10
 _UNITS = {"depth": "m", CONE: "MPa"}
 _SAMPLES = {"depth": "Depth (m)", "n": "N", CONE: "qc (MPa)"}
 _NAMES = {
-    "depth": "depth z top from depthfrom depthtop topdepth testdepth depthbgl depthbgs depthbelowground",
+    "depth": "depth top from depthfrom depthtop topdepth testdepth depthbgl depthbgs depthbelowground",
     "n": "n spt sptn nspt nvalue sptnvalue sptvalue blows blowcount blowcounts sptblows sptblowcount nfield fieldn "
     "uncorrectedn blowsft blowsfoot blowsperft blowsperfoot",
     "n60": "n60 sptn60",
@@ -282,13 +282,13 @@ def _read_ags(path: Location, found: _Hole) -> None:
     label, text = found.label, _text_of(path)
     if '"**' in text[:100_000]:
         raise refuse(label, "is AGS 3; save it as AGS 4")
-    group, names, sizes = "", [""], {"depth": 1.0, CONE: 1.0}
+    group, names, sizes = "", [""], dict.fromkeys(_UNITS, 1.0)
     rows = csv.reader(io.StringIO(text, newline=""))
     try:
         for cells in rows:
             kind, line = cells[0].strip() if cells else "", rows.line_num
             if kind == "GROUP":
-                group = "".join(cells[1:2]).strip()
+                group, names, sizes = "".join(cells[1:2]).strip(), [], dict.fromkeys(_UNITS, 1.0)
             elif group not in _AGS:
                 continue
             elif kind == "HEADING":

@@ -95,7 +95,7 @@ def test_blow_counts_are_read_of_every_format(site, name):
 
 CONES = {
     "cone.csv": table("Depth (m),qc (MPa)", CONE),
-    "kilo.csv": table("z [m],Cone resistance [kPa]", [(z, 1e3 * q) for z, q in CONE]),
+    "kilo.csv": table("Depth [m],Cone resistance [kPa]", [(z, 1e3 * q) for z, q in CONE]),
     "tsf.csv": table("Depth (ft),qc (tsf)", [(z / 0.3048, q / 0.0957605179586737) for z, q in CONE]),
     "suffix.csv": table("depth_m,qc_MPa", CONE),
     "spaces.csv": table("depth m,qc MPa", CONE),
@@ -455,6 +455,7 @@ def test_what_a_log_does_not_reach_is_said(site):
         ("log.csv", "Depth (m),qc\n1,20\n", "the unit is missing; write qc (MPa)", 1),
         ("log.csv", "Depth (m),qc (kN)\n1,20\n", "q_c: ", 1),
         ("log.csv", "Depth (m),Blows (per 100 mm)\n1,20\n", "needs a column of depth and one of N or q_c", 1),
+        ("log.csv", "z (m),N\n1,20\n", "needs a column of depth and one of N or q_c", 1),  # may be an elevation
         ("log.csv", "Tiefe (m),N\n1,20\n", "needs a column of depth and one of N or q_c", 1),
         ("log.csv", "Depth (m),N60\n1,abc\n", "'abc' is not a number", 2),
         ("log.csv", "Depth (m),N60\n1,5-6\n", "'5-6'", 2),
@@ -470,6 +471,7 @@ def test_what_a_log_does_not_reach_is_said(site):
         ("log.ags", "hello", "has no rows with a depth and a reading", 5),
         ("log.ags", '"**ISPT"\n"*HOLE_ID"\n', "is AGS 3", 5),
         ("log.ags", '"GROUP","ISPT"\n"HEADING","LOCA_ID","ISPT_TOP"\n"DATA","B"\n', "has 2 cells", 3),
+        ("log.ags", '"GROUP","ISPT"\n"DATA","B","1"\n', "has 3 cells; the headings of ISPT are 0", 2),
         ("log.ags", ags_counts({"A": COUNTS}, unit="furlong"), "depth: ", 21),
         ("log.ags", ags_counts({"A": COUNTS}).replace('"0.5"', '"x"'), "depth: 'x' is not a number", 23),
         ("log.ags", b"\x00\x01", "is not a text file", 5),
