@@ -49,7 +49,7 @@ _NAMES = {
     "uncorrectedn blowsft blowsfoot blowsperft blowsperfoot",
     "n60": "n60 sptn60",
     "n1_60": "n160",
-    CONE: "qc coneresistance coneresistanceqc tipresistance conetipresistance",
+    CONE: "qc coneresistance coneresistanceqc tipresistance conetipresistance qt correctedconeresistance",
     "energy_ratio": "energyratio er energy hammerenergy hammerefficiency",
     "hole": "hole borehole boring bh holeid boreholeid boringid locaid pointid",
 }
@@ -335,7 +335,7 @@ def _read_gef(path: Location, found: _Hole) -> None:
     voids: dict[str, float] = {}
     hole, separator, ending, end = "", None, "", 0
     for end, line in enumerate(lines, 1):
-        match = re.fullmatch(r"#\s*(\w+)\s*=\s*(.*?)\s*", line)
+        match = re.fullmatch(r"\s*#\s*(\w+)\s*=\s*(.*?)\s*", line)
         key, rest = (match[1].upper(), match[2]) if match else ("", "")
         values = [value.strip() for value in rest.split(",")]
         if key == "COLUMNINFO" and len(values) > 3 and values[0].isascii() and values[0].isdecimal():
@@ -374,6 +374,11 @@ def _read_gef(path: Location, found: _Hole) -> None:
         found.add(hole, CONE, place, z, found.cone(q, sizes[cone], place), unit=sizes[depth])
 
 
+def _by_name(root: ElementTree.Element) -> dict[str, ElementTree.Element]:
+    """Return the first element of each name, without namespaces."""
+    return {part.tag.rpartition("}")[2]: part for part in reversed(list(root.iter())) if isinstance(part.tag, str)}
+
+
 def _read_bro(path: Location, found: _Hole) -> None:
     """Read a cone of the Dutch register (BRO-XML): flags of the measured quantities, and their values as one text."""
     label, text = found.label, _text_of(path)
@@ -383,8 +388,9 @@ def _read_bro(path: Location, found: _Hole) -> None:
         root = ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError):
         raise refuse(label, "cannot be read as XML") from None
-    parts = {part.tag.rpartition("}")[2]: part for part in reversed(list(root.iter())) if isinstance(part.tag, str)}
-    flags, values, way = parts.get("parameters"), parts.get("values"), parts.get("TextEncoding")
+    parts = _by_name(root)
+    result = _by_name(parts["cptResult"]) if "cptResult" in parts else {}  # dissipation tests have values, too
+    flags, values, way = parts.get("parameters"), result.get("values"), result.get("TextEncoding")
     if flags is None or values is None or way is None or not values.text:
         raise refuse(label, "is no cone log of the BRO: parameters, values or their encoding are missing")
     measured = [flag.tag.rpartition("}")[2] for flag in flags]

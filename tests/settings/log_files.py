@@ -80,7 +80,8 @@ def bro(pairs: Pairs) -> str:
     values = "".join(f"{z + 0.1},{z},-999999,{q},0.02;" for z, q in pairs)
     return (
         '<?xml version="1.0" encoding="UTF-8"?>\n<d:response xmlns:d="urn:d" xmlns:c="urn:c" xmlns:s="urn:s">'
-        f"<c:broId>CPT000000000001</c:broId><c:parameters>{flags}</c:parameters>"
+        f"<c:broId>CPT000000000001</c:broId><c:disResult><c:values>1,2;</c:values></c:disResult>"
+        f"<c:parameters>{flags}</c:parameters>"
         '<c:cptResult><s:TextEncoding decimalSeparator="." tokenSeparator="," blockSeparator=";"/>'
         f"<c:values>{values}</c:values></c:cptResult></d:response>"
     )

@@ -98,13 +98,14 @@ CONES = {
     "kilo.csv": table("Depth [m],Cone resistance [kPa]", [(z, 1e3 * q) for z, q in CONE]),
     "tsf.csv": table("Depth (ft),qc (tsf)", [(z / 0.3048, q / 0.0957605179586737) for z, q in CONE]),
     "suffix.csv": table("depth_m,qc_MPa", CONE),
-    "spaces.csv": table("depth m,qc MPa", CONE),
+    "spaces.csv": table("depth m,qt MPa", CONE),
     "capitals.csv": table("DEPTH (M),CONE RESISTANCE QC (MPA)", CONE),
     "cone.ags": ags_cone({"CPT1": CONE}),
     "kilo.ags": ags_cone({"CPT1": CONE}, unit="kPa", size=1e-3),
     "cone.gef": gef(CONE),
     "separated.gef": gef(CONE, separator=";", ending="!"),
     "deep.gef": gef(CONE, depth="m"),
+    "indented.gef": gef(CONE).replace("#", "  #"),
     "cone.xml": bro(CONE),
 }
 
@@ -202,6 +203,19 @@ def test_what_is_not_used_is_said_in_one_line(site):
     assert words.count("not used: N60, Recovery, Note;") == 1
     assert words.endswith("2 rows without a depth or a reading left out")
     assert words.startswith("soil: log.csv, hole B; friction angle")
+
+
+def test_letters_of_any_encoding_cost_no_number(site):
+    text = ags_counts({"BH1": COUNTS}).replace("made up", "Größe 5° m²").encode("latin-1")
+    assert readings_of(site("log: log.ags", "log.ags", text), "n") == COUNTS
+    assert readings_of(site("log: log.csv", "log.csv", "\ufeff" + table("Depth (m),N60", COUNTS)), "n") == COUNTS
+
+
+def test_a_hole_that_stands_twice_in_a_file_is_one(site):
+    once, twice = (site("log: log.ags", "log.ags", ags_counts({"BH1": COUNTS}) * times) for times in (1, 2))
+    assert readings_of(twice, "n") == sorted(COUNTS * 2)
+    assert twice.constants == once.constants
+    assert twice.distributions == once.distributions
 
 
 # --- Holes ---
