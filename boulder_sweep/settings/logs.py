@@ -30,7 +30,7 @@ from boulder_sweep.settings.problems import (
     unknown_word,
     wrong,
 )
-from boulder_sweep.settings.soil_readings import READING_FIELDS
+from boulder_sweep.settings.soil_readings import READING_FIELDS, REFUSAL_BLOWS
 from boulder_sweep.settings.tree import Scalar
 from boulder_sweep.settings.units import UnitError, factor, suffix_unit
 from boulder_sweep.settings.values import outside
@@ -319,7 +319,8 @@ def _take_ags(found: _Hole, group: str, row: dict[str, str], sizes: dict[str, fl
     text, reported = cells["n"], row.get("ISPT_REP", "")
     given_up = re.findall(r"(\d{1,4})\s*(?:/|for)\s*\d+\s*mm", reported, re.ASCII)
     if found.number(row.get("ISPT_NPEN", ""), "ISPT_NPEN", at) < _WHOLE_MM or (given_up and not text):
-        text = f">{row.get('ISPT_MAIN') or ''.join(given_up[-1:]) or text or 50}"
+        at_most = min(int(text[:9]), REFUSAL_BLOWS) if text.isdecimal() else REFUSAL_BLOWS  # more is extrapolated
+        text = f">{row.get('ISPT_MAIN') or ''.join(given_up[-1:]) or at_most}"
     elif not text and (named := re.search(r"N\s*([=>])\s*(\d{1,4})", reported, re.ASCII)):
         text = named[2] if named[1] == "=" else f">{named[2]}"
     ratio = cells["energy_ratio"] and f"{cells['energy_ratio']}%"

@@ -161,7 +161,8 @@ def test_increments_count_without_the_first(cell, text):
     [
         ({"ISPT_NVAL": "35", "ISPT_NPEN": "450", "ISPT_REP": "6,8/8,9,9,9 N=35"}, 35, False),
         ({"ISPT_NVAL": "200", "ISPT_MAIN": "50", "ISPT_NPEN": "225"}, 50, True),
-        ({"ISPT_NVAL": "200", "ISPT_NPEN": "140"}, 200, True),
+        ({"ISPT_NVAL": "200", "ISPT_NPEN": "140"}, 50, True),
+        ({"ISPT_NVAL": "28", "ISPT_NPEN": "440"}, 28, True),
         ({"ISPT_REP": "6,8/8,9,9,9 N=35"}, 35, False),
         ({"ISPT_REP": "25,25/50 for 75mm"}, 50, True),
         ({"ISPT_REP": "50/75mm"}, 50, True),
