@@ -95,9 +95,14 @@ Example:
 @grid_argument
 @set_option
 def check(grid: str, overrides: tuple[str, ...]) -> int:
-    """Check GRID: all mistakes at once, with file, line and column, and notes on what deserves a second look."""
+    """Check GRID: all mistakes at once, with file, line and column, and notes on what deserves a second look.
+
+    The log of a borehole or of a cone is drawn, with the layers made of it.
+    """
     from boulder_sweep.cli import console
+    from boulder_sweep.views.log_text import log_lines
 
     sweep = load_sweep(grid, overrides, quiet=False)
-    show(f"{grid}: valid", *console.grid_lines(sweep))
+    logs = [log_lines(data) for data in sweep.derived.get("soil", ()) if "log" in data]
+    show(f"{grid}: valid", *console.grid_lines(sweep), *(line for lines in logs for line in ("", *lines)))
     return 0

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import re
 import zipfile
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import closing
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -76,9 +76,8 @@ def read_designs(node: Scalar, folder: Path, problems: ProblemList) -> DesignLis
     DesignList or None
         None where the table cannot be used; the problems say why.
     """
-    text = node.text.strip()
     try:
-        path = location_of(text) if is_url(text) else folder / Path(text)
+        path = located(node.text, folder)
     except LocationError as refused:
         problems.add(node.position, "table", str(refused))
         return None
@@ -101,6 +100,42 @@ def read_designs(node: Scalar, folder: Path, problems: ProblemList) -> DesignLis
     if len(problems.problems) == before and not designs.columns:
         problems.add(node.position, "table", f"{path} has no column that is an input")
     return None if len(problems.problems) > before else designs
+
+
+def located(name: str, folder: Path) -> Location:
+    """Return where a file lies by its name or URL; relative names begin in `folder`.
+
+    Raises
+    ------
+    LocationError
+        It is the URL of nothing that can be opened.
+    """
+    name = name.strip()
+    return location_of(name) if is_url(name) else folder / Path(name)
+
+
+@contextmanager
+def open_table(path: Location, most_rows: int, known: Sequence[str], problems: ProblemList) -> Iterator[TextTable]:
+    """Open a text file, or the first sheet of a spreadsheet (.xlsx), as a table; see `open_text`.
+
+    In a spreadsheet row and column of a cell are its position. Empty rows are skipped, formulas count by their stored
+    value.
+
+    Raises
+    ------
+    SettingsError
+        The file cannot be read at all, or openpyxl is not installed.
+    """
+    if path.suffix.lower() != ".xlsx":
+        with open_text(path, most_rows, known, problems) as table:
+            yield table
+        return
+    label = str(path)
+    try:
+        from openpyxl import load_workbook  # an extra, for tables in this format only
+    except ImportError:
+        raise refuse(label, "spreadsheets need openpyxl: pip install 'boulder-sweep[report]'") from None
+    yield TextTable(label, _sheet_rows(path, load_workbook), "", known, problems)
 
 
 def _designs_of(table: TextTable, path: Location, problems: ProblemList) -> DesignList:
@@ -164,32 +199,9 @@ def _are_numbers(cells: Iterable[str]) -> bool:
         return False
 
 
-def _read_csv(path: Location, problems: ProblemList) -> DesignList:
-    with open_text(path, MAX_TABLE_ROWS, _NAMES, problems) as table:
+def _read_rows(path: Location, problems: ProblemList) -> DesignList:
+    with open_table(path, MAX_TABLE_ROWS, _NAMES, problems) as table:
         return _designs_of(table, path, problems)
-
-
-def _read_xlsx(path: Location, problems: ProblemList) -> DesignList:
-    """Return the designs of the first sheet of a spreadsheet; row and column of a cell are its position.
-
-    Parameters
-    ----------
-    path : Path or UPath
-        Excel workbook; first row the column names. Empty rows are skipped, formulas count by their stored value.
-    problems : ProblemList
-        Receives mistakes.
-
-    Raises
-    ------
-    SettingsError
-        The file cannot be read at all, or openpyxl is not installed.
-    """
-    label = str(path)
-    try:
-        from openpyxl import load_workbook  # an extra, for tables in this format only
-    except ImportError:
-        raise refuse(label, "spreadsheets need openpyxl: pip install 'boulder-sweep[report]'") from None
-    return _designs_of(TextTable(label, _sheet_rows(path, load_workbook), "", _NAMES, problems), path, problems)
 
 
 def _sheet_rows(path: Location, load_workbook: Callable[..., Any]) -> Iterator[Row]:
@@ -337,8 +349,8 @@ def _label(name: str, cells: pa.ChunkedArray, label: str) -> Label:
 
 
 _READERS: dict[str, Callable[[Location, ProblemList], DesignList]] = {
-    ".csv": _read_csv,
-    ".xlsx": _read_xlsx,
+    ".csv": _read_rows,
+    ".xlsx": _read_rows,
     ".parquet": _read_columns,
 }
 """By the end of the file's name."""

@@ -14,9 +14,10 @@ import numpy as np
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.choices import SIDES, read_setting, shares_of, sides_of, unfold_scan
 from boulder_sweep.settings.distributions import Distribution, Input, SetDistributions, read_input
+from boulder_sweep.settings.log_layers import Log
 from boulder_sweep.settings.problems import Mistakes, Position, ProblemList, shorten, unknown_word, wrong
 from boulder_sweep.settings.shape import ProfilePoint
-from boulder_sweep.settings.soil_readings import CORRELATION, METHODS, SOIL_KEYS, TOPSOIL, unfold_soils
+from boulder_sweep.settings.soil_readings import CORRELATION, ENERGY, HOLE, METHODS, SOIL_KEYS, TOPSOIL, unfold_soils
 from boulder_sweep.settings.sweep import SECTION, DesignList
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
 from boulder_sweep.settings.values import meant_by, read_single
@@ -29,7 +30,7 @@ NAME = re.compile(r"\w[\w .+-]{0,79}")
 NAME_RULE = "must be at most 80 letters, digits, spaces and - _ . +, as in m30-sizing"
 """The same in words."""
 TOP_KEYS = ("name", *fields.SECTIONS, "table", SECTION, fields.ALLOW_UNUSUAL)
-SITE_KEYS = {"soil": (*METHODS, TOPSOIL.key), "vehicle": (APPROACH,)}
+SITE_KEYS = {"soil": (*METHODS, HOLE, ENERGY, TOPSOIL.key), "vehicle": (APPROACH,)}
 """Keys of a block that stand for others, as the site gives them."""
 DRAWN_SD = 5.0
 """Standard deviations above its mean up to which values of an uncertain input are drawn, but for one in three million.
@@ -117,8 +118,14 @@ class Entries:
         """Replace the readings of an investigation by soil constants."""
         listed = [key for key in SOIL_KEYS if fields.BY_PATH[f"soil.{key}"].name in self.listed]
         with self.reporting("soil", [f"soil.{key}" for key in SOIL_KEYS]) as mistakes:
-            soils = unfold_soils(self.root, listed, self._deepest_foot(), mistakes)
+            soils = unfold_soils(self.root, listed, self._deepest_foot(), mistakes, self._read_log)
         self.derived |= {"soil": soils} if soils else {}
+
+    def _read_log(self, node: Scalar, hole: Scalar | None) -> Log:
+        """Read the log of a borehole or of a cone."""
+        from boulder_sweep.settings.logs import read_log  # needed for logs only
+
+        return read_log(node, hole, self._folder_of(node.position))
 
     def _deepest_foot(self) -> float:
         """Return the deepest foot of all designs [m]; infinity where mistakes leave it unknown."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from boulder_sweep import investigation as sand
 from boulder_sweep.settings.distributions import FRACTILE_5
 from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.settings.log_layers import CONE, FEWEST, WINDOW_M, Log, layers_of
 from boulder_sweep.settings.model import Bound, Field
 from boulder_sweep.settings.problems import LeafError, Mistake, Mistakes, Position, wrong
 from boulder_sweep.settings.shown_units import quantity_text
@@ -51,6 +52,8 @@ _AT_LEAST = re.compile(
     r"|(?P<blows>\d+)\s*(?:/|\b(?:blows?\s+)?(?:for|in)\b)\s*(?P<driven>[\d.].*)|(?P<refusal>R|ref\.?|refusal)",
     re.IGNORECASE | re.ASCII,
 )
+_FIRST_M = 1.0
+"""Depth above which the first reading of a log is expected."""
 REFUSAL_BLOWS = 50
 """Blows at which a test is given up where the log has no count: within 150 mm, by ASTM D1586."""
 _DRIVEN_M = 0.3048
@@ -67,7 +70,9 @@ TOPSOIL = Field(
     "depth of the topsoil: readings in it are left out",
     Bound(0.0, 0.5, "what lies deeper bears; give soil.layers"),
 )
-METHODS = (*READING_FIELDS, RELATIVE_DENSITY.key)
+LOG, HOLE, ENERGY = "log", "hole", "energy_ratio"
+"""A file with readings; beside it the hole in it, and the energy of the hammer where the file does not give it."""
+METHODS = (*READING_FIELDS, RELATIVE_DENSITY.key, LOG)
 SOURCE_OF_DENSITY = "EM 1110-2-2504, Table 3-1"
 _SCATTER_DEG = {"spt": sand.SPT_SD_DEG, "cpt": sand.CPT_SD_DEG, RELATIVE_DENSITY.key: sand.DENSITY_SD_DEG}
 CORRELATION = 0.99
@@ -270,6 +275,7 @@ def soil_of(
     density_kg_m3: float | None,
     foot_m: float = math.inf,
     topsoil_m: float = 0.0,
+    log: Log | None = None,
 ) -> dict[str, Any]:
     """Return the soil constants by readings as plain data: the readings, and what is taken of them.
 
@@ -287,6 +293,8 @@ def soil_of(
         The deepest foot of all designs [m].
     topsoil_m : float
         Depth of the topsoil [m].
+    log : Log, optional
+        The file that the readings are from, which makes layers of them.
 
     Raises
     ------
@@ -296,17 +304,32 @@ def soil_of(
     located = readings_of(node, method, density_kg_m3)
     readings = [reading for _, reading in located]
     data: dict[str, Any] = {"method": method, "readings": readings}
+    if log is not None:
+        data["log"] = {"file": log.file, "hole": log.hole, "remarks": list(log.remarks)}
+        data |= {} if math.isinf(foot_m) else {"foot_m": foot_m}
     if not lacking:
         return data
     _leave_out(located, foot_m, topsoil_m)
     _take_angles(node, method, located, lacking)
     if any(reading.get("left_out") == BELOW_FOOT for reading in readings):
         data["foot_m"] = foot_m
-    angles = _weakest(readings)["friction_angles_deg"]
+    if log is None:
+        return data | _constants(node, method, lacking, _weakest(readings)["friction_angles_deg"])
+    return data | _of_log(node, method, lacking, readings, log, density_kg_m3, foot_m)
+
+
+def _constants(
+    node: Node, method: str, lacking: Collection[str], angles: dict[str, float], scatter_deg: float | None = None
+) -> dict[str, Any]:
+    """Return the soil constants by the friction angles [deg] of some correlations, and the scatter of readings."""
     source = min(angles, key=angles.__getitem__)
     angle, highest = angles[source], max(angles.values())
     sd = max(_SCATTER_DEG[method], math.ceil(100.0 * (highest - angle) / FRACTILE_5) / 100.0)
-    data["source"] = source
+    data: dict[str, Any] = {"source": source}
+    if scatter_deg is not None:
+        data |= {"correlation_sd_deg": sd, "scatter_sd_deg": scatter_deg}
+        sd = math.ceil(100.0 * math.hypot(sd, scatter_deg) - 1e-9) / 100.0
+        data["total_sd_deg"] = sd
     if "friction_angle" in lacking:
         data |= {"friction_angle_deg": angle, "friction_angle_sd_deg": sd}
     if "density" in lacking:
@@ -322,6 +345,52 @@ def soil_of(
     return data
 
 
+def _of_log(
+    node: Node,
+    method: str,
+    lacking: Collection[str],
+    readings: list[dict[str, Any]],
+    log: Log,
+    density_kg_m3: float | None,
+    foot_m: float,
+) -> dict[str, Any]:
+    """Return the constants of the uppermost layer of a log, and of the deeper ones what 5 % fall below.
+
+    Only single values can be given for deeper layers. Where there can be none, the weakest layer counts at every depth.
+    """
+    found = layers_of(_counting(readings), foot_m, _SCATTER_DEG[method], is_cone=method == "cpt")
+    layers: list[dict[str, Any]] = []
+    for layer in found:
+        constants = _constants(node, method, lacking, layer.angles, layer.scatter_deg)
+        said: dict[str, Any] = {"from_m": layer.from_m, "to_m": layer.to_m, "readings": layer.readings}
+        layers.append(said | {"friction_angles_deg": layer.angles} | constants)
+    data: dict[str, Any] = {"layers": layers}
+    if not log.may_be_layered and len(layers) > 1:
+        weakest = min(layers, key=_weak_angle)
+        return data | {"weakest_layer": layers.index(weakest)} | _taken(weakest)
+    for deeper in layers[1:]:
+        spread = math.sqrt(math.log1p(deeper["subgrade_reaction_cov"] ** 2))
+        share = math.exp(-0.5 * spread * spread - FRACTILE_5 * spread)
+        low, high = (deeper.get(f"density_{end}_kg_m3", density_kg_m3 or 0.0) for end in ("low", "high"))
+        deeper["weak"] = {
+            "density_kg_m3": low + 0.05 * (high - low),
+            "friction_angle_deg": _weak_angle(deeper),
+            "subgrade_reaction_MN_m3": deeper["subgrade_reaction_MN_m3"] * share,
+        }
+    return data | _taken(layers[0])
+
+
+def _weak_angle(layer: dict[str, Any]) -> float:
+    """Return the friction angle [deg] that 5 % fall below."""
+    angle: float = min(layer["friction_angles_deg"].values())
+    return angle - FRACTILE_5 * float(layer["total_sd_deg"])
+
+
+def _taken(layer: dict[str, Any]) -> dict[str, Any]:
+    """Return the constants of a layer."""
+    return {name: value for name, value in layer.items() if name not in ("from_m", "to_m", "readings", "weak")}
+
+
 def _counting(readings: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return [reading for reading in readings if "left_out" not in reading]
 
@@ -332,23 +401,28 @@ def _weakest(readings: list[dict[str, Any]]) -> dict[str, Any]:
 
 def soil_words(data: dict[str, Any], units: str = "si") -> str:
     """Return in one line what is taken of readings, by what `soil_of` returned."""
+    remarks = data["log"]["remarks"] if "log" in data else []
     if not data.keys() & {"friction_angle_deg", "density_low_kg_m3", "subgrade_reaction_MN_m3"}:
-        return "the readings are kept for the record: the file gives every constant"
+        return "; ".join(["the readings are kept for the record: the file gives every constant", *remarks])
+    if "log" in data:
+        return "; ".join([*_log_words(data, units), *_remarks(data, units), *remarks])
     weakest = _weakest(data["readings"])
     count = len(_counting(data["readings"]))
-    of = f", the weakest of {count} readings" if count > 1 else ""
+    of = f"{_reading_words(weakest, units)}{f', the weakest of {count} readings' if count > 1 else ''}"
+    parts = _constant_words(data, weakest.get("friction_angles_deg", {}), of, units)
+    return "; ".join([*parts, *_remarks(data, units)])
+
+
+def _constant_words(data: dict[str, Any], angles: dict[str, float], of: str, units: str) -> list[str]:
+    """Return the constants that readings give, and by what."""
     parts = []
     if "friction_angle_deg" in data:
         angle, sd = data["friction_angle_deg"], data["friction_angle_sd_deg"]
         others = "".join(
-            f"; by {name} it is {other:.4g} deg"
-            for name, other in weakest.get("friction_angles_deg", {}).items()
-            if name != data["source"]
+            f"; by {name} it is {other:.4g} deg" for name, other in angles.items() if name != data["source"]
         )
         source = f"{data['source']}{', the lowest' if others else ''}{others}"
-        parts.append(
-            f"friction angle {angle:.4g} deg, sd {sd:g} deg, by {_reading_words(weakest, units)}{of} ({source})"
-        )
+        parts.append(f"friction angle {angle:.4g} deg, sd {sd:.3g} deg, by {of} ({source})")
     if "density_low_kg_m3" in data:
         ends = data["density_low_kg_m3"], data["density_high_kg_m3"]
         density = quantity_text("kg/m^3", units, *ends, digits=".0f")
@@ -357,11 +431,39 @@ def soil_words(data: dict[str, Any], units: str = "si") -> str:
         beta = quantity_text("MN/m^3", units, data["subgrade_reaction_MN_m3"], digits=".3g")
         cov = data["subgrade_reaction_cov"]
         parts.append(f"subgrade reaction {beta}, cov {100.0 * cov:.0f} %, which follows the angle (API)")
-    return "; ".join([*parts, *_remarks(data, units)])
+    return parts
+
+
+def _log_words(data: dict[str, Any], units: str) -> list[str]:
+    """Return what is taken of the layers of a log."""
+    layers, log = data["layers"], data["log"]
+    kind = f"means of the cone over {quantity_text('m', units, WINDOW_M)}" if data["method"] == "cpt" else "blow counts"
+    parts = [", hole ".join(filter(None, (log["file"], log["hole"])))]
+    if "weakest_layer" in data:
+        parts.append(f"the weakest of {len(layers)} layers stands for all depths")
+        layers = [layers[data["weakest_layer"]]]
+    for layer in layers:
+        count, ends = layer["readings"], [layer["from_m"], layer["to_m"]]
+        of = f"{count} {kind} at {quantity_text('m', units, *ends, digits='.3g')}"
+        if count >= FEWEST:
+            correlation, mean = layer["correlation_sd_deg"], layer["scatter_sd_deg"]
+            of += f", sd {correlation:.3g} deg of the correlation with {mean:.2g} deg of their mean"
+        elif count > 1:
+            of = f"the weakest of {of}"
+        if "weak" not in layer:
+            parts += _constant_words(layer, layer["friction_angles_deg"], of, units)
+            continue
+        weak = layer["weak"]
+        density = quantity_text("kg/m^3", units, weak["density_kg_m3"], digits=".0f")
+        beta = quantity_text("MN/m^3", units, weak["subgrade_reaction_MN_m3"], digits=".3g")
+        angle, *_ = _constant_words(layer, {}, of, units)
+        taken = f"{weak['friction_angle_deg']:.4g} deg, {density}, {beta}"
+        parts.append(f"below {quantity_text('m', units, ends[0], digits='.3g')} the 5 % of each, {taken}: {angle}")
+    return parts
 
 
 def _remarks(data: dict[str, Any], units: str) -> list[str]:
-    """Return which readings are left out, and which are taken at the end of a range."""
+    """Return which readings are left out, which are taken at the end of a range, and where a log has none."""
     foot = quantity_text("m", units, data.get("foot_m", 0.0))
     kinds = (
         ("above_range", True, "above the range of the correlation, taken as its end"),
@@ -375,6 +477,11 @@ def _remarks(data: dict[str, Any], units: str) -> list[str]:
             depths = sorted(reading["depth_m"] for reading in some if "depth_m" in reading)
             where = f" at {_span(depths, units)}" if depths else ""
             remarks.append(f"{counted(len(some), 'reading')}{where} {words}")
+    depths = sorted(reading["depth_m"] for reading in _counting(data["readings"])) if "log" in data else []
+    if depths and depths[0] > _FIRST_M:
+        remarks.append(f"begins at {_span(depths[:1], units)}; its first reading stands for the soil above")
+    if depths and depths[-1] < data.get("foot_m", 0.0):
+        remarks.append(f"ends at {_span(depths[-1:], units)}; its last reading stands for the soil down to the foot")
     return remarks
 
 
@@ -394,7 +501,13 @@ def _reading_words(reading: dict[str, Any], units: str) -> str:
     return f"N {least}{reading['n']:g} ({energy}) at {depth}, {corrected} with {factors}"
 
 
-def unfold_soils(root: Mapping, listed: Collection[str], foot_m: float, mistakes: Mistakes) -> list[dict[str, Any]]:
+def unfold_soils(
+    root: Mapping,
+    listed: Collection[str],
+    foot_m: float,
+    mistakes: Mistakes,
+    read_log: Callable[[Scalar, Scalar | None], Log],
+) -> list[dict[str, Any]]:
     """Replace the readings of every soil by distributions of the constants that it does not give.
 
     Parameters
@@ -407,6 +520,8 @@ def unfold_soils(root: Mapping, listed: Collection[str], foot_m: float, mistakes
         The deepest foot of all designs [m].
     mistakes : Mistakes
         Receives what is wrong with them.
+    read_log : callable
+        Reads the file of a log, by its name and that of the hole.
 
     Returns
     -------
@@ -420,8 +535,13 @@ def unfold_soils(root: Mapping, listed: Collection[str], foot_m: float, mistakes
         if topsoil is not None:
             with mistakes:
                 topsoil_m = read_single(topsoil.value, TOPSOIL)
-                if not set(given) & set(READING_FIELDS):
-                    raise wrong(topsoil.position, "topsoil says which readings are left out; give it with spt or cpt")
+                if not set(given) & {*READING_FIELDS, LOG}:
+                    message = "topsoil says which readings are left out; give it with spt or cpt, or with a log"
+                    raise wrong(topsoil.position, message)
+        beside = {key: soil.entries.pop(key) for key in (HOLE, ENERGY) if key in soil.entries}
+        for key, one in beside.items():
+            if LOG not in given:
+                mistakes.add(one.position, f"{key} goes with soil.log, the file of a borehole or a cone")
         if not given:
             continue
         entry = soil.entries[given[0]]
@@ -433,12 +553,48 @@ def unfold_soils(root: Mapping, listed: Collection[str], foot_m: float, mistakes
             if "water_table" in soil.entries and "subgrade_reaction" in lacking:
                 message = "the API curve is that of dry sand; with a water table give soil.subgrade_reaction"
                 raise wrong(entry.position, message)
-            constants = soil_of(entry.value, given[0], lacking, _plain_density(soil), foot_m, topsoil_m)
+            density, node, method, log = _plain_density(soil), entry.value, given[0], None
+            if method == LOG:
+                log = _opened(node, beside, read_log)
+                needed = {"friction_angle", "subgrade_reaction"} | ({"density"} if density is None else set())
+                is_one = soil.label or "layers" in soil.entries or not needed <= set(lacking) or math.isinf(foot_m)
+                log = log._replace(may_be_layered=not is_one)
+                method, node = _nodes_of(log, node.position, beside.get(ENERGY), topsoil_m)
+            constants = soil_of(node, method, lacking, density, foot_m, topsoil_m, log)
             data.append(soil.label | constants)
         for key in given[1:]:
             del soil.entries[key]
         soil.replace(given[0], _soil_entries(entry, constants))
     return data
+
+
+def _opened(node: Node, beside: dict[str, Entry], read_log: Callable[[Scalar, Scalar | None], Log]) -> Log:
+    """Read the log that an entry names."""
+    if not isinstance(node, Scalar) or not node.text.strip():
+        raise wrong(node.position, "must be the name of a file: .csv, .xlsx, .ags, .gef or .xml")
+    hole = beside[HOLE].value if HOLE in beside else None
+    if hole is not None and (not isinstance(hole, Scalar) or not hole.text.strip()):
+        raise wrong(hole.position, "must be the name of a hole in the file")
+    return read_log(node, hole)
+
+
+def _nodes_of(log: Log, position: Position, energy: Entry | None, topsoil_m: float) -> tuple[str, Sequence]:
+    """Return the kind of test and the readings of a log, as if they stood in the settings."""
+    is_cone = log.key == CONE
+    ratio = ""
+    if energy is not None:
+        if log.key != "n":
+            raise wrong(energy.position, f"{log.file} gives {log.key}, which needs no energy ratio; remove it")
+        ratio = f"{read_single(energy.value, READING_FIELDS['spt'][ENERGY])!r}"
+    if log.key == "n" and not ratio and not all(reading.energy_ratio for reading in log.readings):
+        message = f"{log.file} does not give the energy ratio of the hammer for every count; write energy_ratio beside "
+        raise wrong(position, f"{message}log (60 % is usual), or name counts at 60 % N60")
+    items: list[Node] = []
+    for reading in log.averaged(topsoil_m) if is_cone else log.readings:
+        texts = {log.key: f"{reading.text} MPa" if is_cone else reading.text, "depth": f"{reading.depth_m!r} m"}
+        texts |= {ENERGY: reading.energy_ratio or ratio} if log.key == "n" else {}
+        items.append(block_of(reading.position, texts))
+    return ("cpt" if is_cone else "spt"), Sequence(position, items)
 
 
 def _plain_density(soil: Mapping) -> float | None:
@@ -462,4 +618,18 @@ def _soil_entries(entry: Entry, data: dict[str, Any]) -> list[Entry]:
     if "subgrade_reaction_MN_m3" in data:
         mean, cov = data["subgrade_reaction_MN_m3"], data["subgrade_reaction_cov"]
         forms["subgrade_reaction"] = {"distribution": "lognormal", "mean": f"{mean!r} MN/m^3", "cov": f"{cov!r}"}
-    return [Entry(key, entry.position, block_of(entry.value.position, form)) for key, form in forms.items()]
+    entries = [Entry(key, entry.position, block_of(entry.value.position, form)) for key, form in forms.items()]
+    deeper: list[Node] = []
+    for layer in data.get("layers", ()):
+        if "weak" in layer:
+            weak = layer["weak"]
+            texts = {
+                "from": f"{layer['from_m']!r} m",
+                "density": f"{weak['density_kg_m3']!r} kg/m^3",
+                "friction_angle": f"{weak['friction_angle_deg']!r} deg",
+                "subgrade_reaction": f"{weak['subgrade_reaction_MN_m3']!r} MN/m^3",
+            }
+            deeper.append(block_of(entry.value.position, texts))
+    if deeper:
+        entries.append(Entry("layers", entry.position, Sequence(entry.value.position, deeper)))
+    return entries

@@ -288,6 +288,7 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "stone-settings": stones.settings_of_example,
     "stone-site": stones.site_of_example,
     "borehole-notes": site_data.notes_of_borehole,
+    "log-drawing": site_data.drawing_of_log,
     "spt-angles": site_data.angles_of_counts,
     "gallery-embassy-street": lambda root: gallery.words_of(root, "embassy_street"),
     "gallery-wet-backfill": lambda root: gallery.words_of(root, "wet_backfill"),

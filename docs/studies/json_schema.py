@@ -32,7 +32,10 @@ from boulder_sweep.settings.model import (
 )
 from boulder_sweep.settings.soil_readings import (
     BLOW_KEYS,
+    ENERGY,
+    HOLE,
     LEAST_KEYS,
+    LOG,
     METHODS,
     READING_FIELDS,
     RELATIVE_DENSITY,
@@ -254,6 +257,12 @@ _SITE_DATA: dict[str, Schema] = {
     "soil": {
         **{method: {**form, "description": f"readings ({method})"} for method, form in _BY_TEST.items()},
         **{field.key: {**_value(field), "description": field.meaning} for field in (RELATIVE_DENSITY, TOPSOIL)},
+        LOG: {"type": "string", "description": "file of a borehole or a cone: .csv, .xlsx, .ags, .gef or .xml"},
+        HOLE: {"type": ["string", "number"], "description": "its hole, where the file has several"},
+        ENERGY: {
+            **_value(READING_FIELDS["spt"][ENERGY]),
+            "description": "energy of the hammer, where the file does not give it",
+        },
     },
     "vehicle": {
         APPROACH: {

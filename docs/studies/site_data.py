@@ -1,4 +1,4 @@
-"""What a site gives, as the commands show it: constants of the soil by a borehole."""
+"""What a site gives, as the commands show it: constants of the soil by a borehole, and its log."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from boulder_sweep.settings.problems import Position
 from boulder_sweep.settings.soil_readings import soil_of
 from boulder_sweep.settings.sweep import derived_words
 from boulder_sweep.settings.tree import block_of
+from boulder_sweep.views.log_text import log_lines
 
-BOREHOLE = Path("configs/borehole.yaml")
+BOREHOLE, BOREHOLE_LOG = Path("configs/borehole.yaml"), Path("configs/borehole_log.yaml")
 
 
 def notes_of_borehole(root: Path) -> str:
@@ -20,6 +21,12 @@ def notes_of_borehole(root: Path) -> str:
     notes = (f"note: {words}" for words in derived_words(load(root / BOREHOLE).derived))
     lines = [line for note in notes for line in textwrap.wrap(note, 80, subsequent_indent="  ")]
     return "\n".join(["```text", *lines, "```"])
+
+
+def drawing_of_log(root: Path) -> str:
+    """Return the log of the example as `sweep check` draws it."""
+    (log,) = load(root / BOREHOLE_LOG).derived["soil"]
+    return "\n".join(["```text", *log_lines(log), "```"])
 
 
 def angles_of_counts(_: Path) -> str:

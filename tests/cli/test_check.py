@@ -1,5 +1,12 @@
 """``sweep check``: what is in a file, and what is wrong with it."""
 
+from pathlib import Path
+
+from boulder_sweep.settings import load
+from boulder_sweep.views.log_text import log_lines
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+
 
 def test_a_valid_file(sweep, grid):
     code, out, err = sweep("check", grid)
@@ -29,6 +36,22 @@ def test_remarks_go_to_stderr(sweep, grid):
     assert code == 0
     assert err.startswith("note: --set: vehicle.speed: 30 m/s is outside the usual range")
     assert "note" not in out
+
+
+def test_a_log_is_drawn(sweep):
+    code, out, err = sweep("check", CONFIGS / "borehole_log.yaml")
+    assert code == 0
+    assert out.split("\n\n")[1].rstrip().splitlines() == log_lines(
+        load(CONFIGS / "borehole_log.yaml").derived["soil"][0]
+    )
+    assert "note: soil: borehole_log.csv, hole BH-2; friction angle" in err
+
+
+def test_mistakes_in_a_log_stand_at_their_cells(sweep, grid):
+    (grid.parent / "log.csv").write_text("Depth (m),N60\n0.5,17\n1.0,many\n")
+    code, out, err = sweep("check", grid, "--set", "soil={log: log.csv}")
+    assert (code, out) == (2, "")
+    assert err.startswith("log.csv:3:5: soil: n60: 'many' is not a number")
 
 
 def test_mistakes(sweep, grid):

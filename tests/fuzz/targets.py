@@ -38,11 +38,13 @@ from boulder_sweep.settings import Sweep, load_text
 from boulder_sweep.settings.design_list import read_designs
 from boulder_sweep.settings.loader import decode
 from boulder_sweep.settings.problems import MAX_REPORTED, Position, ProblemList
+from boulder_sweep.settings.sweep import derived_words
 from boulder_sweep.settings.tree import Scalar
 from boulder_sweep.stones.formats import READERS
 from boulder_sweep.stones.reading import read_scan
 from boulder_sweep.stones.solid import solid_of
 from boulder_sweep.store.provenance import settings_sha256
+from boulder_sweep.views.log_text import log_lines
 from tests.answers.designs import site
 
 CORPUS = Path(__file__).parents[1] / "corpus"
@@ -174,6 +176,41 @@ def changed_table(data: bytes, most: int, mutate: Mutate, chance: random.Random)
         for name, content in files.items():
             archive.writestr(zipfile.ZipInfo(name), content)
     return packed.getvalue()
+
+
+# --- Logs ---
+
+LOGS = (".csv", ".xlsx", ".ags", ".gef", ".xml")
+SITE_OF_A_LOG = """\
+boulder: {length: 1.65 m, width: 1.68 m, height: 3.4 m, density: 2600 kg/m^3}
+site: {embedment_depth: 2.2 m}
+vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
+soil: {log: LOG, topsoil: 0.2 m}
+"""
+
+
+def logs(data: bytes) -> bool:
+    """Read the log of a hole in each format, and draw it; say whether one of them could be."""
+    refused = True
+    for kind in LOGS:
+        path = HERE / f"log{kind}"
+        path.write_bytes(data)
+        refused &= is_refused(data, partial(check_log, path.name))
+    return not refused
+
+
+def check_log(name: str) -> None:
+    """Read a log as the soil of a site: its layers go down, and its drawing is plain."""
+    sweep = load_text(SITE_OF_A_LOG.replace("LOG", name), HERE / "grid.yaml")
+    check_sweep(sweep)
+    (log,) = sweep.derived["soil"]
+    json.dumps(sweep.resolved(), allow_nan=False)
+    tops = [layer.from_m for layer in sweep.model.ground.layers]
+    assert tops == sorted(set(tops))
+    assert len(derived_words(sweep.derived)) == 1
+    for line in log_lines(log)[1:]:
+        assert line.isascii(), line
+        assert len(line) <= 80, line
 
 
 # --- Settings ---
@@ -357,6 +394,7 @@ class Target(NamedTuple):
 TARGETS = {
     "scans": Target(scans, changed_scan),
     "designs": Target(designs, changed_table),
+    "logs": Target(logs, changed_table),
     "settings": Target(settings),
     "answers": Target(answers, changed_answers),
 }
