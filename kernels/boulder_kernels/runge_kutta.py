@@ -89,7 +89,7 @@ def first_rate(work: np.ndarray, touching: bool, f: HeaveConstants) -> float:
     return write_rate(work, START, 0, touching, f)
 
 
-@kernel
+@inlined
 def step(work: np.ndarray, h: float, touching: bool, f: HeaveConstants) -> tuple[float, float]:
     """Try a step of length h [s] into `TRIAL`; return its error [m] and the compression at its end [m]."""
     u = 0.0
@@ -136,7 +136,7 @@ def track_of(work: np.ndarray, axis: int, h: float) -> Track:
     )
 
 
-@kernel
+@inlined
 def keep(work: np.ndarray, q: Tracks, tau: float, h: float) -> None:
     """Go on from the fraction tau of the step that was tried last."""
     for axis in range(AXES):
@@ -180,7 +180,7 @@ def time_of_limit(q: Track, limit: float, tau_end: float) -> float:
     return high
 
 
-@kernel
+@inlined
 def foot_rises(work: np.ndarray, q: Tracks, tau_end: float, h: float, f: HeaveConstants) -> float:
     """Fraction of a step at which the first strip that is pressed in comes back; tau_end if none does.
 
@@ -237,7 +237,7 @@ def sinking_in(work: np.ndarray, j: int, m: FootMotion, f: HeaveConstants) -> fl
     return (field(work, FOOT, j) * (1.0 - m.versin) - f.c.c_y * m.sin) * m.turning - m.rising
 
 
-@kernel
+@inlined
 def press_in(work: np.ndarray, f: HeaveConstants) -> bool:
     """Keep what a strip of the foot is pressed in beyond its bearing capacity as its set; whether any was."""
     sin, versin = sine_versine(field(work, START, 1))

@@ -329,6 +329,26 @@ def test_what_is_proved_to_stay_below_the_limit_does(form: HeaveOptions, degrees
     assert np.all(later.theta_max >= found.theta_max[proved] - 1e-12)
 
 
+@pytest.mark.compiled
+def test_with_a_margin_what_turns_less_is_proved_to_stay_that_far_below() -> None:
+    """And what comes nearer is proved to stay below the limit itself, as without a margin."""
+    limit, margin = np.radians(20.0), np.radians(3.0)
+    table = table_of(some_designs(600, seed=265))
+    without = second_opinions(table, HeaveControl(limit, 3.0))
+    found = second_opinions(table, HeaveControl(limit, 3.0, margin=margin))
+    assert np.array_equal(found.status, without.status)
+    proved = found.status == Status.BELOW_LIMIT
+    nearer = proved & (found.theta_max >= limit - margin)
+    assert nearer.sum() >= 3
+    well_below = np.flatnonzero(proved & ~nearer)
+    later = second_opinions(some_rows(table, well_below), HeaveControl(limit, 5.0, stop=False))
+    assert well_below.size > 40
+    assert np.all(later.theta_max < limit - margin)
+    assert np.mean(found.t_end[well_below] > without.t_end[well_below]) > 0.1
+    with pytest.raises(ValueError, match="fineness is 1 to 4"):
+        second_opinions(table, HeaveControl(limit, 3.0, fineness=FINEST + 1))
+
+
 def test_no_place_costs_less_than_the_least_energy() -> None:
     """At either limit, wherever it stands, for boulders deep and shallow; with strips that were pressed in (Eq 137)."""
     rng = np.random.default_rng(273)
