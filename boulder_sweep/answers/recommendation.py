@@ -253,7 +253,7 @@ class _Boulders:
         waits for those that may be better.
         """
         columns = [PREFERENCES[name] for name in (prefer, *PREFERENCES)]
-        order = np.lexsort([self.figures[name] for name in reversed(columns)]) if self.tried else []
+        order = np.lexsort([self.figures[name] for name in reversed(columns)]) if self.tried else np.empty(0, np.int64)
         waiting = [(int(self.rank[each]), place, int(each)) for place, each in enumerate(order)]
         heapq.heapify(waiting)
         while waiting:

@@ -1,0 +1,305 @@
+"""The answer of `need` in words: which boulder to bury how deep, why, what else there is, and what to ask next."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from boulder_sweep.answers.lightest import DEPTH, HEIGHT
+from boulder_sweep.answers.recommendation import OF_A_DESIGN, Design, Nearest, Recommendation
+from boulder_sweep.columns import BOULDER_MASS
+from boulder_sweep.designs import SIDES
+from boulder_sweep.judge.robustness import MEANINGS, can_be_asked
+from boulder_sweep.judge.validity import BY_FLAG, UNSTUDIED
+from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT
+from boulder_sweep.settings.shown_units import quantity_text, shown_unit
+
+if TYPE_CHECKING:
+    from boulder_sweep.answers.need import Need
+
+MODELS = "under three soil models"
+"""What second opinions are, in the words of an answer."""
+ALONG = dict(zip(SIDES, ("long", "wide", "high"), strict=True))
+BETTER = {"mass": "lighter", "depth": "shallower", "excavation": "less to dig"}
+"""What a design is that is the best by a preference, beside the one that is recommended."""
+BEST = {"mass": "the lightest", "depth": "the shallowest", "excavation": "the one with the least to dig"}
+"""And what the one that is recommended is."""
+MOST_NAMED = 6
+"""Most boulders that are named one by one because they will not do."""
+USUALLY = (0.35, 0.75)
+"""Embedments, as shares of the height, in which another boulder is looked for: those of the study of grades."""
+
+
+class Again(NamedTuple):
+    """How a question was asked on the command line, so that the next one can be suggested as a whole command.
+
+    Parameters
+    ----------
+    file
+        The settings file.
+    options
+        The options that were given and decide the answer, each with its values: ``("--units", "us")``.
+    """
+
+    file: str
+    options: tuple[tuple[str, ...], ...] = ()
+
+    def asking(self, *options: tuple[str, ...], without: tuple[str, ...] = ()) -> str:
+        """Return the command that asks with other options; those of the same name, and some more, are left out.
+
+        Of entries of the file, all remain that are not set anew. The boulder's embedment is one entry by two names.
+        """
+        fresh = {name for name, *_ in options if name != "--set"} | {*without}
+        entries = {_entry(value) for name, *values in options if name == "--set" for value in values}
+        kept = [
+            option
+            for option in self.options
+            if option[0] not in fresh and not (option[0] == "--set" and _entry(option[1]) in entries)
+        ]
+        return shlex.join(["sweep", "need", self.file, *(word for option in (*kept, *options) for word in option)])
+
+
+def _entry(assignment: str) -> str:
+    """Return which entry of a file an assignment sets; depth and ratio are one."""
+    path = assignment.partition("=")[0].strip()
+    return "site.embedment" if path.startswith("site.embedment") else path
+
+
+def advice(need: Need, units: str = "si") -> list[str]:
+    """Return the recommendation as sentences, one or several to a paragraph, the most important first.
+
+    Parameters
+    ----------
+    need
+        The answers.
+    units
+        ``si`` or ``us``.
+    """
+    found = need.recommendation
+    if found is None:
+        return []
+    words = _Words(need, found, units)
+    if found.design is None:
+        return [words.none(), *([words.nearest(found.nearest)] if found.nearest else [])]
+    will_not_do = words.will_not_do() if need.key.name in EMBEDMENT else []
+    return [words.recommendation(found.design), *words.others(found.design), *will_not_do, words.tested(found.design)]
+
+
+def next_questions(need: Need, again: Again, units: str = "si") -> list[tuple[str, str]]:
+    """Return what to ask next where no boulder qualifies: words, and a whole command for each."""
+    found = need.recommendation
+    if found is None or found.design is not None:
+        return []
+    questions = []
+    nearest = found.nearest
+    if nearest is not None and nearest.design is not None:
+        grade = ("--robust",) if nearest.robust else ("--any",)
+        less = again.asking(("--margin", f"{nearest.margin:.0%}"), grade, without=("--robust", "--any"))
+        questions.append(("with less to spare", less))
+    model, given = need.sweep.model, need.sweep.plan.given
+    if need.sweep.table is None and model.shape.is_box and BOULDER_MASS not in given:
+        wider = [f"site.embedment_ratio=[{USUALLY[0]:g}, {USUALLY[1]:g}]"]
+        for name in SIDES[1:]:
+            usual, values = BY_NAME[name].usual, given[name].values
+            assert usual is not None
+            low, high = float(values.min()), max(float(values.max()), usual.high)
+            if low < high:
+                ends = (quantity_text("m", units, _down(end, units)) for end in (low, high))
+                wider.append(f"{BY_NAME[name].path}=[{', '.join(ends)}]")
+        options = (("--least", "mass"), *(("--set", each) for each in wider))
+        command = again.asking(*options, without=("--most", "--between"))
+        questions.append(("the lightest boulder that does", command))
+    return questions
+
+
+def _down(length: float, units: str) -> float:
+    """Return a length [m] that is written in few digits."""
+    size = shown_unit("m", units).size if units == "us" else 1.0
+    return math.floor(length / size * 100.0 + 1e-6) / 100.0 * size
+
+
+class _Words:
+    """The sentences about a recommendation.
+
+    Parameters
+    ----------
+    need, found
+        The answers and their recommendation.
+    units
+        ``si`` or ``us``.
+    """
+
+    def __init__(self, need: Need, found: Recommendation, units: str) -> None:
+        self.need, self.found, self.units = need, found, units
+        given = need.sweep.plan.given
+        several = [name for name, one in given.items() if name in BY_NAME and one.values.min() < one.values.max()]
+        by_mass = need.key.name == BOULDER_MASS
+        self.told_apart = [name for name in SIDES if name in several or name == need.key.name or by_mass]
+        self.rocks = "boulder_density_kg_m3" in several
+        self.conditions = [name for name in several if name not in OF_A_DESIGN]
+
+    def length(self, metres: float, digits: str = ".4g") -> str:
+        """Return a length with its unit."""
+        return quantity_text("m", self.units, metres, digits=digits)
+
+    def mass(self, row: Mapping[str, Any]) -> str:
+        """Return the mass of the boulder of a row: tonnes, or pounds."""
+        if self.units == "us":
+            return f"{row[BOULDER_MASS] / shown_unit('kg', 'us').size:,.0f} lb"
+        return f"{row[BOULDER_MASS] / 1000:.1f} t"
+
+    def depth(self, design: Design) -> str:
+        """Return the depth of a design, to 1 mm."""
+        return f"{self.length(design.sizes[DEPTH], '.3f')} deep"
+
+    def dug(self, design: Design) -> str:
+        """Return what is excavated for a design."""
+        return quantity_text("m^3", self.units, design.excavated_m3, digits=".1f").replace("^3", "³")
+
+    def boulder(self, row: Mapping[str, Any]) -> str:
+        """Return what tells a boulder from the others of the file."""
+        if self.told_apart == [HEIGHT]:
+            named = f"{self.length(row[HEIGHT])} boulder"
+        else:
+            sides = (f"{self.length(row[name])} {ALONG[name]}" for name in self.told_apart)
+            named = f"boulder {listed(tuple(sides))}".strip()
+        rock = quantity_text("kg/m^3", self.units, row["boulder_density_kg_m3"])
+        return f"the {named} of {rock}" if self.rocks else f"the {named}"
+
+    def everywhere(self) -> str:
+        """Return in which soils and before which vehicles; empty where there is one of each."""
+        n, sections = self.found.conditions, {BY_NAME[name].section for name in self.conditions}
+        if n == 1:
+            return ""
+        if self.need.sweep.table is not None:
+            return " in every row of the list that has it"
+        every = "both" if n == 2 else f"all {n}"
+        if self.conditions == ["impact_speed_m_s"]:
+            return f" at {every} speeds"
+        if sections == {"soil"}:
+            return f" in {every} soils"
+        return f" before {every} vehicles" if sections == {"vehicle"} else f" in {every} cases of soil and vehicle"
+
+    def here(self, row: Mapping[str, Any]) -> str:
+        """Return in which soil and before which vehicle a row is; empty where there is one of each."""
+        labels = [row[name] for name in self.need.sweep.plan.labels]
+        values = [
+            f"{BY_NAME[name].key.replace('_', ' ')} {quantity_text(BY_NAME[name].unit, self.units, row[name])}"
+            for name in self.conditions
+        ]
+        return f" at {listed(tuple(labels or values))}" if self.found.conditions > 1 else ""
+
+    def recommendation(self, design: Design) -> str:
+        """Return what to build, and why it is this one."""
+        row, margin = design.rows[0], self.need.least_margin
+        build = f"ury {self.boulder(row)} ({self.mass(row)}) {self.depth(design)}: it passes{self.everywhere()}"
+        if design.chance is not None:
+            holds = f" with a probability of {design.chance:.1%}{f' and {percent(margin)} to spare' if margin else ''}"
+        else:
+            holds = f" with {percent(design.margin)} to spare{self.opinions(design)}"
+        count, why = self.found.qualified, ""
+        if count > 1:
+            why = f" It is {BEST[self.found.prefer]} of {count:,} boulders that qualify."
+        elif self.found.boulders > 1:
+            why = f" No other of the {self.found.boulders:,} boulders qualifies."
+        not_graded = self.not_graded(design)
+        return f"{f'{not_graded} By the margin alone, b' if not_graded else 'B'}{build}{holds}.{why}"
+
+    def opinions(self, design: Design) -> str:
+        """Return what second opinions say of a design."""
+        margin = self.need.least_margin
+        if design.grade == "robust":
+            return f", and with {percent(margin)} {MODELS}" if margin and self.need.robust else f", and stands {MODELS}"
+        return ", but a second opinion overturns it (sensitive)" if design.grade == "sensitive" else ""
+
+    def not_graded(self, design: Design) -> str:
+        """Return why a design has no grade; empty where it has one, or none is asked for."""
+        rows = [row for row in design.rows if row["robustness"] == "open"]
+        if design.grade != "open":
+            return ""
+        outside = [BY_FLAG[name].meaning for name in Design(rows).flags if name in UNSTUDIED]
+        if not can_be_asked(self.need.sweep):
+            return f"Not graded: {MEANINGS['open']}."
+        some = f" in {len(rows)} of {len(design.rows)} cases" if len(rows) < len(design.rows) else ""
+        return f"Not graded{some}: no study of second opinions covers {listed(tuple(outside))}."
+
+    def others(self, design: Design) -> list[str]:
+        """Return the designs that are better in something else."""
+        sentences: dict[tuple[float, ...], tuple[str, Design]] = {}
+        for name, other in self.found.others.items():
+            sizes = tuple(other.sizes.values())
+            words = f"{sentences[sizes][0]}, and {BETTER[name]}" if sizes in sentences else BETTER[name].capitalize()
+            sentences[sizes] = (words, other)
+        return [
+            f"{words}: {self.boulder(other.rows[0])}, {self.mass(other.rows[0])}, {self.depth(other)}, "
+            f"{self.dug(other)} to dig in place of {self.dug(design)}."
+            for words, other in sentences.values()
+        ]
+
+    def will_not_do(self) -> list[str]:
+        """Return which boulders have no depth, and where: one by one if they are few and differ by height alone."""
+        found = self.found
+        none = found.boulders - found.qualified
+        if not none:
+            return []
+        if self.told_apart != [HEIGHT] or none > MOST_NAMED or self.rocks:
+            return [f"{none:,} of {found.boulders:,} boulders have no depth that does{self.everywhere()}."]
+        never: dict[float, list[dict[str, Any]]] = {}
+        for row in self.need.arrow.to_pylist():
+            if row["passes_at"] is None:
+                never.setdefault(row[HEIGHT], []).append(row)
+        parts = [self.length(height) for height, rows in never.items() if len(rows) == found.conditions]
+        for height, rows in never.items():
+            if len(rows) < found.conditions:
+                where = self.here(rows[0]) if len(rows) == 1 else f" in {len(rows)} of {found.conditions} cases"
+                parts.append(f"{self.length(height)}{where}")
+        return [f"At no depth: {', '.join(parts)}."]
+
+    def tested(self, design: Design) -> str:
+        """Return in what a design lies outside the crash tests."""
+        outside = [name for name in design.flags if design.grade != "open" or name not in UNSTUDIED]
+        if not outside:
+            return "The crash tests had as much: it lies inside what the model was tested on." * (not design.flags)
+        return f"No crash test covers it: {'; '.join(BY_FLAG[name].meaning for name in outside)}."
+
+    def none(self) -> str:
+        """Return that nothing qualifies."""
+        need, who = (
+            self.need,
+            "No boulder of the file passes" if self.found.boulders > 1 else "The boulder does not pass",
+        )
+        how = f" with {percent(need.least_margin)} to spare" if need.least_margin else ""
+        how += f" {MODELS}" if need.robust else ""
+        if need.probability is not None:
+            how = f" with a probability of {need.probability:.4g}{' and' if how else ''}{how}"
+        return f"{who}{how}{self.everywhere()}."
+
+    def nearest(self, nearest: Nearest) -> str:
+        """Return what comes nearest, by how much it falls short, and which input would change that."""
+        failing = [row for row in nearest.rows if row["passes_at"] is None]
+        row, design, who = failing[0], nearest.design, self.boulder(nearest.rows[0])
+        if design is not None:
+            under = f" {MODELS}" if nearest.robust else ", but not under every soil model" * self.need.robust
+            has = percent(nearest.margin) if nearest.margin else "nothing"
+            text = f"Nearest: {who} ({self.mass(row)}) {self.depth(design)}, with {has} to spare{under}."
+        else:
+            why = " ".join(word for word in (row["verdict"], row["reason"]) if word).replace("_", " ")
+            at = self.length(row[DEPTH], ".3f")
+            text = f"Nearest: {who} ({self.mass(row)}), which passes at no depth{self.here(row)}; at {at}: {why}."
+        changes = []
+        for name, one in nearest.changes.items():
+            value = quantity_text(BY_NAME[name].unit, self.units, max(row[name] for row in one.rows))
+            changes.append(f"{BY_NAME[name].path} {value} ({self.mass(one.rows[0])}, {self.depth(one)})")
+        return f"{text} It would qualify from {' or from '.join(changes)} on." if changes else text
+
+
+def percent(share: float) -> str:
+    """Return a share in whole per cent, rounded down."""
+    return f"{math.floor(share * 100.0 + 1e-9)} %"
+
+
+def listed(words: tuple[str, ...]) -> str:
+    """Return words as a list: ``a, b and c``."""
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
