@@ -15,6 +15,7 @@ from boulder_sweep.judge.robustness import MEANINGS, can_be_asked
 from boulder_sweep.judge.validity import BY_FLAG, UNSTUDIED
 from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT
 from boulder_sweep.settings.shown_units import quantity_text, shown_unit
+from boulder_sweep.text import NO_BREAK_SPACE
 
 if TYPE_CHECKING:
     from boulder_sweep.answers.need import Need
@@ -140,15 +141,24 @@ class _Words:
         self.rocks = "boulder_density_kg_m3" in several
         self.conditions = [name for name in several if name not in OF_A_DESIGN]
 
+    def value(self, name: str, value: float, digits: str = ".4g") -> str:
+        """Return the value of an input with its unit."""
+        return self.quantity(BY_NAME[name].unit, value, digits)
+
+    def quantity(self, unit: str, value: float, digits: str = ".4g") -> str:
+        """Return a value with its unit, which no line break parts."""
+        text = quantity_text(unit, self.units, value, digits=digits).replace("^3", "³").replace(" deg", "°")
+        return text.replace(" ", NO_BREAK_SPACE)
+
     def length(self, metres: float, digits: str = ".4g") -> str:
         """Return a length with its unit."""
-        return quantity_text("m", self.units, metres, digits=digits)
+        return self.quantity("m", metres, digits)
 
     def mass(self, row: Mapping[str, Any]) -> str:
         """Return the mass of the boulder of a row: tonnes, or pounds."""
         if self.units == "us":
-            return f"{row[BOULDER_MASS] / shown_unit('kg', 'us').size:,.0f} lb"
-        return f"{row[BOULDER_MASS] / 1000:.1f} t"
+            return self.quantity("kg", row[BOULDER_MASS], ",.0f")
+        return f"{row[BOULDER_MASS] / 1000:.1f}{NO_BREAK_SPACE}t"
 
     def depth(self, design: Design) -> str:
         """Return the depth of a design, to 1 mm."""
@@ -156,7 +166,7 @@ class _Words:
 
     def dug(self, design: Design) -> str:
         """Return what is excavated for a design."""
-        return quantity_text("m^3", self.units, design.excavated_m3, digits=".1f").replace("^3", "³")
+        return self.quantity("m^3", design.excavated_m3, ".1f")
 
     def boulder(self, row: Mapping[str, Any]) -> str:
         """Return what tells a boulder from the others of the file."""
@@ -165,7 +175,7 @@ class _Words:
         else:
             sides = (f"{self.length(row[name])} {ALONG[name]}" for name in self.told_apart)
             named = f"boulder {listed(tuple(sides))}".strip()
-        rock = quantity_text("kg/m^3", self.units, row["boulder_density_kg_m3"])
+        rock = self.value("boulder_density_kg_m3", row["boulder_density_kg_m3"])
         return f"the {named} of {rock}" if self.rocks else f"the {named}"
 
     def everywhere(self) -> str:
@@ -185,10 +195,7 @@ class _Words:
     def here(self, row: Mapping[str, Any]) -> str:
         """Return in which soil and before which vehicle a row is; empty where there is one of each."""
         labels = [row[name] for name in self.need.sweep.plan.labels]
-        values = [
-            f"{BY_NAME[name].key.replace('_', ' ')} {quantity_text(BY_NAME[name].unit, self.units, row[name])}"
-            for name in self.conditions
-        ]
+        values = [f"{BY_NAME[name].key.replace('_', ' ')} {self.value(name, row[name])}" for name in self.conditions]
         return f" at {listed(tuple(labels or values))}" if self.found.conditions > 1 else ""
 
     def recommendation(self, design: Design) -> str:
@@ -245,23 +252,27 @@ class _Words:
         if not none:
             return []
         if self.told_apart != [HEIGHT] or none > MOST_NAMED or self.rocks:
-            return [f"{none:,} of {found.boulders:,} boulders have no depth that does{self.everywhere()}."]
+            return [f"At no depth: {none:,} of {found.boulders:,} boulders."] if found.qualified > 1 else []
         never: dict[float, list[dict[str, Any]]] = {}
         for row in self.need.arrow.to_pylist():
             if row["passes_at"] is None:
                 never.setdefault(row[HEIGHT], []).append(row)
-        parts = [self.length(height) for height, rows in never.items() if len(rows) == found.conditions]
+        where: dict[str, list[str]] = {}
         for height, rows in never.items():
-            if len(rows) < found.conditions:
-                where = self.here(rows[0]) if len(rows) == 1 else f" in {len(rows)} of {found.conditions} cases"
-                parts.append(f"{self.length(height)}{where}")
-        return [f"At no depth: {', '.join(parts)}."]
+            some = f" in {len(rows)} of {found.conditions} cases" if len(rows) > 1 else self.here(rows[0])
+            where.setdefault("" if len(rows) == found.conditions else some, []).append(self.length(height))
+        parts = (f"{', '.join(heights)}{place}" for place, heights in sorted(where.items()))
+        return [f"At no depth: {'; '.join(parts)}."]
 
     def tested(self, design: Design) -> str:
         """Return in what a design lies outside the crash tests."""
         outside = [name for name in design.flags if design.grade != "open" or name not in UNSTUDIED]
+        if not design.flags:
+            return (
+                "It lies inside what the model was tested on, and is a simulation all the same, not a rating by test."
+            )
         if not outside:
-            return "The crash tests had as much: it lies inside what the model was tested on." * (not design.flags)
+            return "No crash test covers it."
         return f"No crash test covers it: {'; '.join(BY_FLAG[name].meaning for name in outside)}."
 
     def none(self) -> str:
@@ -285,19 +296,23 @@ class _Words:
             has = percent(nearest.margin) if nearest.margin else "nothing"
             text = f"Nearest: {who} ({self.mass(row)}) {self.depth(design)}, with {has} to spare{under}."
         else:
-            why = " ".join(word for word in (row["verdict"], row["reason"]) if word).replace("_", " ")
-            at = self.length(row[DEPTH], ".3f")
-            text = f"Nearest: {who} ({self.mass(row)}), which passes at no depth{self.here(row)}; at {at}: {why}."
+            why = (row["reason"] or row["verdict"]).replace("_", " ")
+            deep = f"{self.length(row[DEPTH], '.3f')} deep"
+            text = f"Nearest: {who} ({self.mass(row)}), which passes at no depth{self.here(row)}; {deep}: {why}."
         changes = []
         for name, one in nearest.changes.items():
-            value = quantity_text(BY_NAME[name].unit, self.units, max(row[name] for row in one.rows))
-            changes.append(f"{BY_NAME[name].path} {value} ({self.mass(one.rows[0])}, {self.depth(one)})")
-        return f"{text} It would qualify from {' or from '.join(changes)} on." if changes else text
+            at_most = name == "impact_speed_m_s"
+            value = (min if at_most else max)(row[name] for row in one.rows)
+            built = f" ({self.mass(one.rows[0])}, {self.depth(one)})" if name == HEIGHT else ""
+            words = f"{BY_NAME[name].path} {self.value(name, value)} or {'less' if at_most else 'more'}{built}"
+            changes.append(words)
+        either = "; or ".join(changes)
+        return f"{text} It would qualify with {either}." if changes else text
 
 
 def percent(share: float) -> str:
     """Return a share in whole per cent, rounded down."""
-    return f"{math.floor(share * 100.0 + 1e-9)} %"
+    return f"{math.floor(share * 100.0 + 1e-9)}{NO_BREAK_SPACE}%"
 
 
 def listed(words: tuple[str, ...]) -> str:

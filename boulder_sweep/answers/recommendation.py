@@ -109,7 +109,8 @@ class Nearest:
     robust : bool
         and whether it has that under every second opinion, too.
     changes : dict of str to Design
-        It as it would qualify with another value of one input, by column: the least height, the least friction angle.
+        It as it would qualify with another value of one input, by column: the largest speed, the least friction angle,
+        the least height.
     """
 
     rows: list[dict[str, Any]]
@@ -313,22 +314,23 @@ class _Boulders:
         return Nearest(self.table.take(rows).to_pylist(), design, left, robust, self._changes(rows, given, deepest))
 
     def _changes(self, rows: np.ndarray, given: InputRows, depth: float) -> dict[str, Design]:
-        """Return a boulder as it would qualify at the greatest depth, with a stronger soil or with more height."""
-        sweep, changes = self.asked.sweep, {}
-        plain = {name: values for name, values in given.items() if name not in EMBEDMENT}
-        share = np.full(len(rows), depth) / given[HEIGHT]
-        searches = []
-        if sweep.model.ground.is_usual and sweep.partial_factor == 1.0 and "friction_angle_deg" not in sweep.taken_at:
-            searches.append(("friction_angle", {DEPTH: np.full(len(rows), depth)}))
+        """Return a boulder as it would qualify at the greatest depth: in a stronger soil, higher, or at less speed."""
+        sweep = self.asked.sweep
+        deep, share = {DEPTH: np.full(len(rows), depth)}, {RATIO: depth / given[HEIGHT]}
+        searches = [(key_of("speed", most=True), deep)]
+        if sweep.model.ground.is_usual and sweep.partial_factor == 1.0:
+            searches.append((key_of("friction_angle"), deep))
         if sweep.model.shape.is_box and BOULDER_MASS not in given:
-            searches.append(("boulder.height", {RATIO: share}))
-        for word, embedment in searches:
-            key = key_of(word)
-            low, high = given[key.name], np.full(len(rows), usual_ends(key)[1])
-            if (low >= high).any():
+            searches.append((key_of("boulder.height"), share))
+        changes = {}
+        for key, embedment in searches:
+            own = given[key.name]
+            low, high = (np.zeros(len(rows)), own) if key.most else (own, np.full(len(rows), usual_ends(key)[1]))
+            if (low >= high).any() or key.name in sweep.taken_at:
                 continue
-            others = {name: values for name, values in (plain | embedment).items() if name != key.name}
-            value = float(ValueSearch(sweep, key, self.asked.judges).answers_of(others, low, high).passes.max())
+            others = {name: values for name, values in given.items() if name not in (key.name, *EMBEDMENT)} | embedment
+            values = ValueSearch(sweep, key, self.asked.judges).answers_of(others, low, high).passes
+            value = float(values.min() if key.most else values.max())
             design = None if np.isnan(value) else self.judged(rows, others, {key.name: value}, self.asked.judges)
             if design is not None:
                 changes[key.name] = design
