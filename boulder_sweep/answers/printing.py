@@ -276,7 +276,7 @@ def rows_of(table: pa.Table, units: str) -> list[Row]:
 
 
 def table_lines(columns: Sequence[Column], rows: Sequence[Row], most: float = WIDTH) -> list[str]:
-    """Return a table as lines of at most so many signs; columns that do not fit are left out, starting with the last."""
+    """Return a table as lines of at most so many signs; the last columns are left out if they do not fit."""
     texts = [[*head, *(cell(row) for row in rows)] for head, cell in columns]
     widths = [max(map(len, column)) for column in texts]
     while len(widths) > 1 and sum(widths) + 2 * (len(widths) - 1) > most:
@@ -348,8 +348,7 @@ def need_lines(
     if again is not None:
         for words, command in next_questions(need, again, units):
             lines += [f"next, {words}:", f"  {command}"]
-    rows = rows_of(_shown_part(need), units)
-    shown = _every_answer(need, rows, units) if table else _a_screen(need, rows, units)
+    shown = _every_answer(need, units) if table else screen_lines(need, units)
     lines += ["", *shown]
     remarks = undecided_lines(need.arrow) if need.probability is not None else []
     remarks += caution_lines(need.sweep.model, reasons_in(need.arrow), units)
@@ -380,20 +379,21 @@ def _shown_part(need: Need) -> pa.Table:
     return need.arrow.select([name for name in need.arrow.column_names if name in needed])
 
 
-def _every_answer(need: Need, rows: Sequence[Row], units: str) -> list[str]:
+def _every_answer(need: Need, units: str) -> list[str]:
     """Return a table with a line for each answer."""
+    rows = rows_of(_shown_part(need), units)
     lines = table_lines(_need_columns(need, units), rows[:MOST_IN_ALL])
     if len(rows) > MOST_IN_ALL:
         lines.append(f"(the first {MOST_IN_ALL:,} of {len(rows):,} answers; -o writes them all)")
     return lines
 
 
-def _a_screen(need: Need, rows: Sequence[Row], units: str) -> list[str]:
+def screen_lines(need: Need, units: str = "si") -> list[str]:
     """Return a table of at most a screen: a line for each boulder, or else for each answer.
 
     Of more than fit, those come first that pass under the most conditions, and of these the ones that are preferred.
     """
-    found = need.recommendation
+    found, rows = need.recommendation, rows_of(_shown_part(need), units)
     lines: list[Row] = list(rows)
     columns = _need_columns(need, units)
     if found is not None and found.conditions > 1 and need.sweep.table is None and need.key.name != BOULDER_MASS.name:
@@ -402,7 +402,7 @@ def _a_screen(need: Need, rows: Sequence[Row], units: str) -> list[str]:
     if count > MOST_SHOWN and found is not None:
         least = PREFERENCES[found.prefer]
         lines.sort(key=lambda row: (row.get("failing", row["passes_at"] is None), row[least]))
-    shown = table_lines(columns, lines[:MOST_SHOWN])
+    shown = table_lines([*([_marker(need, units)] if count > 1 else []), *columns], lines[:MOST_SHOWN])
     if count > MOST_SHOWN:
         shown.append(f"({MOST_SHOWN} of {count:,}{', the best first' if found else ''}; --table has all answers)")
     return shown
@@ -436,12 +436,12 @@ def _by_boulder(need: Need, rows: Sequence[Row], units: str) -> tuple[list[Row],
             above.append((head_of(name, units), number_of(name, units)))
     wide: list[Column] = []
     for number, row in enumerate(boulders[0]["rows"]):
-        words = [f"{head[0]} {cell(row)}".strip() for head, cell in above]
-        wide.append(((words[0], ", ".join(words[1:])), _in_row(number, answer)))
+        words = [(f"{head[0]} {cell(row)}".strip(), head[1]) for head, cell in above]
+        head = words[0] if len(words) == 1 else (words[0][0], ", ".join(word for word, _ in words[1:]))
+        wide.append((head, _in_row(number, answer)))
     if len(table_lines([*edge, *wide], boulders, math.inf)[2]) <= WIDTH:
         return boulders, [*edge, *wide]
-    passing: Column = (("passes", f"in, of {count}"), lambda row: str(count - row["failing"]))
-    return boulders, [*edge, passing, *((head, _unless_failing(cell)) for head, cell in volume_columns(units))]
+    return boulders, [*edge, (("passes", f"in, of {count}"), lambda row: str(count - row["failing"]))]
 
 
 def _in_row(number: int, cell: Cell) -> Cell:
@@ -449,9 +449,12 @@ def _in_row(number: int, cell: Cell) -> Cell:
     return lambda row: cell(row["rows"][number])
 
 
-def _unless_failing(cell: Cell) -> Cell:
-    """Return a formatter that leaves a cell empty for a boulder that fails in one of its rows."""
-    return lambda row: "" if row["failing"] else cell(row)
+def _marker(need: Need, units: str) -> Column:
+    """Return the column that marks the boulder of the recommendation."""
+    found, metre = need.recommendation, 1.0 if units == "si" else shown_unit("m", units).size
+    design = None if found is None else found.design
+    sizes = {} if design is None else {n: design.sizes[n] / metre for n in SIDES if n != need.key.name}
+    return ("", ""), lambda row: "→" if sizes and all(row[name] == size for name, size in sizes.items()) else ""
 
 
 def _legend(need: Need) -> list[str]:
