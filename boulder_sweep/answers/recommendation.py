@@ -8,6 +8,7 @@ robust ones come first, then the lightest (or what else is preferred).
 from __future__ import annotations
 
 import heapq
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -310,7 +311,9 @@ class _Boulders:
             if design is not None:
                 break
         failing = rows[np.isnan(self.passes[rows])]
-        deepest = float(self._column(DEPTH)[failing].min())
+        # Deeper, the truck would ride over it.
+        reach = given[HEIGHT] - given["bumper_height_m"] - asked.sweep.criterion.min_overlap_m
+        deepest = min(float(self._column(DEPTH)[failing].min()), math.floor(float(reach.min()) * 1000.0) / 1000.0)
         return Nearest(self.table.take(rows).to_pylist(), design, left, robust, self._changes(rows, given, deepest))
 
     def _changes(self, rows: np.ndarray, given: InputRows, depth: float) -> dict[str, Design]:

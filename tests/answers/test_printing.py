@@ -7,12 +7,11 @@ from pathlib import Path
 import pytest
 
 from boulder_sweep import uncertainty
-from boulder_sweep.answers.need import need
 from boulder_sweep.answers.printing import HEADS, need_lines, reserve_lines, uncertainty_lines
 from boulder_sweep.answers.reserves import reserves
 from boulder_sweep.settings import load_text
 from boulder_sweep.settings.fields import INPUTS
-from tests.answers.designs import site
+from tests.answers.designs import bare_need, site
 
 RATIOS = "embedment_ratio: [0.6, 0.65]"
 UNCERTAIN = {"friction": "{mean: 38 deg, sd: 2 deg}", "site": RATIOS}
@@ -24,7 +23,7 @@ def test_every_input_has_a_head() -> None:
 
 @pytest.mark.parametrize("key", ["speed", "height", "friction_angle"])
 def test_ratios_tell_answers_apart(key: str) -> None:
-    found = need(site(site=RATIOS, height="[3, 3.4] m"), key)
+    found = bare_need(site(site=RATIOS, height="[3, 3.4] m"), key)
     lines = need_lines(found)
     heads = lines[0].split()
     assert "ratio" in heads
@@ -47,7 +46,7 @@ def test_ratios_tell_designs_apart_whose_reserves_or_chances_are_shown() -> None
 @pytest.mark.parametrize("given", ["embedment_depth: [1.8, 2.0] m", RATIOS])
 @pytest.mark.parametrize("key", ["embedment_ratio", "embedment_depth", "mass"])
 def test_the_other_measure_of_what_is_asked_for_is_no_input(key: str, given: str) -> None:
-    heads = need_lines(need(site(site=given), key))[0].split()
+    heads = need_lines(bare_need(site(site=given), key))[0].split()
     assert heads[: 2 if key != "mass" else 1] == (["H", "φ′"] if key != "mass" else ["φ′"])
     assert heads.count("depth") == (0 if key == "embedment_ratio" else 1)
     assert heads.count("ratio") == (0 if key == "mass" else 1)
@@ -65,7 +64,7 @@ vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*
 @pytest.fixture(scope="module")
 def many():
     """Answers for 12 boulders in 8 soils."""
-    return need(load_text(GRID, Path("grid.yaml")))
+    return bare_need(load_text(GRID, Path("grid.yaml")))
 
 
 def test_many_answers_stand_boulder_by_soil_and_none_is_left_out(many) -> None:
@@ -104,7 +103,7 @@ def test_many_answers_without_a_soil_that_varies_are_one_table() -> None:
     text = (
         GRID.replace("[36, 38, 40, 42] deg", "40 deg").replace("[50, 80]", "50").replace("step: 0.2 m", "step: 0.04 m")
     )
-    lines = need_lines(need(load_text(text, Path("grid.yaml"))))
+    lines = need_lines(bare_need(load_text(text, Path("grid.yaml"))))
     assert lines[0].split() == ["W", "H", "depth", "ratio", "above", "mass", "margin", "second", "dig", "fill"]
     assert [line.split()[1] for line in lines[3:55]].count("3.6") == 2
 
@@ -117,6 +116,6 @@ def test_named_soils_are_columns() -> None:
     text = "".join(
         f"soil: [{', '.join(soils)}]\n" if line.startswith("soil") else line for line in GRID.splitlines(keepends=True)
     )
-    lines = need_lines(need(load_text(text, Path("grid.yaml"))))
+    lines = need_lines(bare_need(load_text(text, Path("grid.yaml"))))
     assert lines[1].split() == ["soil", "s0", "s1", "s2", "s3"]
     assert lines[2].split() == ["φ′", "deg", "36", "37", "38", "39"]
