@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, Any
@@ -112,11 +111,7 @@ class Need(Result):
 
     def _repr_html_(self) -> str:
         """Return the recommendation and the table of a screen, as a notebook shows them."""
-        from boulder_sweep.answers.advice import advice
-        from boulder_sweep.answers.printing import screen_lines
-
-        sentences = "".join(f"<p>{escape(words)}</p>" for words in advice(self))
-        return f"<div>{sentences}<pre>{escape(chr(10).join(screen_lines(self)))}</pre></div>"
+        return str(draw("notebook", "need_html", self))
 
     def write(self, path: str | Location) -> Location:
         """Write the answers to a Parquet file.

@@ -34,6 +34,8 @@ OF_A_DESIGN = (*SIDES, "boulder_density_kg_m3", BOULDER_MASS, *EMBEDMENT)
 """Inputs that whoever builds chooses. The others, soil and vehicle, are what a design must hold in and against."""
 RANKS = {"robust": 0, None: 1, "open": 1, "sensitive": 2}
 """Order of designs by the worst of their grades."""
+ANSWER = ("fails_at", "passes_at", "found", "passes_within")
+"""Columns of an answer, beside its value, which a design does not have."""
 LESS = 0.05
 """Steps of the margin in which the nearest design is asked what it has."""
 
@@ -261,8 +263,7 @@ class _Boulders:
         while waiting:
             rank, place, each = heapq.heappop(waiting)
             if each not in self._judged:
-                rows, sizes = self.tried[each]
-                self._judged[each] = self.judged(rows, rows_at(self.given, rows), sizes, self.asked.judges)
+                self._judged[each] = self.holding(*self.tried[each])
             design = self._judged[each]
             if design is not None and RANKS[design.grade] <= rank:
                 return design
@@ -270,8 +271,24 @@ class _Boulders:
                 heapq.heappush(waiting, (RANKS[design.grade], place, each))
         return None
 
-    def judged(self, rows: np.ndarray, given: InputRows, sizes: dict[str, float], judges: Judges) -> Design | None:
-        """Return a boulder in some rows, with the inputs given there and its sizes; None where it fails in one."""
+    def holding(self, rows: np.ndarray, sizes: dict[str, float]) -> Design | None:
+        """Return what was tried as a design; None where it fails in a row. Rows that it is the answer to are known."""
+        one = isinstance(self.asked, Question)
+        own = {name: self.passes if one else self._column(name) for name in sizes}
+        known = np.logical_and.reduce([own[name][rows] == value for name, value in sizes.items()])
+        others = rows[~known]
+        judged = self.judged(others, rows_at(self.given, others), sizes, self.asked.judges) if len(others) else []
+        if judged is None:
+            return None
+        answers = [name for name in self.table.column_names if name not in (self.asked.key.answer, *ANSWER)]
+        by_row = dict(zip(others.tolist(), judged, strict=True))
+        by_row |= zip(rows[known].tolist(), self.table.select(answers).take(rows[known]).to_pylist(), strict=True)
+        return Design([by_row[row] for row in rows.tolist()])
+
+    def judged(
+        self, rows: np.ndarray, given: InputRows, sizes: dict[str, float], judges: Judges
+    ) -> list[dict[str, Any]] | None:
+        """Return a boulder of some sizes in some rows, with the inputs given there; None where it fails in one."""
         inputs = {name: np.full(len(rows), value) for name, value in sizes.items()}
         block = block_at(given, np.arange(len(rows)), **inputs)
         block = replace(block, labels={name: label.at(rows) for name, label in self.labels.items()})
@@ -286,7 +303,7 @@ class _Boulders:
                 return None
             judged = ungraded(judged)
             columns += chance_columns(chances, "chance of passing")
-        return Design(rows_table(0, block, judged, columns).to_pylist())
+        return rows_table(0, block, judged, columns).to_pylist()
 
     def nearest(self, asked: Question) -> Nearest:
         """Return the boulder that fails in the fewest rows, and of these the one that is least short of the limits."""
@@ -307,8 +324,9 @@ class _Boulders:
         for robust, left in has:
             easier = judges_of(asked.sweep, left, robust=robust)
             depth = ValueSearch(asked.sweep, key, easier).answers_of(given, low, high).passes.max()
-            design = None if np.isnan(depth) else self.judged(rows, given, {key.name: float(depth)}, easier)
-            if design is not None:
+            found = None if np.isnan(depth) else self.judged(rows, given, {key.name: float(depth)}, easier)
+            if found is not None:
+                design = Design(found)
                 break
         failing = rows[np.isnan(self.passes[rows])]
         # Deeper, the truck would ride over it.
@@ -334,7 +352,7 @@ class _Boulders:
             others = {name: values for name, values in given.items() if name not in (key.name, *EMBEDMENT)} | embedment
             values = ValueSearch(sweep, key, self.asked.judges).answers_of(others, low, high).passes
             value = float(values.min() if key.most else values.max())
-            design = None if np.isnan(value) else self.judged(rows, others, {key.name: value}, self.asked.judges)
-            if design is not None:
-                changes[key.name] = design
+            found = None if np.isnan(value) else self.judged(rows, others, {key.name: value}, self.asked.judges)
+            if found is not None:
+                changes[key.name] = Design(found)
         return changes
