@@ -203,7 +203,8 @@ class _Words:
         row, margin = design.rows[0], self.need.least_margin
         build = f"ury {self.boulder(row)} ({self.mass(row)}) {self.depth(design)}: it passes{self.everywhere()}"
         if design.chance is not None:
-            holds = f" with a probability of {design.chance:.1%}{f' and {percent(margin)} to spare' if margin else ''}"
+            holds = f" with a probability of {100.0 * design.chance:.1f}{NO_BREAK_SPACE}%"
+            holds += f" and {percent(margin)} to spare" if margin else ""
         else:
             holds = f" with {percent(design.margin)} to spare{self.opinions(design)}"
         count, why = self.found.qualified, ""
@@ -284,7 +285,7 @@ class _Words:
         how = f" with {percent(need.least_margin)} to spare" if need.least_margin else ""
         how += f" {MODELS}" if need.robust else ""
         if need.probability is not None:
-            how = f" with a probability of {need.probability:.4g}{' and' if how else ''}{how}"
+            how = f" with a probability of {100.0 * need.probability:.4g}{NO_BREAK_SPACE}%{' and' if how else ''}{how}"
         return f"{who}{how}{self.everywhere()}."
 
     def nearest(self, nearest: Nearest) -> str:

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from boulder_sweep.answers.advice import Again, advice, next_questions
+from boulder_sweep.answers.advice import MODELS, Again, advice, next_questions
 from boulder_sweep.answers.recommendation import OF_A_DESIGN, PREFERENCES
 from boulder_sweep.answers.search import ALWAYS, BLOCKED, NEVER, NOT_MONOTONE, UNKNOWN, WORDS
 from boulder_sweep.columns import BY_NAME as COLUMNS
@@ -365,10 +365,11 @@ def need_lines(
 
 def _title(need: Need) -> str:
     """Return what is asked, where no design is named."""
-    key, spare = need.key, f" with {need.least_margin:.3g} of every limit to spare" if need.least_margin else ""
-    opinions = ", under every second opinion" if need.robust else ""
-    chance = "" if need.probability is None else f" with a probability of {need.probability:.4g}"
-    return f"The {'largest' if key.most else 'least'} {key.field.path} that passes{chance}{spare}{opinions}:"
+    key, chance = need.key, need.probability
+    asked = "" if chance is None else f" with a probability of {100.0 * chance:.4g} %"
+    asked += f"{' and' if asked else ' with'} {100.0 * need.least_margin:.4g} % to spare" if need.least_margin else ""
+    asked += f", {MODELS}" if need.robust else ""
+    return f"The {'largest' if key.most else 'least'} {key.field.path} that passes{asked}:"
 
 
 def _shown_part(need: Need) -> pa.Table:

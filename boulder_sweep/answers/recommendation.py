@@ -222,7 +222,12 @@ class _Boulders:
         self._judged: dict[int, Design | None] = {}
 
     def _column(self, name: str) -> np.ndarray:
-        return self.table[name].to_numpy().astype(float)
+        return np.array(self.table[name].to_pylist(), dtype=float)  # to_numpy() imports pandas
+
+    def _rows(self, rows: np.ndarray, without: tuple[str, ...] = ()) -> list[dict[str, Any]]:
+        """Return rows of the answers, some columns left out."""
+        table = self.table.select([name for name in self.table.column_names if name not in without])
+        return [table.slice(row, 1).to_pylist()[0] for row in rows.tolist()]  # take() imports pandas
 
     def _sizes(self, rows: np.ndarray) -> list[dict[str, float]]:
         """Return what to try of a boulder that has an answer in all its rows: the value that all of them need.
@@ -280,9 +285,9 @@ class _Boulders:
         judged = self.judged(others, rows_at(self.given, others), sizes, self.asked.judges) if len(others) else []
         if judged is None:
             return None
-        answers = [name for name in self.table.column_names if name not in (self.asked.key.answer, *ANSWER)]
         by_row = dict(zip(others.tolist(), judged, strict=True))
-        by_row |= zip(rows[known].tolist(), self.table.select(answers).take(rows[known]).to_pylist(), strict=True)
+        answers = self._rows(rows[known], without=(self.asked.key.answer, *ANSWER))
+        by_row |= zip(rows[known].tolist(), answers, strict=True)
         return Design([by_row[row] for row in rows.tolist()])
 
     def judged(
@@ -332,7 +337,9 @@ class _Boulders:
         # Deeper, the truck would ride over it.
         reach = given[HEIGHT] - given["bumper_height_m"] - asked.sweep.criterion.min_overlap_m
         deepest = min(float(self._column(DEPTH)[failing].min()), math.floor(float(reach.min()) * 1000.0) / 1000.0)
-        return Nearest(self.table.take(rows).to_pylist(), design, left, robust, self._changes(rows, given, deepest))
+        return Nearest(
+            self.table.take(rows.tolist()).to_pylist(), design, left, robust, self._changes(rows, given, deepest)
+        )
 
     def _changes(self, rows: np.ndarray, given: InputRows, depth: float) -> dict[str, Design]:
         """Return a boulder as it would qualify at the greatest depth: in a stronger soil, higher, or at less speed."""

@@ -23,6 +23,7 @@ from boulder_sweep.cli.options import (
     refuse_units_of_json,
     refuse_unwritable,
     say_notes,
+    say_percents,
     set_option,
     take_values,
     units_option,
@@ -122,8 +123,7 @@ def need(
     refuse_unwritable(out, picture)
     if not quiet:
         say_notes(sweep, units)
-        for option in ("margin", "probability"):
-            _say_percent(f"--{option}", question[option])
+        say_percents(margin=question["margin"], probability=question["probability"])
     with working(quiet, of="designs" if question["probability"] is None else "values") as progress:
         result = asked.answers(jobs, progress)
     if as_json:
@@ -138,12 +138,6 @@ def need(
     if picture is not None:
         result.plot(picture, units=units)
     return EXIT_SOME_ROWS_FAILED if result.errors else EXIT_DONE
-
-
-def _say_percent(option: str, text: str | None) -> None:
-    """Say that a bare number above 1 is read as per cent."""
-    if text is not None and "%" not in text and float(text) > 1.0:
-        say(f"note: {option} {text} is read as {text} %")
 
 
 def _given(names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
@@ -210,6 +204,8 @@ def uncertainty(
     sweep = load_sweep(grid, overrides, quiet, units)
     refuse_missing(sweep, grid, design)
     refuse_unwritable(out, picture)
+    if not quiet:
+        say_percents(margin=question["margin"], confidence=question["confidence"], half_width=question["half_width"])
     with working(quiet) as progress:
         result = estimate(sweep, **question, progress=progress)
     show(*([json.dumps(result.to_dict())] if as_json else uncertainty_lines(result, units=units)))

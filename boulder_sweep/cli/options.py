@@ -6,6 +6,7 @@ import functools
 import os
 import textwrap
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -132,6 +133,14 @@ def say_notes(sweep: Sweep, units: str = "si") -> None:
             words = words_of_few_elements(sweep)
         say("\n".join(textwrap.wrap(f"note: model.soil: {words}", 80, subsequent_indent="  ")))
     say_values(sweep, units)
+
+
+def say_percents(**shares: str | None) -> None:
+    """Say of which options a bare number above 1 is read as per cent; those that are no numbers are refused later."""
+    for name, text in shares.items():
+        with suppress(ValueError):
+            if text is not None and float(text) > 1.0:
+                say(f"note: --{name.replace('_', '-')} {text} is read as {text} %")
 
 
 def say_values(sweep: Sweep, units: str = "si") -> None:
