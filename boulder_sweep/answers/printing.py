@@ -431,7 +431,7 @@ def _by_boulder(need: Need, rows: Sequence[Row], units: str) -> tuple[list[Row],
     edge += [] if key.name.startswith("boulder_") else [_mass(units)]
     count = len(boulders[0]["rows"])
     edge.append((("all", head_of(key.name, units)[1]), lambda row: "-" if row["failing"] else answer(row)))
-    above: list[Column] = [((name, ""), word_of(name)) for name in labels]
+    above: list[Column] = [(("", ""), word_of(name)) for name in labels]
     for name in names:
         if name not in OF_A_DESIGN and not (BY_NAME[name].section in labels and name in given):
             above.append((head_of(name, units), number_of(name, units)))

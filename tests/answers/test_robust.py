@@ -47,8 +47,8 @@ def test_robust_costs_depth_and_answers_are_graded_without_asking() -> None:
     assert (depths[1][both] > depths[0][both]).all()
     grades = [grade for grade, depth in zip(least.arrow["robustness"].to_pylist(), depths[0], strict=True) if depth > 0]
     assert set(grades) == {"sensitive"}
-    assert any(line.startswith("sensitive: a second opinion overturns it") for line in need_lines(least))
-    assert any(line.startswith("robust: stands with friction") for line in need_lines(robust))
+    assert any(line.startswith("sensitive: a second opinion overturns it") for line in need_lines(least, notes=True))
+    assert any(line.startswith("robust: stands with friction") for line in need_lines(robust, notes=True))
 
 
 def test_what_second_opinions_do_not_know_is_refused_in_words() -> None:
@@ -75,7 +75,7 @@ def test_no_grade_stands_beside_a_probability() -> None:
     asked = replace(sweep, model=replace(sweep.model, second_opinion=SECOND_OPINIONS))
     found, likely = uncertainty(asked, half_width=0.2), bare_need(asked, probability=0.9)
     assert likely.counts() == {"found": 1}
-    for answers, lines in ((found, uncertainty_lines(found)), (likely, need_lines(likely))):
+    for answers, lines in ((found, uncertainty_lines(found)), (likely, need_lines(likely, notes=True))):
         assert answers.arrow["robustness"].to_pylist() == [None]
         assert answers.arrow["stands_under"].to_pylist() == [None]
         assert not any(word in "\n".join(lines) for word in ("robust", "sensitive", "opinion"))
