@@ -7,7 +7,9 @@ import shlex
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from boulder_sweep.answers.lightest import DEPTH, HEIGHT
+import numpy as np
+
+from boulder_sweep.answers.lightest import DEPTH, HEIGHT, RATIO
 from boulder_sweep.answers.recommendation import OF_A_DESIGN, Design, Nearest, Recommendation
 from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.designs import SIDES
@@ -29,6 +31,8 @@ BEST = {"mass": "the lightest", "depth": "the shallowest", "excavation": "the on
 """And what the one that is recommended is."""
 MOST_NAMED = 6
 """Most boulders that are named one by one because they will not do."""
+ROUNDED = 0.01
+"""By how much a side may be less than the usual one for having been rounded."""
 USUALLY = (0.35, 0.75)
 """Embedments, as shares of the height, in which another boulder is looked for: those of the study of grades."""
 
@@ -93,26 +97,36 @@ def next_questions(need: Need, again: Again, units: str = "si") -> list[tuple[st
     found = need.recommendation
     if found is None or found.design is not None:
         return []
-    questions = []
-    nearest = found.nearest
+    questions, nearest = [], found.nearest
     if nearest is not None and nearest.design is not None:
         grade = ("--robust",) if nearest.robust else ("--any",)
         less = again.asking(("--margin", f"{nearest.margin:.0%}"), grade, without=("--robust", "--any"))
         questions.append(("with less to spare", less))
-    model, given = need.sweep.model, need.sweep.plan.given
-    if need.sweep.table is None and model.shape.is_box and BOULDER_MASS not in given:
-        wider = [f"site.embedment_ratio=[{USUALLY[0]:g}, {USUALLY[1]:g}]"]
-        for name in SIDES[1:]:
-            usual, values = BY_NAME[name].usual, given[name].values
-            assert usual is not None
-            low, high = float(values.min()), max(float(values.max()), usual.high)
-            if low < high:
-                ends = (quantity_text("m", units, _down(end, units)) for end in (low, high))
-                wider.append(f"{BY_NAME[name].path}=[{', '.join(ends)}]")
-        options = (("--least", "mass"), *(("--set", each) for each in wider))
-        command = again.asking(*options, without=("--most", "--between"))
+    wider = _wider(need, units)
+    if wider:
+        command = again.asking(("--least", "mass"), *wider, without=("--most", "--between"))
         questions.append(("the lightest boulder that does", command))
+    elif need.key.name == BOULDER_MASS and (need.least_margin or need.robust):
+        bare = again.asking(("--margin", "0"), ("--any",), without=("--robust",))
+        questions.append(("the lightest boulder that passes at all", bare))
     return questions
+
+
+def _wider(need: Need, units: str) -> list[tuple[str, ...]]:
+    """Return options that widen the ranges of a file in which a boulder is looked for; none if they are as wide."""
+    given = need.sweep.plan.given
+    options: list[tuple[str, ...]] = []
+    if need.sweep.table is not None or not need.sweep.model.shape.is_box or BOULDER_MASS in given:
+        return []
+    ratio = given[RATIO].values if RATIO in given else np.zeros(1)
+    if ratio.min() > USUALLY[0] or ratio.max() < USUALLY[1]:
+        options.append(("--set", f"site.embedment_ratio=[{USUALLY[0]:g}, {USUALLY[1]:g}]"))
+    for name in SIDES[1:]:
+        usual, values = BY_NAME[name].usual, given[name].values
+        if usual is not None and values.max() < usual.high * (1.0 - ROUNDED):
+            ends = (quantity_text("m", units, _down(end, units)) for end in (values.min(), usual.high))
+            options.append(("--set", f"{BY_NAME[name].path}=[{', '.join(ends)}]"))
+    return options
 
 
 def _down(length: float, units: str) -> float:
