@@ -221,13 +221,23 @@ class _Words:
             holds += f" and {percent(margin)} to spare" if margin else ""
         else:
             holds = f" with {percent(design.margin)} to spare{self.opinions(design)}"
-        count, why = self.found.qualified, ""
-        if count > 1:
-            why = f" It is {BEST[self.found.prefer]} of {count:,} boulders that qualify."
-        elif self.found.boulders > 1:
-            why = f" No other of the {self.found.boulders:,} boulders qualifies."
         not_graded = self.not_graded(design)
-        return f"{f'{not_graded} By the margin alone, b' if not_graded else 'B'}{build}{holds}.{why}"
+        return f"{f'{not_graded} By the margin alone, b' if not_graded else 'B'}{build}{holds}.{self.why(design)}"
+
+    def why(self, design: Design) -> str:
+        """Return why it is this boulder, as a sentence that follows another."""
+        found, best = self.found, BEST[self.found.prefer]
+        if self.need.key.name == BOULDER_MASS or found.boulders == 1:
+            return ""
+        if found.qualified == 1:
+            return f" No other of the {found.boulders:,} boulders qualifies."
+        if found.alike == found.qualified:
+            return f" It is {best} of {found.qualified:,} boulders that qualify."
+        worse = found.qualified - found.alike
+        are = f"{worse:,} {'is' if worse == 1 else 'are'} not robust" if design.grade == "robust" else ""
+        are = are or f"a second opinion overturns {worse:,}"
+        one = "it is the other" if found.alike == 1 else f"it is {best} of the others"
+        return f" Of {found.qualified:,} boulders that qualify, {are}; {one}."
 
     def opinions(self, design: Design) -> str:
         """Return what second opinions say of a design."""
@@ -305,11 +315,15 @@ class _Words:
     def nearest(self, nearest: Nearest) -> str:
         """Return what comes nearest, by how much it falls short, and which input would change that."""
         failing = [row for row in nearest.rows if row["passes_at"] is None]
-        row, design, who = failing[0], nearest.design, self.boulder(nearest.rows[0])
+        row, design, who = (failing or nearest.rows)[0], nearest.design, self.boulder(nearest.rows[0])
         if design is not None:
             under = f" {MODELS}" if nearest.robust else ", but not under every soil model" * self.need.robust
             has = percent(nearest.margin) if nearest.margin else "nothing"
             text = f"Nearest: {who} ({self.mass(row)}) {self.depth(design)}, with {has} to spare{under}."
+        elif not failing:
+            text = (
+                f"Nearest: {who} ({self.mass(row)}), which passes{self.everywhere()}, but at no depth in all of them."
+            )
         else:
             why = (row["reason"] or row["verdict"]).replace("_", " ")
             deep = f"{self.length(row[DEPTH], '.3f')} deep"

@@ -135,8 +135,9 @@ class Recommendation:
         The design; None where no boulder qualifies.
     others : dict of str to Design
         The best by the other preferences, where it is another boulder.
-    boulders, qualified, conditions : int
-        Number of boulders, of those with an answer under all conditions, and of these: soils and vehicles, combined.
+    boulders, qualified, alike, conditions : int
+        Number of boulders, of those with an answer under all conditions, of these the ones whose grade is no worse than
+        that of the design, and of conditions: soils and vehicles, combined.
     nearest : Nearest or None
         What comes nearest where none qualifies, of depths without a probability.
     """
@@ -146,6 +147,7 @@ class Recommendation:
     others: dict[str, Design]
     boulders: int
     qualified: int
+    alike: int
     conditions: int
     nearest: Nearest | None = None
 
@@ -157,6 +159,7 @@ class Recommendation:
             "others": {name: design.to_dict() for name, design in self.others.items()},
             "boulders": self.boulders,
             "qualified": self.qualified,
+            "alike": self.alike,
             "conditions": self.conditions,
         }
 
@@ -190,7 +193,8 @@ def recommended(asked: Question | LightestQuestion, table: pa.Table, prefer: str
     }
     if best is None and isinstance(asked, Question) and asked.key.name in EMBEDMENT and boulders.sampling is None:
         nearest = boulders.nearest(asked)
-    counts = (len(boulders.members), len(boulders.qualified), max(map(len, boulders.members)))
+    alike = 0 if best is None else int((boulders.rank <= RANKS[best.grade]).sum())
+    counts = (len(boulders.members), len(boulders.qualified), alike, max(map(len, boulders.members)))
     return Recommendation(prefer, best, others, *counts, nearest)
 
 
@@ -316,7 +320,9 @@ class _Boulders:
 
         def short(rows: np.ndarray) -> tuple[float, ...]:
             failing = rows[np.isnan(self.passes[rows])]
-            return len(failing), -float(margin[failing].min()), -float(time[failing].min())
+            if len(failing):
+                return len(failing), -float(margin[failing].min()), -float(time[failing].min())
+            return 0, float(self.passes[rows].max() - self.given[HEIGHT][rows[0]]), 0.0  # the highest above the ground
 
         rows = min(self.members, key=short)
         given, key, judges = rows_at(self.given, rows), asked.key, asked.judges
@@ -336,7 +342,9 @@ class _Boulders:
         failing = rows[np.isnan(self.passes[rows])]
         # Deeper, the truck would ride over it.
         reach = given[HEIGHT] - given["bumper_height_m"] - asked.sweep.criterion.min_overlap_m
-        deepest = min(float(self._column(DEPTH)[failing].min()), math.floor(float(reach.min()) * 1000.0) / 1000.0)
+        # Of a boulder that has a depth in every row, but no common one, the greatest of them.
+        tried = self._column(DEPTH)[failing if len(failing) else rows[[self.passes[rows].argmax()]]]
+        deepest = min(float(tried.min()), math.floor(float(reach.min()) * 1000.0) / 1000.0)
         return Nearest(
             self.table.take(rows.tolist()).to_pylist(), design, left, robust, self._changes(rows, given, deepest)
         )
@@ -352,10 +360,11 @@ class _Boulders:
             searches.append((key_of("boulder.height"), share))
         changes = {}
         for key, embedment in searches:
-            own = given[key.name]
-            low, high = (np.zeros(len(rows)), own) if key.most else (own, np.full(len(rows), usual_ends(key)[1]))
-            if (low >= high).any() or key.name in sweep.taken_at:
+            own, far = given[key.name], usual_ends(key)
+            ends = (far[0], own.max()) if key.most else (own.min(), far[1])
+            if ends[0] >= ends[1] or key.name in sweep.taken_at:
                 continue
+            low, high = (np.full(len(rows), end) for end in ends)
             others = {name: values for name, values in given.items() if name not in (key.name, *EMBEDMENT)} | embedment
             values = ValueSearch(sweep, key, self.asked.judges).answers_of(others, low, high).passes
             value = float(values.min() if key.most else values.max())

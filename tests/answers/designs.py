@@ -41,6 +41,9 @@ DEFAULTS = {
 }
 
 
+UNCERTAIN_FRICTION = {"friction": "{mean: 38 deg, sd: 2 deg}"}
+
+
 def site(**changes: str) -> Sweep:
     """Return a sweep of 6 designs, 3 heights by 2 friction angles, or another."""
     return load_text(SITE.format(**{**DEFAULTS, **changes}), Path("site.yaml"))
