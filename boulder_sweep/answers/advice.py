@@ -340,8 +340,8 @@ class _Words:
 
 
 def percent(share: float) -> str:
-    """Return a share in whole per cent, rounded down."""
-    return f"{math.floor(share * 100.0 + 1e-9)}{NO_BREAK_SPACE}%"
+    """Return a share in whole per cent."""
+    return f"{100.0 * share:.0f}{NO_BREAK_SPACE}%"
 
 
 def listed(words: tuple[str, ...]) -> str:

@@ -46,7 +46,7 @@ ONE_STIFFNESS = ("soil.subgrade_reaction=63 MN/m^3",)
 
 def need_of_site(root: Path) -> str:
     """Return the depths of the site as a terminal shows them."""
-    return _fenced(need_lines(need(load(root / SITE)), again=Again(str(SITE))))
+    return _fenced(need_lines(need(load(root / SITE)), again=Again(str(SITE)), table=True, notes=True))
 
 
 def lightest_of_grid(root: Path) -> str:
@@ -89,7 +89,7 @@ def chances_with_factor(root: Path, factor: float) -> np.ndarray:
     one_depth = "site.embedment_depth=2 m"
     unfactored = load(root / GRID, [one_depth])
     factored = load(root / GRID, [one_depth, f"partial_factor.friction_angle={factor}"])
-    frame = need(factored).frame
+    frame = need(factored, margin=0.0, robust=False).frame
     found = (frame.found == "found").to_numpy()
     rows = {name: values[found] for name, values in unfactored.plan.given_rows(0, unfactored.n_designs).items()}
     rows["embedment_depth_m"] = frame.passes_at.to_numpy()[found]
