@@ -51,12 +51,13 @@ def embassy_street(file: Path, picture: Path) -> str:
     assert found.recommendation is not None
     assert found.recommendation.design is not None
     best, blocked = found.recommendation.design.sizes, found.frame[found.frame.found == "blocked_by_overlap"]
+    narrow = blocked[blocked.boulder_width_m == blocked.boulder_width_m.min()]
     width, height, depth = (best[name] for name in ("boulder_width_m", "boulder_height_m", "embedment_depth_m"))
     return (
         "The lightest boulder that passes with a quarter to spare, under every second opinion, has "
         f"{best['boulder_mass_kg'] / 1e3:.1f} t: {width:.1f} m wide, {height:.1f} m high and {depth:.2f} m deep; "
-        f"{height - depth:.2f} m stand above the ground. Of those {blocked.boulder_width_m.max():.1f} m wide, heights up "
-        f"to {blocked.boulder_height_m.max():.1f} m are blocked: buried deep enough, they no longer reach the bumper."
+        f"{height - depth:.2f} m stand above the ground. Of those {narrow.boulder_width_m.min():.1f} m wide, heights "
+        f"up to {narrow.boulder_height_m.max():.1f} m are blocked: buried deep enough, they no longer reach the bumper."
     )
 
 
@@ -94,7 +95,7 @@ def embankment(file: Path, picture: Path) -> str:
     """Return the lowest boulders that stop the truck at the speed of the file, and what the slope takes."""
     found = need(load(file), most="speed", margin=0.0)
     found.plot(picture)
-    level = need(load(file, ["soil.slope=0 deg"]), most="speed", margin=0.0).frame.most_impact_speed_m_s
+    level = need(load(file, ["soil.slope=0 deg"]), most="speed", margin=0.0, robust=False).frame.most_impact_speed_m_s
     rows = found.frame
     lost = 1.0 - rows.most_impact_speed_m_s / level
     at = 30.0 * MPH
