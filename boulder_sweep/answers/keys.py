@@ -120,19 +120,23 @@ def key_of(word: str, *, most: bool = False) -> Key:
 
 
 def share(text: str | float, option: str) -> float:
-    """Return a number such as 0.25 or ``25 %``.
+    """Return a number such as 0.25, ``25 %`` or 25: a bare number above 1 is per cent.
 
     Raises
     ------
     QuestionError
         It is not a number.
     """
-    if not isinstance(text, str):
-        return float(text)
-    try:
-        return float(read_quantity(Scalar(Position(option), text), "1").value)
-    except LeafError as problem:
-        raise QuestionError(f"{option} {text}: {problem}") from None
+    if isinstance(text, str):
+        try:
+            value = float(read_quantity(Scalar(Position(option), text), "1").value)
+        except LeafError as problem:
+            raise QuestionError(f"{option} {text}: {problem}") from None
+        if "%" in text:
+            return value
+    else:
+        value = float(text)
+    return value / 100.0 if value > 1.0 else value
 
 
 def margin_asked(text: str | float) -> float:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from boulder_sweep.answers.keys import BOULDER_MASS, Ends, Key, key_of, margin_asked, share
 from boulder_sweep.answers.lightest import LightestQuestion
 from boulder_sweep.answers.questions import Question
+from boulder_sweep.answers.recommendation import PREFERENCES, Recommendation, recommended
 from boulder_sweep.answers.result import (
     Result,
     TableColumn,
@@ -35,13 +36,12 @@ from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.judge.robustness import can_be_asked
 from boulder_sweep.locations import Location
 from boulder_sweep.runner.pool import Pool, call
+from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.fields import EMBEDMENT
 from boulder_sweep.text import ProgressCallback
 
 if TYPE_CHECKING:
     import pyarrow as pa
-
-    from boulder_sweep.settings import Sweep
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,12 +60,19 @@ class Need(Result):
         Designs simulated during the search.
     probability : float or None
         Probability of passing asked for; None where no input is uncertain.
+    robust : bool
+        Whether only a pass counts that stands under every second opinion with the margin.
+    recommendation : Recommendation or None
+        The design to build, and why; None where the question is not about a least size, mass or embedment, or the
+        answers were read from a file.
     """
 
     key: Key
     least_margin: float
     simulated: int
     probability: float | None = None
+    robust: bool = False
+    recommendation: Recommendation | None = None
 
     @property
     def derived(self) -> tuple[str, ...]:
@@ -95,10 +102,16 @@ class Need(Result):
             "asked": self.key.answer,
             "unit": self.key.field.unit,
             "margin": self.least_margin,
+            "robust": self.robust,
             "simulated": self.simulated,
             "found": self.counts(),
+            "recommendation": None if self.recommendation is None else self.recommendation.to_dict(),
             "rows": self.arrow.to_pylist(),
         }
+
+    def _repr_html_(self) -> str:
+        """Return the recommendation and the table of a screen, as a notebook shows them."""
+        return str(draw("notebook", "need_html", self))
 
     def write(self, path: str | Location) -> Location:
         """Write the answers to a Parquet file.
@@ -121,30 +134,75 @@ class Need(Result):
         draw("answer_charts", "draw_design_chart", self, path, units=units)
 
 
+MARGIN = 0.25
+"""Margin that is asked for where none is named."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A question that can be answered. Made by `asked_of`.
+
+    Attributes
+    ----------
+    question : Question or LightestQuestion
+        The question.
+    probability : float or None
+        Probability of passing asked for.
+    prefer : str
+        What is least of the design that is recommended, a key of `PREFERENCES`.
+    """
+
+    question: Question | LightestQuestion
+    probability: float | None
+    prefer: str
+
+    def answers(self, jobs: int | None = None, progress: ProgressCallback | None = None) -> Need:
+        """Return the answers; arguments: see `need`."""
+        asked = self.question
+        judges, key = asked.judges, asked.key
+        judges.final.warm_up()
+        done = _Progress(progress, asked)
+        pieces = list(ranges(asked.count, asked.rows_at_once))
+        tables, simulated = [], 0
+        for table, count in Pool(jobs)(call(_table_of, asked, start, stop) for start, stop in pieces):
+            tables.append(table)
+            simulated += count
+            done.answered(len(table))
+        chance = self.probability
+        question = {"asked": key.answer, "margin": judges.least_margin}
+        question |= {} if chance is None else {"probability": chance}
+        question |= {"robust": True} if judges.robust else {}
+        table = joined_tables(tables, asked.sweep, judges, "boulder_sweep.need", question)
+        best = recommended(asked, table, self.prefer)
+        return Need(asked.sweep, table, key, judges.least_margin, simulated, chance, judges.robust, best)
+
+
 def need(
-    sweep: Sweep,
+    sweep: Sweep | str | Path,
     least: str | None = None,
     *,
     most: str | None = None,
-    margin: str | float = 0.0,
+    margin: str | float | None = None,
     probability: str | float | None = None,
     seed: int = 0,
     between: Ends = None,
-    robust: bool = False,
+    robust: bool | None = None,
+    prefer: str = "mass",
     jobs: int | None = None,
     progress: ProgressCallback | None = None,
 ) -> Need:
-    """Find the smallest value of an input that passes, for every combination of the others.
+    """Find the smallest value of an input that passes, for every combination of the others, and the design to build.
 
     Parameters
     ----------
     sweep
-        The sweep. If the input asked for is an axis of its grid, the axis gives the search range.
+        The sweep, or the path of its file. If the input asked for is an axis of its grid, the axis gives the search
+        range.
     least, most
         The input whose smallest or largest passing value is wanted; only one of the two.
         ``embedment_depth`` by default.
     margin
-        Least margin to the limits, ``0.25`` or ``"25 %"``.
+        Least margin to the limits, ``0.25`` or ``"25 %"``, which is the default; 0 where a probability is asked for.
     probability
         Required probability of passing, ``0.95`` or ``"95 %"``, if inputs have distributions.
     seed
@@ -152,8 +210,11 @@ def need(
     between
         Search range, instead of the axis or the usual range.
     robust
-        Whether only a pass counts that is robust, see `boulder_sweep.judge.robustness`. The readings as printed have
-        none.
+        Whether only a pass counts that stands under every second opinion, with the margin, see
+        `boulder_sweep.judge.robustness`. By default so where second opinions know such designs and no probability is
+        asked for.
+    prefer
+        What is to be least among designs that qualify: ``mass``, ``depth`` or ``excavation``.
     jobs
         Threads; all cores by default. The answers do not depend on it.
     progress
@@ -170,14 +231,45 @@ def need(
     QuestionError
         The question is contradictory or out of range.
     SettingsError
-        An input has a distribution.
+        An input has a distribution, or the file is not valid.
     TypeError, ValueError
         The number of jobs is not a whole number, or out of range.
     """
+    if isinstance(sweep, str | Path):
+        sweep = load(sweep)
+    asked = asked_of(
+        sweep,
+        least,
+        most=most,
+        margin=margin,
+        probability=probability,
+        seed=seed,
+        between=between,
+        robust=robust,
+        prefer=prefer,
+    )
+    return asked.answers(jobs, progress)
+
+
+def asked_of(
+    sweep: Sweep,
+    least: str | None = None,
+    *,
+    most: str | None = None,
+    margin: str | float | None = None,
+    probability: str | float | None = None,
+    seed: int = 0,
+    between: Ends = None,
+    robust: bool | None = None,
+    prefer: str = "mass",
+) -> Asked:
+    """Return a question, or refuse it, before anything is computed; arguments and errors: see `need`."""
     if probability is None:
         sweep = at_values(sweep)
     if least and most:
         raise QuestionError("use either --least or --most, not both")
+    if prefer not in PREFERENCES:
+        raise QuestionError(f"--prefer {prefer}: must be {', '.join(PREFERENCES)}")
     word = most or least or "embedment_depth"
     key = key_of(word, most=bool(most))
     if between is not None and key.name == BOULDER_MASS.name:
@@ -195,10 +287,14 @@ def need(
             f"{key.field.path} cannot be searched beside boulder.mass, which is that of one boulder; "
             "remove it from the file and give boulder.density"
         )
-    least_margin = margin_asked(margin)
     chance = None if probability is None else share(probability, "--probability")
     if chance is not None and not 0.0 < chance < 1.0:
         raise QuestionError(f"--probability {probability}: must be more than 0 and less than 100 %")
+    if robust is None:
+        robust = chance is None and can_be_asked(sweep)
+    if margin is None:
+        margin = MARGIN if chance is None else 0.0
+    least_margin = margin_asked(margin)
     if robust and not can_be_asked(sweep):
         raise QuestionError(
             "--robust: second opinions know boxes of rock of given density, dry, level, uniform soil without cohesion "
@@ -208,20 +304,9 @@ def need(
         raise QuestionError(
             "--robust and --probability cannot be used together: second opinions are not asked of the designs drawn"
         )
-    asked = _question(sweep, key, between, judges_of(sweep, least_margin, robust=robust), chance, seed)
-    asked.judges.final.warm_up()
-    done = _Progress(progress, asked)
-    pieces = list(ranges(asked.count, asked.rows_at_once))
-    tables, simulated = [], 0
-    for table, count in Pool(jobs)(call(_table_of, asked, start, stop) for start, stop in pieces):
-        tables.append(table)
-        simulated += count
-        done.answered(len(table))
-    question = {"asked": key.answer, "margin": least_margin}
-    question |= {} if chance is None else {"probability": chance}
-    question |= {"robust": True} if robust else {}
-    table = joined_tables(tables, sweep, asked.judges, "boulder_sweep.need", question)
-    return Need(sweep, table, key, least_margin, simulated, chance)
+    return Asked(
+        _question(sweep, key, between, judges_of(sweep, least_margin, robust=robust), chance, seed), chance, prefer
+    )
 
 
 class _Progress:

@@ -203,7 +203,7 @@ class AnswerFile:
         sense, _, name = asked["asked"].partition("_")
         word = BY_NAME[name].key if name == BOULDER_MASS else name
         key = key_of(word, most=sense == "most")
-        return Need(sweep, self.table, key, asked["margin"], 0, asked.get("probability"))
+        return Need(sweep, self.table, key, asked["margin"], 0, asked.get("probability"), asked.get("robust", False))
 
     def _chances(self, sweep: Sweep) -> Uncertainty:
         """Return probabilities with the samples that lie beside them."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-import shlex
 import textwrap
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from boulder_sweep.answers.advice import MODELS, Again, advice, next_questions
+from boulder_sweep.answers.recommendation import OF_A_DESIGN, PREFERENCES
 from boulder_sweep.answers.search import ALWAYS, BLOCKED, NEVER, NOT_MONOTONE, UNKNOWN, WORDS
 from boulder_sweep.columns import BY_NAME as COLUMNS
 from boulder_sweep.columns import GRADES, WAY_OUT
@@ -19,7 +20,7 @@ from boulder_sweep.settings.fields import BOULDER_MASS, BY_NAME, EMBEDMENT
 from boulder_sweep.settings.model import FOOT_WORDS
 from boulder_sweep.settings.shown_units import number_text, quantity_text, shown_unit
 from boulder_sweep.stones.rock import ROCK_KG_M3
-from boulder_sweep.text import counted
+from boulder_sweep.text import NO_BREAK_SPACE, counted
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -36,7 +37,9 @@ RATIO, DEPTH = EMBEDMENT
 HEIGHT = SIDES[2]
 WIDTH = 80
 MOST_LINES = 40
-"""Most rows of a plain table; of longer ones evenly spaced rows are shown, or all boulder by soil."""
+"""Most rows of a table of designs; of longer ones evenly spaced rows are shown."""
+MOST_SHOWN = 16
+"""Most rows of the table below a recommendation."""
 HEADS = {
     "boulder_length_m": ("L", "m"),
     "boulder_width_m": ("W", "m"),
@@ -69,8 +72,7 @@ WITHSTOOD = {
 }
 """What the kinds of answers mean to a design that withstands something."""
 MOST_IN_ALL = 1000
-"""Most lines of tables; of more, whole tables are left out."""
-SOIL = "soil"
+"""Most lines of a table of all answers."""
 NEAR_M = 1.5e-3
 """How near to an end of a range a side or depth is at it: both are whole millimetres [m]."""
 NOTES = {
@@ -123,14 +125,19 @@ def flag_lines(answers: Sequence[str]) -> list[str]:
 
 
 def foot_lines(model: Model, reasons: Iterable[str | None] = (), units: str = "si") -> list[str]:
-    """Return on which foot boulders stand, of what rock they are if that is assumed, and what to do about reasons."""
-    words = [FOOT_WORDS[model.foot]]
+    """Return on which foot boulders stand, and what `caution_lines` say."""
+    return [*wrapped([FOOT_WORDS[model.foot]]), *caution_lines(model, reasons, units)]
+
+
+def caution_lines(model: Model, reasons: Iterable[str | None] = (), units: str = "si") -> list[str]:
+    """Return of what rock boulders are if that is assumed, and what to do about reasons."""
+    words = []
     if model.rock_assumed:
         words.append(f"rock: {quantity_text('kg/m^3', units, ROCK_KG_M3)} assumed (boulder.density); no pass is robust")
     occurring = set(reasons)
-    for reason, advice in WAY_OUT.items():
+    for reason, remedy in WAY_OUT.items():
         if reason in occurring:
-            words.append(f"{'fail' if reason == 'slower_truck' else 'undecided'} ({reason}): {advice}")
+            words.append(f"{'fail' if reason == 'slower_truck' else 'undecided'} ({reason}): {remedy}")
     return wrapped(words)
 
 
@@ -156,7 +163,8 @@ def undecided_lines(table: pa.Table) -> list[str]:
 
 def wrapped(texts: Iterable[str]) -> list[str]:
     """Return texts as lines of at most `WIDTH`."""
-    return [line for text in texts for line in textwrap.wrap(text, WIDTH, subsequent_indent="  ")]
+    lines = (line for text in texts for line in textwrap.wrap(text, WIDTH, subsequent_indent="  "))
+    return [line.replace(NO_BREAK_SPACE, " ") for line in lines]
 
 
 def _rows_lines(result: Result, columns: Sequence[Column], units: str) -> tuple[list[str], list[Row]]:
@@ -267,11 +275,11 @@ def rows_of(table: pa.Table, units: str) -> list[Row]:
     return [{n: value / sizes[n] if isinstance(value, float) else value for n, value in row.items()} for row in rows]
 
 
-def table_lines(columns: Sequence[Column], rows: Sequence[Row]) -> list[str]:
-    """Return a table as lines of at most `WIDTH`; columns that do not fit are left out, starting with the last."""
+def table_lines(columns: Sequence[Column], rows: Sequence[Row], most: float = WIDTH) -> list[str]:
+    """Return a table as lines of at most so many signs; the last columns are left out if they do not fit."""
     texts = [[*head, *(cell(row) for row in rows)] for head, cell in columns]
     widths = [max(map(len, column)) for column in texts]
-    while len(widths) > 1 and sum(widths) + 2 * (len(widths) - 1) > WIDTH:
+    while len(widths) > 1 and sum(widths) + 2 * (len(widths) - 1) > most:
         texts.pop()
         widths.pop()
     lines = table_texts(texts)
@@ -312,8 +320,10 @@ def number_of(name: str, units: str) -> Cell:
     return lambda row: number_text(row[name], units)
 
 
-def need_lines(need: Need, units: str = "si", file: str = "GRID.yaml") -> list[str]:
-    """Return the answers as lines.
+def need_lines(
+    need: Need, units: str = "si", again: Again | None = None, *, table: bool = False, notes: bool = False
+) -> list[str]:
+    """Return the answers as lines: the design to build, a table of at most a screen, and what is odd about it.
 
     Parameters
     ----------
@@ -321,32 +331,45 @@ def need_lines(need: Need, units: str = "si", file: str = "GRID.yaml") -> list[s
         The answers.
     units
         ``si`` or ``us``.
-    file
-        The settings file, for the command that asks further.
+    again
+        How the command line asked, for the commands that ask further; none otherwise.
+    table
+        Whether the table has every answer, with all its columns; else it has one line for each boulder, with a column
+        for each soil and vehicle if they fit.
+    notes
+        Whether it is said what words and columns mean, and what the model leaves out.
 
     Returns
     -------
     list of str
-        Header, one line for each row, or tables with a line for each boulder and a column for each soil; then a
-        legend, how often nothing passes, and the flags of what passes. Columns that do not fit are left out, the least
-        important first.
+        Lines of 80 columns, but for commands. Columns that do not fit are left out, the least important first.
     """
-    rows = rows_of(_shown_part(need), units)
-    by_soil = _by_soil(need, rows, units) if len(rows) > MOST_LINES else []
-    tables = by_soil or [table_lines(_need_columns(need, units), rows[:MOST_IN_ALL])]
-    kept = tables[: max(1, MOST_IN_ALL // len(tables[0]))]
-    lines = [line for k, table in enumerate(kept) for line in ([""] * (k > 0) + table)]
-    if len(kept) < len(tables):
-        lines.append(f"(the first {len(kept)} of {len(tables)} tables; -o writes all {len(rows):,} rows)")
-    elif not by_soil and len(rows) > MOST_IN_ALL:
-        lines.append(f"(the first {MOST_IN_ALL:,} of {len(rows):,} rows; -o writes them all)")
-    remarks = [*volume_lines(tables[0][0]), *_legend(need, file), *_grades(need), *_outside(need)]
-    if need.probability is not None:
-        remarks += undecided_lines(need.arrow)
-    remarks += foot_lines(need.sweep.model, reasons_in(need.arrow), units)
+    lines = wrapped(advice(need, units) or [_title(need)])
+    if again is not None:
+        for words, command in next_questions(need, again, units):
+            lines += [f"next, {words}:", f"  {command}"]
+    shown = _every_answer(need, units) if table else screen_lines(need, units)
+    lines += ["", *shown]
+    remarks = undecided_lines(need.arrow) if need.probability is not None else []
+    remarks += caution_lines(need.sweep.model, reasons_in(need.arrow), units)
     if need.key.name == BOULDER_MASS.name:
-        remarks += _edges(need, units, file)
+        remarks += _edges(need, units)
+    if notes:
+        remarks += [*volume_lines("\n".join(shown)), *_legend(need), *_grades(need), *_outside(need)]
+        remarks.append(FOOT_WORDS[need.sweep.model.foot])
+    more = [word for word, given in (("--table", table), ("--notes", notes)) if not given]
+    if again is not None and more:
+        remarks.append(f"More: {', '.join(more)}")
     return [*lines, *wrapped(remarks)]
+
+
+def _title(need: Need) -> str:
+    """Return what is asked, where no design is named."""
+    key, chance = need.key, need.probability
+    asked = "" if chance is None else f" with a probability of {100.0 * chance:.4g} %"
+    asked += f"{' and' if asked else ' with'} {100.0 * need.least_margin:.4g} % to spare" if need.least_margin else ""
+    asked += f", {MODELS}" if need.robust else ""
+    return f"The {'largest' if key.most else 'least'} {key.field.path} that passes{asked}:"
 
 
 def _shown_part(need: Need) -> pa.Table:
@@ -357,63 +380,91 @@ def _shown_part(need: Need) -> pa.Table:
     return need.arrow.select([name for name in need.arrow.column_names if name in needed])
 
 
-def _by_soil(need: Need, rows: Sequence[Row], units: str) -> list[list[str]]:
-    """Return tables with a line for each boulder and a column for each soil, as many columns as fit.
+def _every_answer(need: Need, units: str) -> list[str]:
+    """Return a table with a line for each answer."""
+    rows = rows_of(_shown_part(need), units)
+    lines = table_lines(_need_columns(need, units), rows[:MOST_IN_ALL])
+    if len(rows) > MOST_IN_ALL:
+        lines.append(f"(the first {MOST_IN_ALL:,} of {len(rows):,} answers; -o writes them all)")
+    return lines
 
-    None for the lightest boulder, which differs by soil, for a list of designs, or where no soil varies.
+
+def screen_lines(need: Need, units: str = "si") -> list[str]:
+    """Return a table of at most a screen: a line for each boulder, or else for each answer.
+
+    Of more than fit, those come first that pass under the most conditions, and of these the ones that are preferred.
     """
-    key, open_ = need.key, (need.key.name, *need.derived)
-    names = [name for name in HEADS if name not in (*open_, BOULDER_MASS.name) and varies(need.sweep, need.arrow, name)]
-    labels = [name for name in need.sweep.plan.labels if name in need.arrow.column_names]
-    soils = [((name, ""), word_of(name)) for name in labels if name == SOIL]
-    soils += [(head_of(name, units), number_of(name, units)) for name in names if BY_NAME[name].section == SOIL]
-    if not soils or need.sweep.table is not None or key.name == BOULDER_MASS.name:
-        return []
-    others = [((name, ""), word_of(name)) for name in labels if name != SOIL]
-    others += [(head_of(name, units), number_of(name, units)) for name in names if BY_NAME[name].section != SOIL]
-    others += [] if key.name.startswith("boulder_") else [_mass(units)]
-    answer = answer_cell(key, key.answer, "found", units)
-    answers: dict[tuple[str, ...], dict[tuple[str, ...], str]] = {}
+    found, rows = need.recommendation, rows_of(_shown_part(need), units)
+    lines: list[Row] = list(rows)
+    columns = _need_columns(need, units)
+    if found is not None and found.conditions > 1 and need.sweep.table is None and need.key.name != BOULDER_MASS.name:
+        lines, columns = _by_boulder(need, rows, units)
+    count = len(lines)
+    if count > MOST_SHOWN and found is not None:
+        least = PREFERENCES[found.prefer]
+        lines.sort(key=lambda row: (row.get("failing", row["passes_at"] is None), row[least]))
+    shown = table_lines([*([_marker(need, units)] if count > 1 else []), *columns], lines[:MOST_SHOWN])
+    if count > MOST_SHOWN:
+        shown.append(f"({MOST_SHOWN} of {count:,}{', the best first' if found else ''}; --table has all answers)")
+    return shown
+
+
+def _by_boulder(need: Need, rows: Sequence[Row], units: str) -> tuple[list[Row], list[Column]]:
+    """Return the boulders, each with its rows, and columns: the value that all rows need, and that of each if they fit.
+
+    Whoever builds chooses the boulder and its embedment; the other inputs are conditions.
+    """
+    key, labels, given = need.key, need.sweep.plan.labels, need.sweep.plan.given
+    names = [name for name in HEADS if name not in (key.name, *need.derived, BOULDER_MASS.name)]
+    names = [name for name in names if varies(need.sweep, need.arrow, name)]
+    chosen = [name for name in names if name in OF_A_DESIGN]
+    ratio = number_of(RATIO, "si")  # no column of the table
+    grouped: dict[tuple[Any, ...], list[Row]] = {}
     for row in rows:
-        by_soil = answers.setdefault(tuple(cell(row) for _, cell in others), {})
-        by_soil[tuple(cell(row) for _, cell in soils)] = answer(row)
-    heads = list(dict.fromkeys(soil for by_soil in answers.values() for soil in by_soil))
-    titles = [" ".join(head).strip() for head, _ in soils]
-    edge = [[*head, *texts] for (head, _), texts in zip(others, zip(*answers, strict=True), strict=True)]
-    left = table_texts(edge) if edge else ["", "", *[""] * len(answers)]
-    left = [text.rjust(max(len(left[0]), *map(len, titles))) for text in left]
-    columns = [[*soil, "", "", *(by_soil.get(soil, "") for by_soil in answers.values())] for soil in heads]
-    each = max(len(text) for column in columns for text in column) + 2
-    most = max(1, (WIDTH - len(left[0])) // each)
-    word, unit = head_of(key.name, units)
-    title = f"{'largest' if key.most else 'least'} {word}{f' [{unit}]' if unit else ''} by boulder and soil"
-    tables = []
-    for start in range(0, len(columns), most):
-        part = columns[start : start + most]
-        lines = [title.rjust(len(left[0]))] * (start == 0)
-        for k, edge_text in enumerate([*(text.rjust(len(left[0])) for text in titles), *left]):
-            lines.append((edge_text + "".join(column[k].rjust(each) for column in part)).rstrip())
-            if k == len(titles) + 1:
-                lines.append("─" * (len(left[0]) + each * len(part)))
-        tables.append(lines)
-    return tables
+        grouped.setdefault(tuple(ratio(row) if name == RATIO else row[name] for name in chosen), []).append(row)
+    boulders: list[Row] = []
+    for some in grouped.values():
+        failing = sum(row["passes_at"] is None for row in some)
+        boulders.append({**max(some, key=lambda row: row["passes_at"] or 0.0), "rows": some, "failing": failing})
+    answer = answer_cell(key, key.answer, "found", units)
+    edge = [(head_of(name, units), number_of(name, units)) for name in chosen]
+    edge += [] if key.name.startswith("boulder_") else [_mass(units)]
+    count = len(boulders[0]["rows"])
+    edge.append((("all", head_of(key.name, units)[1]), lambda row: "-" if row["failing"] else answer(row)))
+    above: list[Column] = [(("", ""), word_of(name)) for name in labels]
+    for name in names:
+        if name not in OF_A_DESIGN and not (BY_NAME[name].section in labels and name in given):
+            above.append((head_of(name, units), number_of(name, units)))
+    wide: list[Column] = []
+    for number, row in enumerate(boulders[0]["rows"]):
+        words = [(f"{head[0]} {cell(row)}".strip(), head[1]) for head, cell in above]
+        head = words[0] if len(words) == 1 else (words[0][0], ", ".join(word for word, _ in words[1:]))
+        wide.append((head, _in_row(number, answer)))
+    if len(table_lines([*edge, *wide], boulders, math.inf)[2]) <= WIDTH:
+        return boulders, [*edge, *wide]
+    return boulders, [*edge, (("passes", f"in, of {count}"), lambda row: str(count - row["failing"]))]
 
 
-def _legend(need: Need, file: str) -> list[str]:
-    """Return what the words of the answers mean, how many rows have each, and what to ask next."""
+def _in_row(number: int, cell: Cell) -> Cell:
+    """Return a formatter of one of the rows of a boulder."""
+    return lambda row: cell(row["rows"][number])
+
+
+def _marker(need: Need, units: str) -> Column:
+    """Return the column that marks the boulder of the recommendation."""
+    found, metre = need.recommendation, 1.0 if units == "si" else shown_unit("m", units).size
+    design = None if found is None else found.design
+    sizes = {} if design is None else {n: design.sizes[n] / metre for n in SIDES if n != need.key.name}
+    return ("", ""), lambda row: "→" if sizes and all(row[name] == size for name, size in sizes.items()) else ""
+
+
+def _legend(need: Need) -> list[str]:
+    """Return what the words of the answers mean, and how many rows have each."""
     counts = need.counts()
     smaller = "smaller" if need.key.most else "greater"
     steady = f"passes here and at all {smaller} values, and in other places between values that fail"
     broken = f"{steady} (never*: there alone)" if need.key.is_steady else "fails again further on"
-    lines = [
-        f"{note.format(broken)} ({counted(counts[word], 'row')})" for word, note in NOTES.items() if word in counts
-    ]
-    if "never" in counts or "blocked_by_overlap" in counts:
-        if need.key.name == BOULDER_MASS.name:
-            lines.append(f"next: wider ranges for the sides and the embedment in {file}")
-        else:
-            lines.append(f"next: another boulder: sweep need {shlex.quote(file)} --least mass")
-    return lines
+    return [f"{note.format(broken)} ({counted(counts[word], 'row')})" for word, note in NOTES.items() if word in counts]
 
 
 def _grades(need: Need) -> list[str]:
@@ -430,7 +481,7 @@ def _outside(need: Need) -> list[str]:
     return flag_lines(need.arrow.filter(need.arrow["passes_at"].is_valid())["validity"].to_pylist())
 
 
-def _edges(need: Need, units: str, file: str) -> list[str]:
+def _edges(need: Need, units: str) -> list[str]:
     """Return at which ends of the ranges in the file the lightest boulders lie."""
     from boulder_sweep.answers.keys import sweep_ranges  # loads the kernels
 
@@ -455,7 +506,7 @@ def _edges(need: Need, units: str, file: str) -> list[str]:
     if not ends:
         return ["edges: the lightest boulders lie within the ranges of the file, at no end of one"]
     listed = "; ".join(f"{words} ({count} of {len(passing)})" for words, count in ends.items())
-    return [f"edges: {listed}. Wider ranges in {file} may hold a lighter boulder"]
+    return [f"edges: {listed}. Wider ranges in the file may hold a lighter boulder"]
 
 
 def _need_columns(need: Need, units: str) -> list[Column]:

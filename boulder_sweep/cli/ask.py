@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from boulder_sweep.cli.options import (
     OUTPUT,
@@ -20,6 +22,8 @@ from boulder_sweep.cli.options import (
     refuse_missing,
     refuse_units_of_json,
     refuse_unwritable,
+    say_notes,
+    say_percents,
     set_option,
     take_values,
     units_option,
@@ -31,19 +35,21 @@ from boulder_sweep.text import counted
 NEED_EXAMPLES = """\b
 Examples:
   sweep need configs/site.yaml
-  sweep need configs/site.yaml --margin '25 %' --plot depths.png
-  sweep need configs/site.yaml --robust
+  sweep need configs/site.yaml --prefer excavation --plot depths.png
+  sweep need configs/site.yaml --margin 0 --any --table
   sweep need configs/site.yaml --least height -o heights.parquet
   sweep need configs/uncertain_site.yaml --probability 0.95 --least mass
   sweep need configs/site.yaml --most speed --between '5 m/s' '40 m/s'
 """
+REPEATED = ("units", "least", "most", "margin", "probability", "between", "robust", "prefer", "at", "overrides")
+"""Parameters of `need` that decide the answer, which a further question repeats where they were given."""
 
 
-@click.command("need", short_help="The least depth (or any input) that passes.", epilog=NEED_EXAMPLES)
+@click.command("need", short_help="The boulder to bury, and the least depth that passes.", epilog=NEED_EXAMPLES)
 @grid_argument
 @click.option("--least", metavar="KEY", help="Input whose smallest passing value is wanted [embedment_depth].")
 @click.option("--most", metavar="KEY", help="Input whose largest passing value is wanted, e.g. speed.")
-@margin_option
+@click.option("--margin", metavar="SHARE", help="Least margin to the limits [25 %; 0 with --probability].")
 @click.option("--probability", metavar="P", help="Probability of passing, e.g. 0.95, if inputs have distributions.")
 @click.option(
     "--between",
@@ -53,10 +59,20 @@ Examples:
     help="Range to search, with units, e.g. '5 ft' '9 ft' [default: the axis of the file, or the usual].",
 )
 @click.option(
-    "--robust",
-    is_flag=True,
-    help="Count only passes that stand under every second opinion, with --margin.",
+    "--robust/--any",
+    default=None,
+    help="Count only passes that stand under every second opinion, with the margin, or any pass [robust where second "
+    "opinions know such designs, and without --probability].",
 )
+@click.option(
+    "--prefer",
+    type=click.Choice(("mass", "depth", "excavation")),
+    default="mass",
+    show_default=True,
+    help="What is to be least of the design to build.",
+)
+@click.option("--table", is_flag=True, help="Print every answer, with all its columns.")
+@click.option("--notes", is_flag=True, help="Print what the words mean, and what the model leaves out.")
 @jobs_option
 @click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table of all answers.")
 @click.option("--plot", "picture", type=OUTPUT, metavar="F.png", help="Design chart (.png, .svg or .pdf).")
@@ -71,12 +87,19 @@ def need(
     picture: str | None,
     units: str,
     at: str | None,
+    jobs: int | None,
     quiet: bool,
     overrides: tuple[str, ...],
     as_json: bool,
+    table: bool,
+    notes: bool,
     **question: Any,
 ) -> int:
-    """Find the least KEY that passes, for every combination of the other inputs of GRID.
+    """Name the boulder of GRID to bury, and how deep; or find the least KEY that passes.
+
+    The design named passes in every soil and before every vehicle of GRID with the margin, and stands under every
+    second opinion; of those that do, it is the lightest (--prefer). The table has the least KEY for every combination
+    of the other inputs.
 
     If KEY is an axis of the grid, the axis is the search range; otherwise the usual range, for depths from 0.35 of the
     height to where the truck would go over the boulder. Every answer has a bracket: the value that passes and the next
@@ -85,22 +108,28 @@ def need(
     nothing passes is `blocked_by_overlap` if the truck goes over the boulder at the end of the range (overlap below
     criterion.min_overlap), `undecided` if the last value tried is, and `never` if neither.
     """
-    from boulder_sweep.answers.need import need as find
+    from boulder_sweep.answers.advice import Again
+    from boulder_sweep.answers.need import asked_of
     from boulder_sweep.answers.printing import need_lines
+    from boulder_sweep.judge.quantiles import at_values
 
     refuse_units_of_json(units, as_json)
-    sweep = load_sweep(grid, overrides, quiet, units)
-    if question["probability"] is None:
-        sweep = take_values(sweep, at, quiet, units)
-    elif at is not None:
+    if question["probability"] is not None and at is not None:
         raise click.UsageError("--at and --probability cannot be used together")
+    sweep = load_sweep(grid, overrides, quiet=True)
+    if question["probability"] is None:
+        sweep = at_values(sweep, at)
+    asked = asked_of(sweep, **question)
     refuse_unwritable(out, picture)
+    if not quiet:
+        say_notes(sweep, units)
+        say_percents(margin=question["margin"], probability=question["probability"])
     with working(quiet, of="designs" if question["probability"] is None else "values") as progress:
-        result = find(sweep, **question, progress=progress)
+        result = asked.answers(jobs, progress)
     if as_json:
         show(json.dumps(result.to_dict()))
     else:
-        show(*need_lines(result, units=units, file=grid))
+        show(*need_lines(result, units, Again(grid, _given(REPEATED)), table=table, notes=notes))
     if not quiet:
         counts = ", ".join(f"{word} {count:,}" for word, count in result.counts().items())
         say(f"{counted(len(result), 'row')}: {counts}; {counted(result.simulated, 'simulation')}")
@@ -109,6 +138,23 @@ def need(
     if picture is not None:
         result.plot(picture, units=units)
     return EXIT_SOME_ROWS_FAILED if result.errors else EXIT_DONE
+
+
+def _given(names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
+    """Return the options among these that the user gave to the command that runs, as words to type again."""
+    context = click.get_current_context()
+    words: list[tuple[str, ...]] = []
+    for one in context.command.params:
+        if one.name not in names or context.get_parameter_source(one.name) != ParameterSource.COMMANDLINE:
+            continue
+        value = context.params[one.name]
+        if isinstance(value, bool):
+            words.append((one.opts[0] if value else one.secondary_opts[0],))
+        elif one.multiple:
+            words += [(one.opts[0], each) for each in value]
+        else:
+            words.append((one.opts[0], *([value] if isinstance(value, str) else value)))
+    return tuple(words)
 
 
 UNCERTAINTY_EXAMPLES = """\b
@@ -158,6 +204,8 @@ def uncertainty(
     sweep = load_sweep(grid, overrides, quiet, units)
     refuse_missing(sweep, grid, design)
     refuse_unwritable(out, picture)
+    if not quiet:
+        say_percents(margin=question["margin"], confidence=question["confidence"], half_width=question["half_width"])
     with working(quiet) as progress:
         result = estimate(sweep, **question, progress=progress)
     show(*([json.dumps(result.to_dict())] if as_json else uncertainty_lines(result, units=units)))

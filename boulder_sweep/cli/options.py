@@ -6,6 +6,7 @@ import functools
 import os
 import textwrap
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -104,36 +105,59 @@ def talk_options(function: Command) -> Command:
 def load_sweep(
     path: str, overrides: Sequence[str], quiet: bool, units: str = "si", *, second_opinion: bool = False
 ) -> Sweep:
-    """Load settings and print the notes on them, and how inputs follow from the data of a site, in these units.
-
-    Where the soil has too few elements, some designs are simulated to say what that costs.
-    """
+    """Load settings and print the notes on them; see `say_notes`."""
     from boulder_sweep.settings import load
     from boulder_sweep.settings.loader import SECOND_OPINION
-    from boulder_sweep.settings.sweep import derived_words
 
     sweep = load(path, (*overrides, SECOND_OPINION) if second_opinion else overrides)
     if not quiet:
-        for words in derived_words(sweep.derived, units):
-            say("\n".join(textwrap.wrap(f"note: {words}", 80, subsequent_indent="  ")))
-        for note in sweep.notes:
-            say(f"note: {note}")
-        if sweep.model.has_few_elements:
-            from boulder_sweep.judge.few_elements import words_of_few_elements  # the kernels are heavy
-
-            with working(quiet):
-                words = words_of_few_elements(sweep)
-            say("\n".join(textwrap.wrap(f"note: model.soil: {words}", 80, subsequent_indent="  ")))
+        say_notes(sweep, units)
     return sweep
+
+
+def say_notes(sweep: Sweep, units: str = "si") -> None:
+    """Print the notes on settings, how inputs follow from the data of a site, and which values uncertain inputs have.
+
+    Where the soil has too few elements, some designs are simulated to say what that costs.
+    """
+    from boulder_sweep.settings.sweep import derived_words
+
+    for words in derived_words(sweep.derived, units):
+        say("\n".join(textwrap.wrap(f"note: {words}", 80, subsequent_indent="  ")))
+    for note in sweep.notes:
+        say(f"note: {note}")
+    if sweep.model.has_few_elements:
+        from boulder_sweep.judge.few_elements import words_of_few_elements  # the kernels are heavy
+
+        with working(quiet=False):
+            words = words_of_few_elements(sweep)
+        say("\n".join(textwrap.wrap(f"note: model.soil: {words}", 80, subsequent_indent="  ")))
+    say_values(sweep, units)
+
+
+def say_percents(**shares: str | None) -> None:
+    """Say of which options a bare number above 1 is read as per cent; those that are no numbers are refused later."""
+    for name, text in shares.items():
+        with suppress(ValueError):
+            if text is not None and float(text) > 1.0:
+                say(f"note: --{name.replace('_', '-')} {text} is read as {text} %")
+
+
+def say_values(sweep: Sweep, units: str = "si") -> None:
+    """Print the values that uncertain inputs are taken at, if any are."""
+    from boulder_sweep.judge.quantiles import words_of
+
+    if sweep.taken_at:
+        say("\n".join(wrap(f"note: {words_of(sweep, units)}")))
 
 
 def take_values(sweep: Sweep, at: str | None, quiet: bool, units: str = "si") -> Sweep:
     """Return settings with one value for every uncertain input, and print these values."""
-    from boulder_sweep.judge.quantiles import at_values, words_of
+    from boulder_sweep.judge.quantiles import at_values
 
     sweep = at_values(sweep, at)
-    if sweep.taken_at and not quiet:
-        say("\n".join(wrap(f"note: {words_of(sweep, units)}")))
+    if not quiet:
+        say_values(sweep, units)
     return sweep
 
 

@@ -48,8 +48,7 @@ IN_WORDS = (
 )
 """What ``robust`` means, in words,"""
 SENSITIVE_IN_WORDS = (
-    "a second opinion overturns it; no fail, but ask for a better soil test, a deeper bed (sweep need --robust) or a "
-    "crash test"
+    "a second opinion overturns it; no fail, but ask for a better soil test, a deeper bed or a crash test"
 )
 """and ``sensitive``."""
 MEANINGS = {
@@ -65,7 +64,7 @@ UNSTUDIED_IN_WORDS = (
 """And ``open``, where they were asked."""
 GIVES_WAY = (
     "no second opinion: by the density and friction angle of the soil the ground under the foot cannot carry the "
-    "boulder's own weight; ask for a better soil test, a deeper bed (sweep need --robust) or a foundation"
+    "boulder's own weight; ask for a better soil test, a deeper bed or a foundation"
 )
 """And of a sensitive pass whose boulder would sink before the impact."""
 FREE_ROTATION_DEG = 8.0

@@ -85,7 +85,7 @@ _HEAD = """\
 # {name}: which boulder, buried how deep, stops the truck?
 #
 #   sweep check {file}     is the file valid, how many designs has it?
-#   sweep need {file}      how deep must each of these boulders be buried?
+#   sweep need {file}      which of these boulders, buried how deep?
 #   sweep run {file}       simulate them all into one table
 #
 # Every entry takes one value, a list [a, b], or a range {{from, to, step}} or {{from, to, count}}, in SI or US units.

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from boulder_sweep import load, need, uncertainty
+from boulder_sweep.answers.advice import Again
 from boulder_sweep.answers.printing import need_lines, reserve_lines, uncertainty_lines
 from boulder_sweep.answers.reserves import reserves
 from boulder_sweep.crash_tests.tables import Table
@@ -45,12 +46,12 @@ ONE_STIFFNESS = ("soil.subgrade_reaction=63 MN/m^3",)
 
 def need_of_site(root: Path) -> str:
     """Return the depths of the site as a terminal shows them."""
-    return _fenced(need_lines(need(load(root / SITE)), file=str(SITE)))
+    return _fenced(need_lines(need(load(root / SITE)), again=Again(str(SITE)), table=True, notes=True))
 
 
 def lightest_of_grid(root: Path) -> str:
     """Return the lightest boulders of the M30 grid as a terminal shows them, at one stiffness of the soil."""
-    return _fenced(need_lines(need(load(root / GRID, ONE_STIFFNESS), "mass"), file=str(GRID)))
+    return _fenced(need_lines(need(load(root / GRID, ONE_STIFFNESS), "mass"), again=Again(str(GRID))))
 
 
 def capacity_of_site(root: Path) -> str:
@@ -65,7 +66,7 @@ def uncertainty_of_site(root: Path) -> str:
 
 def need_with_probability(root: Path) -> str:
     """Return the depth for a chance of 95 % as a terminal shows it."""
-    return _fenced(need_lines(need(load(root / UNCERTAIN), probability=0.95)))
+    return _fenced(need_lines(need(load(root / UNCERTAIN), probability=0.95), again=Again(str(UNCERTAIN))))
 
 
 def partial_factors(root: Path) -> str:
@@ -88,7 +89,7 @@ def chances_with_factor(root: Path, factor: float) -> np.ndarray:
     one_depth = "site.embedment_depth=2 m"
     unfactored = load(root / GRID, [one_depth])
     factored = load(root / GRID, [one_depth, f"partial_factor.friction_angle={factor}"])
-    frame = need(factored).frame
+    frame = need(factored, margin=0.0, robust=False).frame
     found = (frame.found == "found").to_numpy()
     rows = {name: values[found] for name, values in unfactored.plan.given_rows(0, unfactored.n_designs).items()}
     rows["embedment_depth_m"] = frame.passes_at.to_numpy()[found]

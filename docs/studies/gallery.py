@@ -45,19 +45,19 @@ def words_of(root: Path, name: str) -> str:
 
 
 def embassy_street(file: Path, picture: Path) -> str:
-    """Return the lightest boulder for which some depth is robust, and what the narrower ones lack."""
-    found = need(load(file), robust=True)
+    """Return the boulder that is recommended, and what the narrower ones lack."""
+    found = need(load(file))
     found.plot(picture)
-    rows = found.frame
-    rows["mass_t"] = rows.eval("boulder_length_m * boulder_width_m * boulder_height_m * boulder_density_kg_m3") / 1e3
-    best = rows[rows.found == "found"].sort_values("mass_t").iloc[0]
-    blocked = rows[rows.found == "blocked_by_overlap"]
-    above = best.boulder_height_m - best.least_embedment_depth_m
+    assert found.recommendation is not None
+    assert found.recommendation.design is not None
+    best, blocked = found.recommendation.design.sizes, found.frame[found.frame.found == "blocked_by_overlap"]
+    narrow = blocked[blocked.boulder_width_m == blocked.boulder_width_m.min()]
+    width, height, depth = (best[name] for name in ("boulder_width_m", "boulder_height_m", "embedment_depth_m"))
     return (
-        f"The lightest boulder with a robust pass has {best.mass_t:.1f} t: {best.boulder_width_m:.1f} m wide, "
-        f"{best.boulder_height_m:.1f} m high and {best.least_embedment_depth_m:.2f} m deep; {above:.2f} m "
-        f"stand above the ground. Of those {blocked.boulder_width_m.max():.1f} m wide, heights up to "
-        f"{blocked.boulder_height_m.max():.1f} m are blocked: buried deep enough, they no longer reach the bumper."
+        "The lightest boulder that passes with a quarter to spare, under every second opinion, has "
+        f"{best['boulder_mass_kg'] / 1e3:.1f} t: {width:.1f} m wide, {height:.1f} m high and {depth:.2f} m deep; "
+        f"{height - depth:.2f} m stand above the ground. Of those {narrow.boulder_width_m.min():.1f} m wide, heights "
+        f"up to {narrow.boulder_height_m.max():.1f} m are blocked: buried deep enough, they no longer reach the bumper."
     )
 
 
@@ -93,9 +93,9 @@ def clayey_terrace(file: Path, picture: Path) -> str:
 
 def embankment(file: Path, picture: Path) -> str:
     """Return the lowest boulders that stop the truck at the speed of the file, and what the slope takes."""
-    found = need(load(file), most="speed")
+    found = need(load(file), most="speed", margin=0.0)
     found.plot(picture)
-    level = need(load(file, ["soil.slope=0 deg"]), most="speed").frame.most_impact_speed_m_s
+    level = need(load(file, ["soil.slope=0 deg"]), most="speed", margin=0.0, robust=False).frame.most_impact_speed_m_s
     rows = found.frame
     lost = 1.0 - rows.most_impact_speed_m_s / level
     at = 30.0 * MPH
@@ -111,7 +111,7 @@ def embankment(file: Path, picture: Path) -> str:
 
 def quarry_stone(file: Path, picture: Path) -> str:
     """Return the least depths in the weakest and the strongest soil of the file."""
-    found = need(load(file), margin="25 %")
+    found = need(load(file))
     found.plot(picture)
     rows = found.frame.sort_values("friction_angle_deg")
     weak, strong = rows.iloc[0], rows.iloc[-1]

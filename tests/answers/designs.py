@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from boulder_sweep.answers.need import Need
+from boulder_sweep.answers.need import Need, need
 from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
@@ -16,6 +17,8 @@ from boulder_sweep.settings import Sweep, load_text
 from boulder_sweep.settings.sweep import DesignList
 
 DEPTH = "embedment_depth_m"
+bare_need = partial(need, margin=0.0, robust=False)
+"""Asks for the bare least value that passes."""
 SITE = """
 name: site
 boulder:  {{length: {length}, width: {width}, height: {height}, density: 2600 kg/m^3}}
@@ -36,6 +39,9 @@ DEFAULTS = {
     "readings": "corrected",
     "accuracy": "balanced",
 }
+
+
+UNCERTAIN_FRICTION = {"friction": "{mean: 38 deg, sd: 2 deg}"}
 
 
 def site(**changes: str) -> Sweep:

@@ -12,13 +12,12 @@ import pytest
 import boulder_sweep
 from boulder_sweep.answers.keys import key_of
 from boulder_sweep.answers.lightest import Boulders, LightestQuestion
-from boulder_sweep.answers.need import need
 from boulder_sweep.answers.trials import Remembered, judges_of
 from boulder_sweep.designs import block_of
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.judged import PASS
 from boulder_sweep.settings import Sweep
-from tests.answers.designs import DEPTH, passes, random_designs, site
+from tests.answers.designs import DEPTH, bare_need, passes, random_designs, site
 
 
 def test_the_lightest_boulder_is_lighter_than_any_of_the_grid(tmp_path: Path) -> None:
@@ -34,7 +33,7 @@ def test_the_lightest_boulder_is_lighter_than_any_of_the_grid(tmp_path: Path) ->
     mass = table.boulder_length_m.astype(float) * table.boulder_width_m.astype(float)
     mass *= table.boulder_height_m.astype(float) * table.boulder_density_kg_m3.astype(float)
     of_grid = mass.groupby(table.friction_angle_deg).min()
-    found = need(sweep, "mass")
+    found = bare_need(sweep, "mass")
     frame = found.frame
     assert (frame.least_boulder_mass_kg.to_numpy() <= of_grid.to_numpy()).all()
     assert (frame.least_boulder_mass_kg.to_numpy() > 0.9 * of_grid.to_numpy()).all()
@@ -61,7 +60,7 @@ def test_the_lightest_boulder_may_reach_no_deeper_than_it_must_overlap(
 ) -> None:
     """The deepest embedment of a range may leave too little overlap; the best one is just above that limit."""
     usual = {"height": "[1.8, 3.6] m", "site": "embedment_ratio: [0.45, 0.75]"}
-    found = need(site(**(usual | changes)), "mass")
+    found = bare_need(site(**(usual | changes)), "mass")
     frame = found.frame
     assert frame.least_boulder_mass_kg[0] < lighter_kg
     assert passes(found, frame, frame[DEPTH], DEPTH).all()
@@ -99,7 +98,7 @@ def test_no_boulder_among_many_is_lighter_than_the_lightest() -> None:
     for _ in range(8):
         bounds, changes = random_bounds(rng)
         sweep = site(**changes)
-        answer = need(sweep, "mass").frame.iloc[0]
+        answer = bare_need(sweep, "mass").frame.iloc[0]
         least = answer.least_boulder_mass_kg
         best = np.array([answer[f"boulder_{side}_m"] for side in bounds], dtype=float)
         ends = np.array(list(bounds.values()))
@@ -149,7 +148,7 @@ def lighter_around(sweep: Sweep, answer: pd.Series, count: int = 2000) -> np.nda
 
 def assert_lightest(sweep: Sweep) -> pd.Series:
     """Assert that no boulder around the lightest is lighter by more than a millimetre of the shortest side."""
-    answer = need(sweep, "mass").frame.iloc[0]
+    answer = bare_need(sweep, "mass").frame.iloc[0]
     assert answer.found == "found"
     shortest = min(answer.boulder_length_m, answer.boulder_width_m, answer.boulder_height_m)
     lighter = lighter_around(sweep, answer)
@@ -196,7 +195,7 @@ def test_no_boulder_around_the_lightest_of_shallow_ones_is_lighter() -> None:
     rng = np.random.default_rng(3)
     for _ in range(24):
         sweep = site(**shallow_bounds(rng))
-        if need(sweep, "mass").frame.found[0] == "found":
+        if bare_need(sweep, "mass").frame.found[0] == "found":
             assert_lightest(sweep)
 
 
@@ -213,7 +212,7 @@ def test_no_boulder_around_the_lightest_is_lighter(tallest: tuple[float, float])
 
 
 def test_one_boulder_is_scaled_with_its_proportions() -> None:
-    frame = need(site(height="3 m", site="embedment_ratio: 0.65"), "mass").frame
+    frame = bare_need(site(height="3 m", site="embedment_ratio: 0.65"), "mass").frame
     assert np.allclose(frame.boulder_height_m / frame.boulder_length_m, 3.0 / 1.65, rtol=2e-3)
     assert np.allclose(frame[DEPTH] / frame.boulder_height_m, 0.65, rtol=2e-3)
     assert frame.boulder_mass_kg.is_monotonic_decreasing, "a stronger soil needs a lighter boulder"
@@ -221,4 +220,4 @@ def test_one_boulder_is_scaled_with_its_proportions() -> None:
 
 def test_a_list_of_designs_has_no_bounds_for_the_mass() -> None:
     with pytest.raises(QuestionError, match="a list of designs has none"):
-        need(random_designs(3), "mass")
+        bare_need(random_designs(3), "mass")

@@ -78,5 +78,6 @@ def test_the_table_shows_the_probability(found):
     from boulder_sweep.answers.printing import need_lines
 
     lines = need_lines(found)
+    lines = lines[lines.index("") + 1 :]
     assert lines[0].split() == ["mass", "L", "W", "H", "depth", "P(pass)", "dig", "fill"]
     assert lines[3].split()[-3] == f"{found.frame.p_pass[0]:.3f}"

@@ -24,7 +24,7 @@ from boulder_sweep.judge.judged import PASS, Judged
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.settings import Sweep, load_text
 from boulder_sweep.settings.sweep import DesignList
-from tests.answers.designs import DEPTH, passes, random_designs, site
+from tests.answers.designs import DEPTH, bare_need, passes, random_designs, site
 
 ONE_UNCERTAIN = """
 name: one
@@ -49,7 +49,7 @@ def certify(found: Need) -> int:
 
 
 def test_brackets_of_random_designs_are_certified() -> None:
-    found = need(random_designs(2000), "embedment_depth")
+    found = bare_need(random_designs(2000), "embedment_depth")
     assert certify(found) >= 500
     counts = found.counts()
     assert sum(counts.values()) == len(found) == 2000
@@ -59,12 +59,12 @@ def test_brackets_of_random_designs_are_certified() -> None:
 
 @pytest.mark.parametrize("accuracy", ["fast", "fine"])
 def test_brackets_hold_for_every_accuracy(accuracy: str) -> None:
-    assert certify(need(site(accuracy=accuracy))) >= 4
+    assert certify(bare_need(site(accuracy=accuracy))) >= 4
 
 
 @pytest.mark.parametrize("accuracy", ["fast", "balanced", "fine"])
 def test_as_printed_nothing_is_proved_so_nothing_is_found(accuracy: str) -> None:
-    frame = need(site(readings="as_printed", accuracy=accuracy)).frame
+    frame = bare_need(site(readings="as_printed", accuracy=accuracy)).frame
     stands = frame[frame.found == "undecided"]
     assert set(frame.found) == {"undecided", "blocked_by_overlap"}
     assert len(stands) >= 3
@@ -85,7 +85,7 @@ def test_as_printed_nothing_is_proved_so_nothing_is_found(accuracy: str) -> None
 )
 def test_any_input_may_be_asked_for(question: dict[str, str], column: str) -> None:
     sweep = site(height="3 m", friction="[36, 38, 40, 42] deg", site="embedment_depth: [1.9, 2.0, 2.1, 2.2] m")
-    found = need(sweep, **question)
+    found = bare_need(sweep, **question)
     sense = "most" if "most" in question else "least"
     assert found.key.answer == f"{sense}_{column}"
     certify(found)
@@ -93,15 +93,15 @@ def test_any_input_may_be_asked_for(question: dict[str, str], column: str) -> No
 
 
 def test_ratio_as_key() -> None:
-    depth = need(site(), "embedment_depth").frame
-    ratio = need(site(), "embedment_ratio").frame
+    depth = bare_need(site(), "embedment_depth").frame
+    ratio = bare_need(site(), "embedment_ratio").frame
     assert np.allclose(
         ratio.least_embedment_ratio * ratio.boulder_height_m, depth.least_embedment_depth_m, atol=4e-3, equal_nan=True
     )
 
 
 def test_an_axis_is_the_range() -> None:
-    found = need(site(site="embedment_ratio: [0.6, 0.62]", height="3.4 m")).frame
+    found = bare_need(site(site="embedment_ratio: [0.6, 0.62]", height="3.4 m")).frame
     assert found[DEPTH].between(0.6 * 3.4 - 1e-3, 0.62 * 3.4 + 1e-3).all()
     assert found.found.tolist() == ["never", "always"]
     assert found.fails_at[0] == pytest.approx(0.62 * 3.4, abs=1e-3)
@@ -109,8 +109,8 @@ def test_an_axis_is_the_range() -> None:
 
 
 def test_margin_needs_more_depth() -> None:
-    plain = need(site()).frame
-    more = need(site(), margin="25 %")
+    plain = bare_need(site()).frame
+    more = bare_need(site(), margin="25 %")
     assert (more.frame.least_embedment_depth_m > plain.least_embedment_depth_m)[more.frame.passes_at.notna()].all()
     assert more.frame.margin[more.frame.passes_at.notna()].between(0.25, 0.27).all()
 
@@ -136,12 +136,12 @@ def test_a_margin_is_proved_to_last() -> None:
                 assert judges.holds(rows)[0] == holds
                 assert rows["margin"][0] >= 0.375 or not holds or sweep is long
     question = {"margin": "36 %", "between": ("1.2 m", "1.4 m")}
-    one, other = (need(sweep, "embedment_depth", **question).frame.iloc[0] for sweep in (brief, long))
+    one, other = (bare_need(sweep, "embedment_depth", **question).frame.iloc[0] for sweep in (brief, long))
     assert (one.found, one.passes_within) == (other.found, other.passes_within) == ("not_monotone", "1.2 to 1.219")
 
 
 def test_a_boulder_that_ends_below_the_bumper_is_no_answer() -> None:
-    found = need(site(height="2.6 m", friction="36 deg")).frame.iloc[0]
+    found = bare_need(site(height="2.6 m", friction="36 deg")).frame.iloc[0]
     assert found.found == "blocked_by_overlap"
     assert math.isnan(found.passes_at)
     assert found.fails_at < 2.6 - 0.5
@@ -151,7 +151,7 @@ def test_a_boulder_that_ends_below_the_bumper_is_no_answer() -> None:
 @pytest.mark.parametrize("count", [150, pytest.param(300, marks=pytest.mark.nightly)])
 def test_what_is_not_monotone_is_said_with_all_that_passes(count: int) -> None:
     """Hardly buried, a boulder may slide less than is allowed; deeper it turns over; deeper still it is held."""
-    found = need(random_designs(count), between=("0.05 m", "1.2 m"))
+    found = bare_need(random_designs(count), between=("0.05 m", "1.2 m"))
     frame = found.frame[found.frame.found == "not_monotone"]
     assert len(frame) >= 5
     rows, inside, outside = [], [], []
@@ -170,17 +170,17 @@ def test_what_is_not_monotone_is_said_with_all_that_passes(count: int) -> None:
 
 
 def test_answers_do_not_depend_on_the_threads() -> None:
-    one, two = (need(site(), jobs=jobs) for jobs in (1, 2))
+    one, two = (bare_need(site(), jobs=jobs) for jobs in (1, 2))
     assert one.arrow.equals(two.arrow)
 
 
 def test_rows_do_not_depend_on_their_neighbours() -> None:
     sweep = random_designs(40)
-    whole = need(sweep).frame
+    whole = bare_need(sweep).frame
     assert sweep.table is not None
     for row in (3, 17):
         alone = DesignList("one.csv", {name: values[row : row + 1] for name, values in sweep.table.columns.items()})
-        frame = need(Sweep("one", None, (), sweep.constants, alone)).frame
+        frame = bare_need(Sweep("one", None, (), sweep.constants, alone)).frame
         for name in ("found", "passes_at", "max_rotation_deg"):
             pd.testing.assert_series_equal(
                 frame[name].astype(str), whole[name][row : row + 1].astype(str).reset_index(drop=True)
@@ -190,7 +190,7 @@ def test_rows_do_not_depend_on_their_neighbours() -> None:
 def test_progress_counts_rows_or_the_values_tried_for_a_probability() -> None:
     """One row of many samples takes long: its progress moves, up to the end."""
     seen: list[tuple[int, int]] = []
-    need(load_text(ONE_UNCERTAIN, Path("one.yaml")), probability=0.9, progress=lambda *now: seen.append(now))
+    bare_need(load_text(ONE_UNCERTAIN, Path("one.yaml")), probability=0.9, progress=lambda *now: seen.append(now))
     done, totals = zip(*seen, strict=True)
     assert len(set(totals)) == 1
     assert totals[0] > 10
@@ -199,7 +199,7 @@ def test_progress_counts_rows_or_the_values_tried_for_a_probability() -> None:
     assert list(done) == sorted(set(done))
     assert len(done) > 5
     seen.clear()
-    rows = len(need(site(), progress=lambda *now: seen.append(now)))
+    rows = len(bare_need(site(), progress=lambda *now: seen.append(now)))
     assert seen[0] == (0, rows)
     assert seen[-1] == (rows, rows)
 
@@ -222,7 +222,7 @@ def test_progress_counts_rows_or_the_values_tried_for_a_probability() -> None:
 )
 def test_questions_that_make_no_sense_are_refused(question: dict, message: str) -> None:
     with pytest.raises(QuestionError, match=message):
-        need(site(), **question)
+        bare_need(site(), **question)
 
 
 @pytest.mark.parametrize(
@@ -243,21 +243,21 @@ def test_questions_that_make_no_sense_are_refused(question: dict, message: str) 
 @pytest.mark.filterwarnings("error")
 def test_a_range_that_is_too_narrow_is_refused(question: dict, message: str) -> None:
     with pytest.raises(QuestionError, match=message):
-        need(site(height="2.6 m"), **question)
+        bare_need(site(height="2.6 m"), **question)
 
 
 def test_an_axis_between_two_multiples_is_refused() -> None:
     sweep = site(height="3 m", friction="40 deg", site="embedment_depth: [1.9491, 1.9499] m")
     with pytest.raises(QuestionError, match="holds no multiple"):
-        need(sweep)
-    assert need(sweep, between=("1.94 m", "1.96 m")).frame.passes_at[0] == 1.949
+        bare_need(sweep)
+    assert bare_need(sweep, between=("1.94 m", "1.96 m")).frame.passes_at[0] == 1.949
 
 
 @pytest.mark.parametrize("question", [{}, {"least": "embedment_ratio"}])
 def test_the_end_of_the_range_tells_what_is_blocked_and_not_the_last_multiple_before_it(question: dict) -> None:
-    found = need(site(height="2.6 m"), **question).frame
+    found = bare_need(site(height="2.6 m"), **question).frame
     assert found.found.tolist() == ["blocked_by_overlap", "blocked_by_overlap"]
-    assert need(site(height="2.6 m"), between=("1.5 m", "1.8 m")).frame.found[0] == "never"
+    assert bare_need(site(height="2.6 m"), between=("1.5 m", "1.8 m")).frame.found[0] == "never"
 
 
 @pytest.mark.parametrize("question", [{"between": ("1 m", "1.9 m")}, {"most": "impact_height"}])
@@ -267,7 +267,7 @@ def test_one_height_tells_what_is_blocked_from_what_never_passes(question: dict,
     heights = np.concatenate([height - np.arange(400, 0, -8) * 1e-3, height + np.array([-4e-4, 0.0, 4e-4, 8e-3])])
     sweep = site(height=str([float(own) for own in heights.round(4)]), friction="30 deg", site="embedment_depth: 1.9 m")
     sweep = dataclasses.replace(sweep, criterion=dataclasses.replace(sweep.criterion, min_overlap_m=least))
-    found = need(sweep, **question).frame.found
+    found = bare_need(sweep, **question).frame.found
     blocked = heights < height - 1e-9 if least else heights <= height + 1e-9  # without overlap the truck passes over
     assert found.tolist() == np.where(blocked, "blocked_by_overlap", "never").tolist()
 
@@ -278,28 +278,28 @@ def test_a_curve_of_the_chart_holds_one_ratio_of_embedment(tmp_path: Path, monke
     monkeypatch.setattr("boulder_sweep.views.answer_charts._curve", lambda *words: curves.append(words[2]))
     monkeypatch.setattr("matplotlib.axes.Axes.legend", lambda *_, **__: None)  # of no curve
     sweep = site(height="[3, 3.2, 3.4] m", friction="40 deg", site="embedment_ratio: [0.6, 0.65, 0.7]")
-    need(sweep, most="speed").plot(tmp_path / "chart.png")
+    bare_need(sweep, most="speed").plot(tmp_path / "chart.png")
     assert [rows.boulder_height_m.tolist() for rows in curves] == [[3.0, 3.2, 3.4]]
     assert (curves[0].embedment_depth_m / curves[0].boulder_height_m).tolist() == pytest.approx([0.65] * 3)
 
 
 def test_ranges_that_are_narrow_by_themselves_are_searched() -> None:
     """Ends of half a millimetre where the truck goes over, no range at all, and one value that is not round."""
-    found = need(site(height="[0.7, 0.7696, 3] m", friction="40 deg")).frame
+    found = bare_need(site(height="[0.7, 0.7696, 3] m", friction="40 deg")).frame
     assert found.found.tolist() == ["blocked_by_overlap", "blocked_by_overlap", "found"]
-    one = need(site(height="2.999 m", friction="40 deg", site="embedment_ratio: [0.7]")).frame
+    one = bare_need(site(height="2.999 m", friction="40 deg", site="embedment_ratio: [0.7]")).frame
     assert one.found.tolist() == ["always"]
 
 
 def test_a_partial_factor_on_the_angle_that_is_asked_for_is_refused() -> None:
     factored = dataclasses.replace(site(), partial_factor=1.25)
     with pytest.raises(QuestionError, match="multiply the tangent of the answer"):
-        need(factored, "friction_angle")
+        bare_need(factored, "friction_angle")
 
 
 def test_distributions_are_taken_at_their_unfavourable_quantiles() -> None:
     uncertain = site(friction="{mean: 38 deg, sd: 3 deg}")
-    assert need(uncertain).arrow.equals(need(at_values(uncertain)).arrow)
+    assert bare_need(uncertain).arrow.equals(bare_need(at_values(uncertain)).arrow)
 
 
 def test_values_of_the_lattice_are_those_that_a_file_would_give() -> None:
@@ -307,7 +307,7 @@ def test_values_of_the_lattice_are_those_that_a_file_would_give() -> None:
 
 
 def test_table_has_units_and_settings(tmp_path: Path) -> None:
-    found = need(site())
+    found = bare_need(site())
     path = found.write(tmp_path / "depths.parquet")
     schema = pq.read_schema(path)
     assert schema.field("least_embedment_depth_m").metadata[b"unit"] == b"m"
@@ -323,13 +323,13 @@ def test_table_has_units_and_settings(tmp_path: Path) -> None:
 
 
 def test_chart_is_drawn(tmp_path: Path) -> None:
-    need(site()).plot(tmp_path / "chart.png")
-    need(site(), "mass").plot(tmp_path / "mass.png")
+    bare_need(site()).plot(tmp_path / "chart.png")
+    bare_need(site(), "mass").plot(tmp_path / "mass.png")
     assert (tmp_path / "chart.png").stat().st_size > 10_000
     with pytest.raises(PictureError, match="no curve"):
-        need(site(height="3 m", friction="40 deg")).plot(tmp_path / "one.png")
+        bare_need(site(height="3 m", friction="40 deg")).plot(tmp_path / "one.png")
     with pytest.raises(PictureError, match="nothing passes"):
-        need(site(), margin="99 %").plot(tmp_path / "none.png")
+        bare_need(site(), margin="99 %").plot(tmp_path / "none.png")
 
 
 def test_public_name() -> None:
@@ -351,7 +351,7 @@ def test_a_design_is_judged_once_with_the_accuracy_of_the_sweep(monkeypatch: pyt
 
     judge = Evaluation.__call__
     monkeypatch.setattr(Evaluation, "__call__", counted)
-    found = need(sweep, jobs=1)
+    found = bare_need(sweep, jobs=1)
     assert own.accuracy.error_estimate
     assert len(judged) == len(set(judged)) >= len(found)
 

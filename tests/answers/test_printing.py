@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from boulder_sweep import uncertainty
-from boulder_sweep.answers.need import need
 from boulder_sweep.answers.printing import HEADS, need_lines, reserve_lines, uncertainty_lines
 from boulder_sweep.answers.reserves import reserves
 from boulder_sweep.settings import load_text
 from boulder_sweep.settings.fields import INPUTS
-from tests.answers.designs import site
+from tests.answers.designs import bare_need, site
 
 RATIOS = "embedment_ratio: [0.6, 0.65]"
 UNCERTAIN = {"friction": "{mean: 38 deg, sd: 2 deg}", "site": RATIOS}
+
+
+def table_of(lines: list[str]) -> list[str]:
+    """Return lines from the head of the table on."""
+    return lines[lines.index("") + 1 :]
 
 
 def test_every_input_has_a_head() -> None:
@@ -24,8 +29,8 @@ def test_every_input_has_a_head() -> None:
 
 @pytest.mark.parametrize("key", ["speed", "height", "friction_angle"])
 def test_ratios_tell_answers_apart(key: str) -> None:
-    found = need(site(site=RATIOS, height="[3, 3.4] m"), key)
-    lines = need_lines(found)
+    found = bare_need(site(site=RATIOS, height="[3, 3.4] m"), key)
+    lines = table_of(need_lines(found, table=True))
     heads = lines[0].split()
     assert "ratio" in heads
     assert "depth" not in heads, "follows from ratio and height"
@@ -47,7 +52,7 @@ def test_ratios_tell_designs_apart_whose_reserves_or_chances_are_shown() -> None
 @pytest.mark.parametrize("given", ["embedment_depth: [1.8, 2.0] m", RATIOS])
 @pytest.mark.parametrize("key", ["embedment_ratio", "embedment_depth", "mass"])
 def test_the_other_measure_of_what_is_asked_for_is_no_input(key: str, given: str) -> None:
-    heads = need_lines(need(site(site=given), key))[0].split()
+    heads = table_of(need_lines(bare_need(site(site=given), key), table=True))[0].split()
     assert heads[: 2 if key != "mass" else 1] == (["H", "φ′"] if key != "mass" else ["φ′"])
     assert heads.count("depth") == (0 if key == "embedment_ratio" else 1)
     assert heads.count("ratio") == (0 if key == "mass" else 1)
@@ -65,48 +70,66 @@ vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*
 @pytest.fixture(scope="module")
 def many():
     """Answers for 12 boulders in 8 soils."""
-    return need(load_text(GRID, Path("grid.yaml")))
+    return bare_need(load_text(GRID, Path("grid.yaml")))
 
 
-def test_many_answers_stand_boulder_by_soil_and_none_is_left_out(many) -> None:
+def test_boulders_stand_with_the_depth_that_all_soils_need(many) -> None:
     assert len(many) == 96
-    lines = need_lines(many)
+    lines = table_of(need_lines(many))
     assert all(len(line) <= 80 for line in lines)
-    tables = "\n".join(lines).split("\n\n")
-    assert lines[0].strip() == "least depth [m] by boulder and soil"
-    found = {}
-    for table in tables:
-        rows = table.splitlines()
-        (at,) = [place for place, line in enumerate(rows) if line.startswith("─")]
-        soils = list(zip(*(line.split()[2:] for line in rows[at - 4 : at - 2]), strict=True))
-        assert rows[at - 2].split() == ["W", "H", "mass"]
-        for line in rows[at + 1 : at + 13]:
-            width, height, mass, *cells = line.split()
-            assert float(mass) == pytest.approx(float(width) * float(height) * 1.65 * 2.6, abs=0.06)
-            found |= {(width, height, *soil): cell for soil, cell in zip(soils, cells, strict=True)}
-    assert len(found) == 96
-    for row in many.arrow.to_pylist():
-        key = [row[name] for name in ("boulder_width_m", "boulder_height_m")]
-        key += [row[name] for name in ("friction_angle_deg", "subgrade_reaction_MN_m3")]
-        cell = found[tuple(f"{value:.5g}" for value in key)]
-        words = {"blocked_by_overlap": "blocked", "never": "never", "undecided": "undecided"}
-        assert cell == words.get(row["found"], f"{row['least_embedment_depth_m'] or 0:.3f}")
+    assert lines[0].split() == ["W", "H", "mass", "all", "passes"]
+    assert lines[1].split() == ["m", "m", "t", "m", "in,", "of", "8"]
+    frame = many.frame.groupby(["boulder_width_m", "boulder_height_m"]).least_embedment_depth_m
+    needed, count = frame.max().where(frame.count() == 8), frame.count()
+    shown = [line.replace("→", " ").split() for line in lines[3:15]]
+    assert len(shown) == len(needed) == 12
+    assert {cells[3] for cells in shown} > {"-"}
+    for width, height, mass, depth, passing in shown:
+        size = float(width), float(height)
+        assert float(mass) == pytest.approx(size[0] * size[1] * 1.65 * 2.6, abs=0.06)
+        assert depth == ("-" if np.isnan(needed[size]) else f"{needed[size]:.3f}")
+        assert int(passing) == count[size]
 
 
-def test_of_too_many_answers_whole_tables_are_shown(many, monkeypatch) -> None:
+def test_soils_that_fit_are_columns() -> None:
+    found = bare_need(load_text(GRID.replace("[36, 38, 40, 42]", "[36, 42]"), Path("grid.yaml")))
+    lines = table_of(need_lines(found))
+    assert lines[0].split() == ["W", "H", "mass", "all", "φ′", "36", "φ′", "36", "φ′", "42", "φ′", "42"]
+    assert lines[1].split() == ["m", "m", "t", "m", "β", "50", "β", "80", "β", "50", "β", "80"]
+    rows, words = found.arrow.to_pylist(), {"blocked_by_overlap": "blocked", "never": "never", "undecided": "undecided"}
+    cells = [words.get(row["found"], f"{row['least_embedment_depth_m'] or 0:.3f}") for row in rows]
+    assert [cell for line in lines[3:15] for cell in line.replace("→", " ").split()[4:]] == cells
+
+
+def test_the_boulder_that_is_recommended_is_marked(many) -> None:
+    lines = table_of(need_lines(many))
+    sizes = many.recommendation.design.sizes
+    (marked,) = (line.split()[1:3] for line in lines if "→" in line)
+    assert [float(cell) for cell in marked] == [sizes["boulder_width_m"], sizes["boulder_height_m"]]
+
+
+def test_of_too_many_boulders_the_best_are_shown(many, monkeypatch) -> None:
+    monkeypatch.setattr("boulder_sweep.answers.printing.MOST_SHOWN", 5)
+    lines = table_of(need_lines(many))
+    assert [line.split()[-1] for line in lines[3:8]] == ["8"] * 5
+    masses = [float(line.replace("→", " ").split()[2]) for line in lines[3:8]]
+    assert masses == sorted(masses)
+    assert lines[8] == "(5 of 12, the best first; --table has all answers)"
+    assert "→" in lines[3]
+
+
+def test_the_table_of_all_answers_ends_somewhere(many, monkeypatch) -> None:
     monkeypatch.setattr("boulder_sweep.answers.printing.MOST_IN_ALL", 20)
-    lines = need_lines(many)
-    assert sum(line.startswith("─") for line in lines) == 1
-    assert "(the first 1 of 2 tables; -o writes all 96 rows)" in lines
+    lines = table_of(need_lines(many, table=True))
+    assert lines[0].split()[:7] == ["W", "H", "φ′", "β", "depth", "ratio", "above"]
+    assert lines[23] == "(the first 20 of 96 answers; -o writes them all)"
 
 
-def test_many_answers_without_a_soil_that_varies_are_one_table() -> None:
-    text = (
-        GRID.replace("[36, 38, 40, 42] deg", "40 deg").replace("[50, 80]", "50").replace("step: 0.2 m", "step: 0.04 m")
-    )
-    lines = need_lines(need(load_text(text, Path("grid.yaml"))))
+def test_answers_without_a_soil_that_varies_are_one_table() -> None:
+    text = GRID.replace("[36, 38, 40, 42] deg", "40 deg").replace("[50, 80]", "50")
+    lines = table_of(need_lines(bare_need(load_text(text, Path("grid.yaml")))))
     assert lines[0].split() == ["W", "H", "depth", "ratio", "above", "mass", "margin", "second", "dig", "fill"]
-    assert [line.split()[1] for line in lines[3:55]].count("3.6") == 2
+    assert [line.replace("→", " ").split()[1] for line in lines[3:15]].count("3.6") == 2
 
 
 def test_named_soils_are_columns() -> None:
@@ -117,6 +140,5 @@ def test_named_soils_are_columns() -> None:
     text = "".join(
         f"soil: [{', '.join(soils)}]\n" if line.startswith("soil") else line for line in GRID.splitlines(keepends=True)
     )
-    lines = need_lines(need(load_text(text, Path("grid.yaml"))))
-    assert lines[1].split() == ["soil", "s0", "s1", "s2", "s3"]
-    assert lines[2].split() == ["φ′", "deg", "36", "37", "38", "39"]
+    lines = table_of(need_lines(bare_need(load_text(text, Path("grid.yaml")))))
+    assert lines[0].split() == ["W", "H", "mass", "all", "s0", "s1", "s2", "s3"]

@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from boulder_sweep.answers.need import need
 from boulder_sweep.answers.printing import reserve_lines
 from boulder_sweep.answers.reserves import CLASSES, ISO_MASS_KG, ISO_SPEEDS, RESERVES, Reserve, classes, reserves
 from boulder_sweep.columns import INPUT_COLUMNS
@@ -19,7 +18,7 @@ from boulder_sweep.judge.judged import PASS
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.settings import Sweep, load, load_text
 from boulder_sweep.settings.sweep import DesignList
-from tests.answers.designs import random_designs, site
+from tests.answers.designs import bare_need, random_designs, site
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -56,7 +55,7 @@ def test_a_design_passes_at_what_it_withstands_and_not_beyond(reserves_of_many: 
 def test_the_answers_are_those_of_the_same_questions(reserve: Reserve) -> None:
     sweep = shallow_designs(24)
     found, key = reserves(sweep).frame, reserve.key
-    asked = need(sweep, **{"most" if key.most else "least": key.field.path}).frame
+    asked = bare_need(sweep, **{"most" if key.most else "least": key.field.path}).frame
     for column, same in (
         (reserve.column, key.answer),
         (f"{reserve.word}_fails_at", "fails_at"),

@@ -8,10 +8,9 @@ import pytest
 from scipy.special import ndtr
 
 import boulder_sweep
-from boulder_sweep.answers.need import need
 from boulder_sweep.answers.uncertainty import uncertainty
 from boulder_sweep.settings.shape import tapered
-from tests.answers.designs import DEPTH, passes, site
+from tests.answers.designs import DEPTH, bare_need, passes, site
 
 SPEED = "impact_speed_m_s"
 TAPERED = {"height": "3.4 m, taper: 0.8", "friction": "38 deg"}
@@ -31,7 +30,7 @@ def test_the_lightest_tapered_boulder_is_lighter_than_any_of_the_grid(tmp_path: 
     mass = (volume * table.boulder_height_m.astype(float) * table.boulder_density_kg_m3.astype(float))[
         table.verdict == "pass"
     ]
-    found = need(sweep, "mass")
+    found = bare_need(sweep, "mass")
     row = found.frame.iloc[0]
     assert 0.9 * mass.min() < row.boulder_mass_kg <= mass.min()
     volume = row.boulder_length_m * row.boulder_width_m * row.boulder_height_m * filled
@@ -40,14 +39,14 @@ def test_the_lightest_tapered_boulder_is_lighter_than_any_of_the_grid(tmp_path: 
 
 
 def test_the_fastest_truck_that_a_tapered_boulder_withstands() -> None:
-    found = need(site(**TAPERED), most="speed")
+    found = bare_need(site(**TAPERED), most="speed")
     assert passes(found, found.frame, found.frame.passes_at, SPEED).all()
     assert not passes(found, found.frame, found.frame.fails_at, SPEED).any()
     assert (found.frame.fails_at - found.frame.passes_at).between(0.0, 0.01).all()
 
 
 def test_the_chances_of_a_tapered_boulder_are_those_of_its_least_angle() -> None:
-    least = need(site(**TAPERED), "friction_angle").frame.passes_at[0]
+    least = bare_need(site(**TAPERED), "friction_angle").frame.passes_at[0]
     exact = ndtr(1.0 / 1.5)
     found = uncertainty(site(**TAPERED | {"friction": f"{{mean: {least + 1.0} deg, sd: 1.5 deg}}"})).frame.iloc[0]
     assert found.p_pass_low - 5e-4 <= exact <= found.p_pass_high + 5e-4

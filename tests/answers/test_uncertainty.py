@@ -13,18 +13,17 @@ from scipy.special import ndtr
 
 import boulder_sweep
 from boulder_sweep.answers.chance import FIRST, Points
-from boulder_sweep.answers.need import need
 from boulder_sweep.answers.printing import uncertainty_lines
 from boulder_sweep.answers.uncertainty import drivers, uncertainty
 from boulder_sweep.errors import PictureError, QuestionError
-from tests.answers.designs import site
+from tests.answers.designs import bare_need, site
 
 UNCERTAIN = {"height": "3.2 m", "site": "embedment_depth: 2.2 m", "friction": "{mean: 38 deg, sd: 3 deg}"}
 
 
 def test_chance_follows_from_the_least_friction_angle() -> None:
     """With one uncertain input the design passes from its least friction angle on, and the chance is known."""
-    least = need(site(**UNCERTAIN | {"friction": "38 deg"}), "friction_angle").frame.passes_at[0]
+    least = bare_need(site(**UNCERTAIN | {"friction": "38 deg"}), "friction_angle").frame.passes_at[0]
     exact = ndtr((38.0 - least) / 3.0)
     found = uncertainty(site(**UNCERTAIN), half_width=0.002, confidence=0.99).frame.iloc[0]
     assert found.p_pass_low - 5e-4 <= exact <= found.p_pass_high + 5e-4  # 0.01 deg of the lattice is 0.1 %
@@ -74,13 +73,13 @@ def test_what_does_not_vary_has_no_driver() -> None:
 
 def test_depth_for_a_probability() -> None:
     sweep = site(**UNCERTAIN)
-    row = need(sweep, "embedment_depth", probability="95 %").frame.iloc[0]
+    row = bare_need(sweep, "embedment_depth", probability="95 %").frame.iloc[0]
     assert row.found == "found"
     assert row.p_pass >= 0.95 > row.p_pass_low
     depth = f"embedment_depth: {row.passes_at} m"
     there = uncertainty(site(**UNCERTAIN | {"site": depth}), half_width=0.003, seed=7).frame.iloc[0]
     assert there.p_pass == pytest.approx(0.95, abs=0.006)
-    certain = need(site(**UNCERTAIN | {"friction": "38 deg"})).frame.passes_at[0]
+    certain = bare_need(site(**UNCERTAIN | {"friction": "38 deg"})).frame.passes_at[0]
     assert row.passes_at > certain
 
 

@@ -12,43 +12,81 @@ import pytest
 CONFIG = Path(__file__).parents[2] / "configs" / "site.yaml"
 
 
-def test_table_fits_the_terminal(sweep):
-    for words in ([], ["--least", "mass"], ["--most", "speed"], ["--margin", "10 %"]):
-        code, out, err = sweep("need", CONFIG, *words)
-        assert code == 0
-        assert all(len(line) <= 80 for line in out.splitlines())
-        assert "simulations" in err
+BARE = ("--margin", "0", "--any")
+"""Asks for the bare least depth."""
+
+
+def table_of(out):
+    """Return the printed lines from the head of the table on."""
+    return out.splitlines()[out.splitlines().index("") + 1 :]
+
+
+@pytest.mark.parametrize("shown", [(), ("--table",), ("--notes",), ("--table", "--notes", "--units", "us")])
+@pytest.mark.parametrize(
+    "words", [[], ["--least", "mass"], ["--most", "speed"], ["--margin", "10 %", "--any"], ["--margin", "90%"]]
+)
+def test_lines_fit_the_terminal(sweep, words, shown):
+    code, out, err = sweep("need", CONFIG, *words, *shown)
+    assert code == 0
+    assert all(len(line) <= 80 for line in out.splitlines() if not line.startswith("  sweep need "))
+    assert "simulations" in err
+
+
+def test_the_answer_is_at_most_a_screen_and_the_boulder_stands_first(sweep):
+    _, out, _ = sweep("need", CONFIG, "-q")
+    assert out.startswith("Bury the 3.4 m boulder (24.5 t) 2.448 m deep: it passes in both soils with 35 %")
+    assert out.endswith("More: --table, --notes\n")
+    assert len(out.splitlines()) <= 24
+    assert sum(line.startswith("→") for line in out.splitlines()) == 1
 
 
 def test_columns_of_the_table(sweep):
     _, out, _ = sweep("need", CONFIG, "-q")
-    head = out.splitlines()[0].split()
-    assert head == ["H", "φ′", "depth", "ratio", "above", "mass", "margin", "second", "dig", "fill"]
-    assert len(out.splitlines()) >= 3 + 12
+    assert table_of(out)[0].split() == ["H", "mass", "all", "φ′", "36", "φ′", "40"]
+    _, out, _ = sweep("need", CONFIG, "-q", "--table")
+    head = ["H", "φ′", "depth", "ratio", "above", "mass", "margin", "second", "dig", "fill"]
+    assert table_of(out)[0].split() == head
+    assert len(table_of(out)) >= 3 + 12
 
 
-def test_what_does_not_pass_is_counted_with_the_next_question(sweep):
-    _, out, _ = sweep("need", CONFIG, "-q")
-    assert "up to where the truck would pass or ride over the boulder\n  (3 rows)\n" in out
-    assert f"next: another boulder: sweep need {CONFIG} --least mass" in out.replace("\n  ", " ")
-    _, out, _ = sweep("need", CONFIG, "-q", "--between", "1.0 m", "1.2 m")
+def test_notes_say_what_words_mean_and_only_notes_do(sweep):
+    plain, noted = (sweep("need", CONFIG, "-q", *BARE, *words)[1] for words in ((), ("--notes",)))
+    said = (
+        "up to where the truck would pass or ride over the boulder\n  (3 rows)\n",
+        "an answer is a simulation, not a rating by test\n",
+        "flags: 0 of 9 answers inside what the model was tested on; rotation 9,",
+        "sensitive: a second opinion overturns it",
+        "foot: flat",
+    )
+    for words in said:
+        assert words in noted
+        assert words not in plain
+    assert noted.index("sensitive: a second opinion overturns it") < noted.index("flags: ")
+    assert "dig, fill: soil to excavate" in sweep("need", CONFIG, "-q", "--table", "--notes")[1]
+    _, out, _ = sweep("need", CONFIG, "-q", *BARE, "--notes", "--between", "1.0 m", "1.2 m")
     assert "never: passes nowhere in the searched range (12 rows)\n" in out
     assert "blocked" not in out
-    _, out, _ = sweep("need", CONFIG, "-q", "--set", "boulder.height=[3.4, 3.6] m")
-    assert "next:" not in out
-
-
-def test_what_passes_is_a_simulation_with_its_flags(sweep):
-    _, out, _ = sweep("need", CONFIG, "-q")
-    assert "an answer is a simulation, not a rating by test\n" in out
-    assert "flags: 0 of 9 answers inside what the model was tested on; rotation 9," in out
-    assert out.index("sensitive: a second opinion overturns it") < out.index("flags: ")
-    _, out, _ = sweep("need", CONFIG, "-q", "--between", "1.0 m", "1.2 m")
     assert "flags" not in out
 
 
+def test_defaults_are_a_quarter_to_spare_and_every_second_opinion(sweep):
+    default, said = (sweep("need", CONFIG, "-q", *words)[1] for words in ((), ("--margin", "25 %", "--robust")))
+    assert default == said
+    assert default != sweep("need", CONFIG, "-q", "--any")[1]
+    assert default != sweep("need", CONFIG, "-q", "--margin", "0")[1]
+
+
+@pytest.mark.parametrize("command", ["need", "uncertainty"])
+def test_a_bare_number_above_one_is_per_cent_and_that_is_said(sweep, command):
+    file = CONFIG if command == "need" else CONFIG.with_name("uncertain_site.yaml")
+    one, other = (sweep(command, file, "--margin", margin) for margin in ("25", "25 %"))
+    assert one[:2] == other[:2]
+    assert "note: --margin 25 is read as 25 %\n" in one[2]
+    assert "is read as" not in other[2]
+
+
 def test_the_lightest_boulder_says_at_which_ends_it_lies(sweep):
-    one = ("--set", "soil.friction_angle=40 deg")
+    one = (*BARE, "--set", "soil.friction_angle=40 deg")
     wide = (*one, "--set", "boulder.width=[1.4, 1.9] m", "--set", "site.embedment_ratio=[0.45, 0.75]")
     _, out, _ = sweep("need", CONFIG, "-q", "--least", "mass", *wide)
     assert "edges: W is the least, 1.4 m (1 of 1); " in out
@@ -78,7 +116,8 @@ def test_what_is_robust_stands_under_the_law_that_decides(sweep):
 
 
 def test_the_answer_typed_into_the_file_passes(sweep, tmp_path):
-    out = sweep("need", CONFIG, "--json", "--set", "boulder.height=3 m", "--set", "soil.friction_angle=40 deg")[1]
+    one = ("--set", "boulder.height=3 m", "--set", "soil.friction_angle=40 deg")
+    out = sweep("need", CONFIG, "--json", *BARE, *one)[1]
     row = json.loads(out)["rows"][0]
     for value, verdict in ((row["passes_at"], "pass"), (row["fails_at"], "fail")):
         words = ["boulder.height=3 m", "soil.friction_angle=40 deg", f"site.embedment_depth={value} m"]
@@ -93,7 +132,7 @@ def test_names_of_listed_designs_stand_with_their_answers(sweep, tmp_path, monke
     Path("t.csv").write_text("site_name,boulder_height_m,friction_angle_deg\nnorth,3.4,40\nsouth,3.0,36\n")
     code, out, _ = sweep("need", "listed.yaml", "-q")
     assert code == 0
-    assert [line.split()[0] for line in out.splitlines()[3:5]] == ["north", "south"]
+    assert [line.replace("→", "").split()[0] for line in table_of(out)[3:5]] == ["north", "south"]
     Path("t.csv").write_text("site_name,embedment_depth_m\nnorth,1.9\nsouth,2.0\n")
     text = re.sub(r"site:\n  embedment_depth: .*\n", "", text)
     Path("listed.yaml").write_text(
@@ -101,7 +140,7 @@ def test_names_of_listed_designs_stand_with_their_answers(sweep, tmp_path, monke
     )
     code, out, err = sweep("need", "listed.yaml", "-q")
     assert (code, err) == (0, "")
-    assert sum(line.lstrip()[0].isdigit() for line in out.splitlines()) == 1
+    assert sum(line.lstrip()[0].isdigit() for line in table_of(out)) == 1
 
 
 def test_rows_that_cannot_be_computed_give_exit_code_3(sweep):
@@ -132,9 +171,15 @@ def test_rows_that_are_blocked_give_exit_code_0(sweep, words, reason):
         (["-o", "depths.csv"], "must end in .parquet"),
         (["--plot", "chart.bmp"], "must end in"),
         (["--json", "--units", "us"], "--json is in SI units for this command"),
+        (["--margin", "1"], "--margin 1: must be 0 or more and less than 100 %"),
+        (["--probability", "120%"], "must be more than 0 and less than 100 %"),
+        (["--prefer", "height"], "'height' is not one of 'mass', 'depth', 'excavation'"),
     ],
 )
-def test_mistakes_are_said_before_anything_is_computed(sweep, words, message):
-    code, out, err = sweep("need", CONFIG, *words)
+def test_mistakes_are_said_before_anything_is_computed_and_before_any_note(sweep, words, message):
+    noted = ("--set", "site.embedment_ratio=[0.3, 0.7]")
+    assert "note: " in sweep("need", CONFIG, *noted)[2]
+    code, out, err = sweep("need", CONFIG, *noted, *words)
     assert (code, out) == (2, "")
     assert message in err
+    assert "note: " not in err

@@ -9,10 +9,11 @@ import pytest
 from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation
 
-from boulder_sweep import load, need
+from boulder_sweep import load
 from boulder_sweep.answers.placing import boulder_block, placed
 from boulder_sweep.cli.stone import placing_lines
 from boulder_sweep.stones.weighing import scanned
+from tests.answers.designs import bare_need
 from tests.stones.shapes import box, frustum, sphere, written
 
 ROOT = Path(__file__).parents[2]
@@ -206,7 +207,7 @@ def test_a_stone_at_a_site_is_asked_for_its_least_depth(placed_at_a_site):
     assert depths == sorted(depths)
     for way in found.passing:
         sweep = load(SITE_FILE, [boulder_block(found.found, way.standing), "soil.friction_angle=40 deg"])
-        assert need(sweep).arrow["least_embedment_depth_m"].to_pylist() == [way.depth_m]
+        assert bare_need(sweep).arrow["least_embedment_depth_m"].to_pylist() == [way.depth_m]
 
 
 def test_the_order_and_the_turn_of_a_scan_change_no_depth(placed_at_a_site, tmp_path):

@@ -45,7 +45,7 @@ from boulder_sweep.stones.reading import read_scan
 from boulder_sweep.stones.solid import solid_of
 from boulder_sweep.store.provenance import settings_sha256
 from boulder_sweep.views.log_text import log_lines
-from tests.answers.designs import site
+from tests.answers.designs import bare_need, site
 
 CORPUS = Path(__file__).parents[1] / "corpus"
 FOLDER = tempfile.TemporaryDirectory(prefix="boulder-sweep-fuzz-")
@@ -236,11 +236,11 @@ def check_sweep(sweep: Sweep) -> None:
 
 UNCERTAIN = {"friction": "{mean: [36, 40] deg, cov: 5 %}", "site": "embedment_depth: 2.2 m"}
 QUESTIONS: dict[str, Callable[[], Any]] = {
-    "depth": lambda: boulder_sweep.need(site(), margin=0.1),
-    "ratio": lambda: boulder_sweep.need(site(height="3.4 m", site="embedment_ratio: [0.5, 0.7]"), robust=True),
-    "mass": lambda: boulder_sweep.need(site(height="[2.6, 3.6] m", friction="[38, 40] deg"), "mass"),
-    "speed": lambda: boulder_sweep.need(site(height="[3.0, 3.4] m"), most="speed"),
-    "chance": lambda: boulder_sweep.need(site(**UNCERTAIN, height="3.4 m"), probability=0.9),
+    "depth": lambda: bare_need(site(), margin=0.1),
+    "ratio": lambda: bare_need(site(height="3.4 m", site="embedment_ratio: [0.5, 0.7]"), robust=True),
+    "mass": lambda: bare_need(site(height="[2.6, 3.6] m", friction="[38, 40] deg"), "mass"),
+    "speed": lambda: bare_need(site(height="[3.0, 3.4] m"), most="speed"),
+    "chance": lambda: bare_need(site(**UNCERTAIN, height="3.4 m"), probability=0.9),
     "capacity": lambda: reserves(site(height="[3.0, 3.4] m")),
     "uncertainty": lambda: boulder_sweep.uncertainty(site(**UNCERTAIN, height="[3.0, 3.4] m"), half_width=0.2),
 }

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import boulder_sweep
-from boulder_sweep.answers.need import need
 from boulder_sweep.designs import block_of
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.impact.recomputing import recompute
@@ -16,6 +15,7 @@ from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.settings import Sweep, load_text
 from boulder_sweep.settings.problems import SettingsError
+from tests.answers.designs import bare_need
 
 BOX = 1.65 * 1.68 * 3.44
 FILE = """boulder: {{length: 1.65 m, width: 1.68 m, height: 3.44 m, {boulder}}}
@@ -70,7 +70,7 @@ def test_without_the_density_of_the_rock_no_pass_is_robust():
     assert "rock_assumed" not in sweep_of("mass: 25 t, density: 2650 kg/m^3").resolved()["model"]
     assert any("2650 kg/m^3, which is assumed" in note.message for note in sweep.notes)
     with pytest.raises(QuestionError, match="rock of given density"):
-        need(sweep, robust=True)
+        bare_need(sweep, robust=True)
 
 
 def test_a_rounded_foot_is_never_a_pass():
@@ -100,8 +100,8 @@ def test_a_search_for_another_boulder_is_refused_beside_a_mass():
     sweep = sweep_of("mass: 25 t, density: 2600 kg/m^3")
     for asked in ("mass", "height", "boulder.density"):
         with pytest.raises(QuestionError, match=r"beside boulder\.mass"):
-            need(sweep, least=asked)
-    found = need(sweep, least="embedment_depth").frame
+            bare_need(sweep, least=asked)
+    found = bare_need(sweep, least="embedment_depth").frame
     assert found.boulder_mass_kg[0] == 25000.0
     assert found.columns.tolist().count("boulder_mass_kg") == 1
     assert 0.0 < found.least_embedment_depth_m[0] < 2.3

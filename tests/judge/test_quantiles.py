@@ -16,6 +16,7 @@ from boulder_sweep.errors import QuestionError
 from boulder_sweep.impact.recomputing import recompute
 from boulder_sweep.judge.quantiles import words_of
 from boulder_sweep.store.failures import StoreError
+from tests.answers.designs import bare_need
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SITE, SOILS = CONFIGS / "uncertain_site.yaml", CONFIGS / "site.yaml"
@@ -159,10 +160,10 @@ def test_need_never_answers_a_depth_that_fails_in_one_of_the_soils(tmp_path: Pat
     sweep = load(tmp_path / "site.yaml")
     taken = at_values(sweep)
     answers = [
-        boulder_sweep.need(case).frame["least_embedment_depth_m"][0]
+        bare_need(case).frame["least_embedment_depth_m"][0]
         for case in (dataclasses.replace(taken, cases=()), *taken.cases)
     ]
-    (answer,) = boulder_sweep.need(sweep).frame["least_embedment_depth_m"]
+    (answer,) = bare_need(sweep).frame["least_embedment_depth_m"]
     assert answer >= max(answers) - 1e-9
 
 
@@ -223,8 +224,8 @@ def test_the_python_functions_take_the_unfavourable_values(tmp_path: Path) -> No
     assert boulder_sweep.read(tmp_path / "table")[PHI][0] == at_values(sweep).constants[PHI]
     with pytest.raises(StoreError, match="settings"):
         boulder_sweep.run(at_values(sweep, "mean"), tmp_path / "table", resume=True)
-    assert boulder_sweep.need(sweep).frame.equals(boulder_sweep.need(at_values(sweep)).frame)
-    assert not boulder_sweep.need(sweep).frame.equals(boulder_sweep.need(at_values(sweep, "mean")).frame)
+    assert bare_need(sweep).frame.equals(bare_need(at_values(sweep)).frame)
+    assert not bare_need(sweep).frame.equals(bare_need(at_values(sweep, "mean")).frame)
 
 
 @pytest.mark.parametrize(

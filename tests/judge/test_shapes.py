@@ -17,6 +17,7 @@ from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.model import Ground
 from boulder_sweep.settings.shape import Shape, tapered
 from boulder_sweep.soils import SLICES, coefficients, with_soil
+from tests.answers.designs import bare_need
 from tests.judge.plain import plain_designs
 
 RWG = Path(__file__).parents[2] / "configs" / "rwg.yaml"
@@ -138,12 +139,12 @@ def test_a_weighed_boulder_with_a_profile_is_decided(tmp_path):
 
 def test_answers_take_profiles_and_give_their_mass(tmp_path):
     sweep = shaped(tmp_path, "taper: 0.8")
-    answer = boulder_sweep.need(sweep).frame.iloc[0]
+    answer = bare_need(sweep).frame.iloc[0]
     assert answer.boulder_mass_kg == pytest.approx(2596 * 1.65 * 1.68 * 3.44 * tapered(0.8).filled)
-    box = boulder_sweep.need(load(RWG)).frame.iloc[0]
+    box = bare_need(load(RWG)).frame.iloc[0]
     assert answer.least_embedment_depth_m > box.least_embedment_depth_m
     with pytest.raises(QuestionError, match="second opinions know boxes"):
-        boulder_sweep.need(sweep, robust=True)
+        bare_need(sweep, robust=True)
 
 
 def test_side_views_show_the_shape(tmp_path):

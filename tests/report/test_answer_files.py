@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import boulder_sweep
-from boulder_sweep.answers.need import Need, need
+from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.outputs import AnswerFile
 from boulder_sweep.answers.reserves import reserves
 from boulder_sweep.errors import ReportError
@@ -27,7 +27,7 @@ from boulder_sweep.report.comparison import compare
 from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import load_text
 from boulder_sweep.store.provenance import settings_sha256
-from tests.answers.designs import site
+from tests.answers.designs import bare_need, site
 from tests.conftest import Command
 from tests.report.conftest import SETS
 
@@ -40,16 +40,16 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """One file of each question."""
     folder = tmp_path_factory.mktemp("answers")
     found: dict[str, Any] = {
-        "depth": need(site(), margin="10 %"),
-        "depth of a ratio": need(site(site=RATIOS), robust=True),
-        "mass": need(site(height="[2.6, 3.6] m", friction="[38, 40] deg"), "mass"),
-        "speed": need(site(height="[3.0, 3.4] m"), most="speed"),
-        "chance": need(site(**UNCERTAIN, height="3.4 m"), probability=0.9),
-        "sets": need(load_text(SETS, folder / "sets.yaml"), margin=0.1),
+        "depth": bare_need(site(), margin="10 %"),
+        "depth of a ratio": bare_need(site(site=RATIOS), robust=True),
+        "mass": bare_need(site(height="[2.6, 3.6] m", friction="[38, 40] deg"), "mass"),
+        "speed": bare_need(site(height="[3.0, 3.4] m"), most="speed"),
+        "chance": bare_need(site(**UNCERTAIN, height="3.4 m"), probability=0.9),
+        "sets": bare_need(load_text(SETS, folder / "sets.yaml"), margin=0.1),
         "capacity": reserves(site(height="[3.0, 3.4] m")),
         "uncertainty": boulder_sweep.uncertainty(site(**UNCERTAIN, height="[3.0, 3.4] m"), half_width=0.2),
-        "one": need(site(height="3.4 m", friction="40 deg")),
-        "nothing": need(site(height="2.0 m", friction="36 deg")),
+        "one": bare_need(site(height="3.4 m", friction="40 deg")),
+        "nothing": bare_need(site(height="2.0 m", friction="36 deg")),
     }
     for name, answers in found.items():
         answers.write(folder / f"{name}.parquet")
@@ -78,7 +78,7 @@ def test_a_need_is_read_back_as_it_was(files: dict[str, Path], name: str) -> Non
 
 def test_axes_too_long_for_the_settings_are_read_from_the_table(tmp_path: Path) -> None:
     many = ", ".join(f"{30 + place / 100:g}" for place in range(1001))
-    found = need(site(height="3.4 m", friction=f"[{many}] deg"))
+    found = bare_need(site(height="3.4 m", friction=f"[{many}] deg"))
     found.write(tmp_path / "many.parquet")
     rows = read_rows(tmp_path / "many.parquet")
     assert rows.shape == (1001,)
@@ -209,7 +209,7 @@ def test_one_design_of_uncertainty_is_drawn_with_its_samples(tmp_path: Path, swe
 
 
 def test_two_needs_are_paired_by_their_inputs(files: dict[str, Path], tmp_path: Path) -> None:
-    weaker = need(site(friction="[34, 38] deg"), margin="10 %")
+    weaker = bare_need(site(friction="[34, 38] deg"), margin="10 %")
     weaker.write(tmp_path / "weaker.parquet")
     found = compare(files["depth"], tmp_path / "weaker.parquet")
     before, after = (pq.read_table(file).to_pandas() for file in (files["depth"], tmp_path / "weaker.parquet"))

@@ -27,6 +27,7 @@ from boulder_sweep.report.page import ASSETS, SCRIPTS
 from boulder_sweep.settings import load_text
 from boulder_sweep.settings.shown_units import shown_column, shown_settings, shown_unit
 from boulder_sweep.settings.units import factor
+from tests.answers.designs import bare_need
 from tests.store.folders import rewrite
 
 US = {
@@ -278,7 +279,7 @@ def answers(tmp_path_factory):
     plain = load_text(ONE_SITE.replace("SPEED", "30 mph"), Path("one.yaml"))
     uncertain = load_text(ONE_SITE.replace("SPEED", "{mean: 13.4 m/s, cov: 5 %}"), Path("one.yaml"))
     found = {
-        "need": boulder_sweep.need(plain),
+        "need": bare_need(plain),
         "capacity": reserves(plain),
         "uncertainty": boulder_sweep.uncertainty(uncertain, half_width=0.1),
     }

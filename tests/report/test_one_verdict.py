@@ -18,6 +18,7 @@ from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.report import write_explorer
 from boulder_sweep.settings import Sweep
 from boulder_sweep.stones.weighing import scanned
+from tests.answers.designs import bare_need
 from tests.report.test_verdicts import designs
 from tests.stones.shapes import box, written
 
@@ -132,7 +133,7 @@ def test_capacity_states_the_row_and_what_it_says_follows_from_it(asked):
 
 def test_what_need_finds_is_the_row_of_that_design(asked, tmp_path):
     sweep, table = asked
-    found = boulder_sweep.need(sweep, "embedment_depth").frame
+    found = bare_need(sweep, "embedment_depth").frame
     answered = found[found.embedment_depth_m.notna() & found.found.isin(["found", "always"])]
     assert len(answered) >= 100
     kept = [name for name in table.columns if name in answered.columns and name in sweep.plan.given]

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from boulder_sweep import investigation as sand
-from boulder_sweep import need
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings.soil_readings import covered_depth
 from boulder_sweep.settings.sweep import derived_words
+from tests.answers.designs import bare_need
 
 SITE = """\
 boulder: {length: 1.65 m, width: 1.68 m, height: 3.4 m, density: 2600 kg/m^3}
@@ -264,7 +264,7 @@ LOG = blows((25, 1.5), (22, 3.0), (18, 4.5))
 )
 def test_a_search_below_the_readings_that_count_is_refused(site, embedment, least, between, entry):
     with pytest.raises(QuestionError) as caught:
-        need(site(LOG, f"site.{embedment}"), least, between=between)
+        bare_need(site(LOG, f"site.{embedment}"), least, between=between)
     assert "the readings of the soil below 1.5 m were left out" in str(caught.value)
     assert f"they count where the file gives {entry}" in str(caught.value)
     key, bracket, values = entry.partition(": ")
@@ -278,11 +278,11 @@ def test_beside_a_table_a_deeper_design_makes_more_readings_count(load_it, tmp_p
     text = f"table: {table}\n{SITE.replace('site: {embedment_depth: 2.2 m}', '')}  {LOG}\n"
     table.write_text("embedment_depth_m\n1.2\n")
     with pytest.raises(QuestionError, match=r"or they count where the table has a design with such a foot"):
-        need(load_it(text))
+        bare_need(load_it(text))
     table.write_text("embedment_depth_m\n1.2\n2.9\n")
     assert covered_depth(load_it(text).derived) == 3.0
 
 
 def test_a_search_within_them_is_answered(site):
-    answers = need(site(LOG), "embedment_depth", between=("2.2 m", "2.9 m"))
+    answers = bare_need(site(LOG), "embedment_depth", between=("2.2 m", "2.9 m"))
     assert answers.counts()

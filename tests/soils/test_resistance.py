@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from boulder_kernels.ground import BROMS, KP_SQUARED, WIDTH_CAPPED
-from boulder_sweep.answers.need import need
 from boulder_sweep.answers.uncertainty import uncertainty
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.impact.simulation import simulate
@@ -19,7 +18,7 @@ from boulder_sweep.settings.model import PRESETS, RESISTANCES, Model
 from boulder_sweep.soils import coefficients, with_law
 from boulder_sweep.views.wording import LAW_WORDS, design_line
 from tests import oracle
-from tests.answers.designs import site
+from tests.answers.designs import bare_need, site
 from tests.judge.plain import plain_designs
 from tests.oracle.soil import lateral_coefficient
 
@@ -86,7 +85,7 @@ def test_the_papers_law_leaves_every_bit_alone() -> None:
 
 def test_less_resistance_needs_more_depth_and_is_passed_less_often() -> None:
     heavy = site(height="3.6 m", friction="42 deg")
-    depth = {law: need(by(law, heavy)).frame.least_embedment_depth_m.iloc[0] for law in ("kp_squared", "broms")}
+    depth = {law: bare_need(by(law, heavy)).frame.least_embedment_depth_m.iloc[0] for law in ("kp_squared", "broms")}
     assert depth["kp_squared"] < depth["broms"]
     uncertain = site(site="embedment_depth: 2.2 m", friction="{mean: 40 deg, sd: 2 deg}", height="3.2 m")
     chance = {law: uncertainty(by(law, uncertain)).frame.p_pass.iloc[0] for law in ("kp_squared", "broms")}

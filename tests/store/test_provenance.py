@@ -13,12 +13,11 @@ import pyarrow.parquet as pq
 import pytest
 
 import boulder_kernels
-import boulder_sweep
 from boulder_sweep.answers.outputs import AnswerFile
 from boulder_sweep.errors import ReportError
 from boulder_sweep.store import provenance
 from boulder_sweep.store.provenance import canonical, differences, file_metadata, identity, identity_in, sha256_of
-from tests.answers.designs import site
+from tests.answers.designs import bare_need, site
 from tests.store.folders import OTHER_VERSIONS
 
 
@@ -133,7 +132,7 @@ def test_file_metadata_has_no_time_and_no_process():
 def answers(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a file of answers."""
     path = tmp_path_factory.mktemp("answers") / "need.parquet"
-    boulder_sweep.need(site(), margin=0.1).write(path)
+    bare_need(site(), margin=0.1).write(path)
     return path
 
 

