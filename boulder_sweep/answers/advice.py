@@ -22,7 +22,7 @@ from boulder_sweep.text import NO_BREAK_SPACE
 if TYPE_CHECKING:
     from boulder_sweep.answers.need import Need
 
-MODELS = "under three soil models"
+MODELS = "under the weakest of three soil models"
 """What second opinions are, in the words of an answer."""
 ALONG = dict(zip(SIDES, ("long", "wide", "high"), strict=True))
 BETTER = {"mass": "lighter", "depth": "shallower", "excavation": "less to dig"}

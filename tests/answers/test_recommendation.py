@@ -74,7 +74,7 @@ def test_it_is_the_lightest_that_holds_in_every_soil_at_one_depth() -> None:
     assert [row["friction_angle_deg"] for row in design.rows] == [36.0, 40.0]
     assert (design.grade, design.margin >= 0.25) == ("robust", True)
     assert design.excavated_m3 == max(row["excavated_m3"] for row in design.rows)
-    assert "and with 25 % under three soil models. It is the lightest of 2 boulders that qualify." in said(found)
+    assert "and with 25 % under the weakest of three soil models. It is the lightest of 2 boulders that qualify." in said(found)
 
 
 def test_a_depth_that_one_row_needs_and_another_fails_at_is_not_recommended() -> None:
@@ -161,8 +161,8 @@ def test_where_none_qualifies_the_nearest_has_what_is_said_of_it() -> None:
     assert nearest.design is not None
     assert design_of(again).sizes == nearest.design.sizes
     words = said(found)
-    assert words.startswith("No boulder of the file passes with 25 % to spare under three soil models in both soils.")
-    assert "Nearest: the 3.2 m boulder (23.1 t) 2.415 m deep, with 20 % to spare under three soil models." in words
+    assert words.startswith("No boulder of the file passes with 25 % to spare under the weakest of three soil models in both soils.")
+    assert "Nearest: the 3.2 m boulder (23.1 t) 2.415 m deep, with 20 % to spare under the weakest of three soil models." in words
 
 
 def test_each_change_that_is_named_would_do_and_less_would_not() -> None:
