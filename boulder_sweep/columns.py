@@ -275,8 +275,8 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "robustness",
         "dictionary",
         "",
-        "of a pass: robust where it stands with friction and vertical motion under other laws of the soil, too, "
-        "sensitive where it does not under one of them, open where that was not asked; null for no pass",
+        "of a pass: robust where it stands with friction and vertical motion under the weakest law of the soil, too, "
+        "sensitive where it does not under a law that was asked, open where none was; null for no pass",
         lambda facts: facts.robustness,
         rows="passing",
         words=GRADES,
@@ -285,8 +285,8 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "stands_under",
         "dictionary",
         "",
-        "of a pass: the models it stands under, joined by ; (paper, broms, width_capped); "
-        "null where no second opinion was asked for",
+        "of a pass: of the models that were simulated, those it stands under, joined by ; (paper, broms, "
+        "width_capped); null where there was no second opinion",
         lambda facts: facts.stands_under,
         rows="passing",
         words=STANDINGS,

@@ -13,7 +13,7 @@ from boulder_sweep.designs import REASONS, DesignBlock, Label, block_of, input_o
 from boulder_sweep.judge.accuracy import Accuracy, accuracy_of, steps_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 from boulder_sweep.judge.judged import PASS, Judged, joined
-from boulder_sweep.judge.robustness import STANDS_UNDER_ALL
+from boulder_sweep.judge.robustness import standing
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.distributions import SetDistributions
 from boulder_sweep.settings.sweep import DesignList
@@ -99,8 +99,8 @@ class Judges:
     least_margin
         Margin that a design must have to count as passing. Both evaluations prove that it lasts.
     robust
-        Whether only a pass that stands under all second opinions counts, for which both evaluations then ask: robust,
-        or open outside their study.
+        Whether only a pass that stands under the second opinion that decides counts, for which both evaluations then
+        ask: robust, or open outside the study.
     """
 
     coarse: Evaluation
@@ -113,7 +113,7 @@ class Judges:
         """Return whether rows pass with the requested margin and robustness, bool, shape (n,)."""
         passes = judged.verdict == PASS
         if self.robust:
-            passes &= judged["stands_under"] == STANDS_UNDER_ALL
+            passes &= standing(judged)
         return passes & (judged["margin"] >= self.least_margin) if self.least_margin > 0.0 else passes
 
 

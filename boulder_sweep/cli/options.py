@@ -109,10 +109,10 @@ def load_sweep(
     Where the soil has too few elements, some designs are simulated to say what that costs.
     """
     from boulder_sweep.settings import load
-    from boulder_sweep.settings.loader import ALL_OPINIONS
+    from boulder_sweep.settings.loader import SECOND_OPINION
     from boulder_sweep.settings.sweep import derived_words
 
-    sweep = load(path, (*overrides, ALL_OPINIONS) if second_opinion else overrides)
+    sweep = load(path, (*overrides, SECOND_OPINION) if second_opinion else overrides)
     if not quiet:
         for words in derived_words(sweep.derived, units):
             say("\n".join(textwrap.wrap(f"note: {words}", 80, subsequent_indent="  ")))

@@ -29,9 +29,9 @@ from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_sweep.judge.accuracy import LONGEST_HORIZON, Accuracy, control_of, finer_controls, readings_of
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed, worst_of
-from boulder_sweep.judge.robustness import can_be_asked, with_second_opinions
+from boulder_sweep.judge.robustness import DECISIVE, can_be_asked, with_second_opinions
 from boulder_sweep.judge.verdict import Limits, judged_rows, limits_of, rows_of
-from boulder_sweep.settings.model import SECOND_OPINIONS, Model
+from boulder_sweep.settings.model import Model
 from boulder_sweep.soils import with_soil
 
 if TYPE_CHECKING:
@@ -193,16 +193,16 @@ class Evaluation:
             rule[some] = np.minimum(rule[some], worst)
 
     def asked(self) -> Evaluation:
-        """Return the same with every second opinion, where they can be asked."""
-        return replace(self, second_opinion=SECOND_OPINIONS) if self.askable else self
+        """Return the same with the second opinion that decides, where it can be asked."""
+        return replace(self, second_opinion=(DECISIVE,)) if self.askable else self
 
     def graded(self, judged: Judged, block: DesignBlock) -> Judged:
-        """Return the judged rows of a block with every second opinion of its passes, without a margin."""
+        """Return the judged rows of a block with the second opinion that decides, without a margin."""
         passing = judged.verdict == PASS
         if not self.askable or not passing.any():
             return judged
         passes = self.designs(block, passing)
-        return with_second_opinions(judged, passes, SECOND_OPINIONS, self.model.resistance, self.limits, self.longest_s)
+        return with_second_opinions(judged, passes, (DECISIVE,), self.model.resistance, self.limits, self.longest_s)
 
     @property
     def longest_s(self) -> float:

@@ -1,10 +1,13 @@
 """Robust or sensitive: what a pass is worth when the model has another form.
 
 A second opinion is the same impact with friction and vertical motion, under a law of the soil that resists less
-(`boulder_kernels.second_opinion`). A pass that stands under both laws is *robust*, one that does not under one of them
-*sensitive*. A pass that stands, but lies outside the ranges from which the study of the documentation draws, is *open*:
-nobody has looked at what second opinions are worth there. Where no second opinion was asked for, a pass is robust if it
-lies where that study has found none that is not (`FREE`), and otherwise open, too.
+(`boulder_kernels.second_opinion`). A pass that stands under the weakest law, mostly `DECISIVE`, is *robust*, one that
+does not under a law that was asked *sensitive*. A pass that stands, but lies outside the ranges from which the study of
+the documentation draws, is *open*: nobody has looked at what second opinions are worth there. Where no second opinion
+was asked for, a pass is robust if it lies where that study has found none that is not (`FREE`), otherwise open, too.
+
+No pass stands that a finer solution overturns: where a second opinion comes near to the limit, or is not proved to stay
+well below it, a fine solution decides, and it must stand with its own error taken off.
 
 A sensitive pass is not a fail: the crash test that passed stands, and one of its second opinions turns it nearly to the
 limit. It needs a better test of the soil, a deeper bed, or a crash test.
@@ -37,10 +40,11 @@ if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
 
 ROBUST, SENSITIVE, OPEN = range(len(GRADES))
-STANDS_UNDER_ALL = (1 << len(SECOND_OPINIONS)) - 1
-"""Code of the column ``stands_under`` of a pass that stands under every second opinion."""
+DECISIVE = "width_capped"
+"""The law that decides: it resists least, but for slender boulders in dense soil, which are asked of others, too."""
 IN_WORDS = (
-    "stands with friction and vertical motion under three laws; not tested: soil on one side only, rounded stones"
+    "stands with friction and vertical motion under the weakest of three laws; not tested: soil on one side only, "
+    "rounded stones"
 )
 """What ``robust`` means, in words,"""
 SENSITIVE_IN_WORDS = (
@@ -84,9 +88,14 @@ FREE_LIMIT_DEG = 20.0
 """The limit of rotation that the study asks about; a higher one is no easier to stay below for a second opinion."""
 ROUNDING = 1e-9
 """Ends of ranges are met by values that were rounded."""
-NUMERICAL_ERROR_DEG = 0.3
-"""By how much the rotation of a second opinion may be wrong near the limit: a pass that is nearer to it does not stand.
-Against a fine solution all that stood and should not were within 0.25 deg of the limit."""
+NEAR_DEG = 1.0
+"""Within this of the limit of rotation,"""
+NEAR_M = 0.01
+"""or of that of penetration, a second opinion is simulated again finely. It turned too little by 0.32 deg at most."""
+FINENESS, TOLERANCE_M = 2, 1e-6
+"""Fineness and error of a step of the fine solution (`boulder_kernels.second_opinion.HeaveControl`),"""
+ERROR_DEG, ERROR_M = 0.05, 1e-3
+"""and its own largest error, and more, which is taken off the limits."""
 AT_ONCE = 400
 """Designs simulated per call: an interruption waits for the current call."""
 
@@ -125,11 +134,16 @@ def grades_without_asking(facts: Any) -> np.ndarray:
     """
     grades = np.full(len(facts.verdict), OPEN, dtype=np.int32)
     limits, outcomes = facts.limits, facts.outcomes
-    if limits.studied and limits.rotation >= math.radians(FREE_LIMIT_DEG) * (1.0 - ROUNDING):
+    if limits.studied and limits.rotation >= least_free_rotation():
         near = facts.rows["passing"] & (outcomes.theta_max + outcomes.theta_error <= math.radians(FREE_ROTATION_DEG))
         rows = np.flatnonzero(near)
         grades[rows[is_free(some_rows(facts.designs.table, rows))]] = ROBUST
     return grades
+
+
+def least_free_rotation() -> float:
+    """Return the least limit of rotation by which a pass is robust without asking [rad]."""
+    return math.radians(FREE_LIMIT_DEG) * (1.0 - ROUNDING)
 
 
 def is_free(table: DesignTable) -> np.ndarray:
@@ -158,23 +172,42 @@ def stands(designs: Designs, law: str, present: str, limits: Any, longest_s: flo
         Longest simulated time; what is not proved to stand by then does not.
     """
     table = with_law(designs.table, law, present)
-    control = HeaveControl(limits.rotation - math.radians(NUMERICAL_ERROR_DEG), longest_s)
+    usual = HeaveControl(limits.rotation, longest_s, margin=math.radians(NEAR_DEG))
+    fine = HeaveControl(limits.rotation - math.radians(ERROR_DEG), longest_s, TOLERANCE_M, FINENESS)
     passes = np.empty(designs.size, dtype=bool)
-    for at in range(0, designs.size, AT_ONCE):
-        some = np.arange(at, min(at + AT_ONCE, designs.size))
+
+    def below(some: np.ndarray, control: HeaveControl) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return which of some designs stay below the limit of rotation, how far they turn, and how far in."""
         outcome = second_opinions(some_rows(table, some), control)
         penetration = outcome.x_v_max - designs.bed_offset[some] - table.L[some]
-        passes[some] = (outcome.status == Status.BELOW_LIMIT.value) & (penetration <= limits.penetration)
+        return np.equal(outcome.status, Status.BELOW_LIMIT.value), np.asarray(outcome.theta_max), penetration
+
+    for at in range(0, designs.size, AT_ONCE):
+        some = np.arange(at, min(at + AT_ONCE, designs.size))
+        stays, turned, penetration = below(some, usual)
+        passes[some] = stays & (penetration <= limits.penetration)
+        near = (turned >= usual.theta_limit - usual.margin) | (np.abs(penetration - limits.penetration) < NEAR_M)
+        again = some[stays & near]
+        if len(again):
+            stays, _, penetration = below(again, fine)
+            passes[again] = stays & (penetration <= limits.penetration - ERROR_M)
     return passes
+
+
+def standing(judged: Judged) -> np.ndarray:
+    """Return which judged rows are robust, or would be inside the ranges of the study, bool, shape (n,)."""
+    grade, under, bit = judged["robustness"], judged["stands_under"], 1 << SECOND_OPINIONS.index(DECISIVE)
+    return (grade == ROBUST) | ((grade == OPEN) & (under >= 0) & ((under & bit) > 0))
 
 
 def with_second_opinions(
     judged: Judged, passes: Designs, laws: tuple[str, ...], present: str, limits: Any, longest_s: float
 ) -> Judged:
-    """Return judged rows with every pass simulated again.
+    """Return judged rows with passes simulated again.
 
-    Where all of `SECOND_OPINIONS` are asked and a pass stands, it is robust, or open outside their study; where one
-    overturns it, it is sensitive.
+    Where `DECISIVE` is asked and a pass stands, it is robust, or open outside the study; where a law overturns it, it
+    is sensitive. If `DECISIVE` alone is asked, passes that are robust without asking are not simulated, and those that
+    it overturns, and those of which another law resists less, are simulated under that law, too.
 
     Parameters
     ----------
@@ -186,19 +219,34 @@ def with_second_opinions(
         As of `stands`.
     """
     passing = np.flatnonzero(judged.verdict == PASS)
-    grade, standing = judged["robustness"].copy(), judged["stands_under"].copy()
-    standing[passing] = 0
+    grade, under = judged["robustness"].copy(), judged["stands_under"].copy()
+    if laws == (DECISIVE,):
+        # Those that are robust without asking are so by the whole limit.
+        asked = np.flatnonzero((grade[passing] != ROBUST) | (limits.rotation < least_free_rotation()))
+        passing, passes = passing[asked], passes.rows(asked)
+    under[passing] = 0
     turned = np.zeros(len(passing), dtype=bool)
+
+    def ask(law: str, rows: np.ndarray) -> None:
+        """Note which of some passes stand under a law."""
+        there = stands(passes.rows(rows), law, present, limits, longest_s)
+        under[passing[rows[there]]] += 1 << SECOND_OPINIONS.index(law)
+        turned[rows[~there]] = True
+
     for law in laws:
-        there = stands(passes, law, present, limits, longest_s)
-        standing[passing[there]] += 1 << SECOND_OPINIONS.index(law)
-        turned |= ~there
+        ask(law, np.arange(len(passing)))
+    if laws == (DECISIVE,):
+        resistance = with_law(passes.table, DECISIVE, present).K_epsilon
+        for law in SECOND_OPINIONS:
+            if law != DECISIVE:
+                weaker = with_law(passes.table, law, present).K_epsilon < resistance
+                ask(law, np.flatnonzero(turned | weaker))
     grade[passing[turned]] = SENSITIVE
-    if laws == SECOND_OPINIONS:
+    if DECISIVE in laws:
         studied = are_studied(passes, limits)
         grade[passing[~turned & studied]] = ROBUST
         grade[passing[~turned & ~studied]] = OPEN
-    columns: dict[str, Any] = judged.columns | {"robustness": grade, "stands_under": standing}
+    columns: dict[str, Any] = judged.columns | {"robustness": grade, "stands_under": under}
     return Judged(columns, judged.words)
 
 

@@ -491,7 +491,7 @@ def _check_arguments(sweep: Sweep, jobs: int | None, progress: Report | None) ->
 
 def resuming(sweep: Sweep, out: Location, jobs: int | None, backend: str, scheduler: str | None) -> str:
     """Return the command that resumes a run with the given arguments."""
-    from boulder_sweep.settings.loader import ALL_OPINIONS
+    from boulder_sweep.settings.loader import SECOND_OPINION
 
     if sweep.path is None:
         return f"boulder_sweep.run(sweep, {str(out)!r}, resume=True)"
@@ -502,7 +502,7 @@ def resuming(sweep: Sweep, out: Location, jobs: int | None, backend: str, schedu
     if sweep.taken_at:
         words += ["--at", next(iter(sweep.taken_at.values())).partition(" ")[0]]
     for entry in sweep.overrides:
-        if entry == ALL_OPINIONS:
+        if entry == SECOND_OPINION:
             words.append("--second-opinion")
         else:  # as it was given
             words += entry.split("=", 1) if entry.startswith("--") else ["--set", entry]

@@ -61,8 +61,8 @@ _ALTERNATIVES = {
 OPTIONS = {"--accuracy": "solver.accuracy", "--second-opinion": "model.second_opinion"}
 """Options that set an entry: a mistake is reported for the option, not for ``--set``."""
 
-ALL_OPINIONS = f"--second-opinion=[{', '.join(SECOND_OPINIONS)}]"
-"""Asks for every second opinion."""
+SECOND_OPINION = f"--second-opinion={SECOND_OPINIONS[-1]}"
+"""Asks for the second opinion that decides."""
 
 MAX_OVERRIDE = 20_000
 """Longest option, in characters."""

@@ -312,7 +312,8 @@ class Model:
     second_opinion: tuple[str, ...] = setting(
         "model.second_opinion",
         "",
-        "laws of the soil's resistance under which every pass is simulated again, with friction and vertical motion",
+        "laws of the soil's resistance under which passes are simulated again, with friction and vertical motion; "
+        "width_capped alone decides, and broms is asked where that overturns a pass or resists more",
         (),
         kind="a law for a second opinion",
         shown_default=NO_OPINION,

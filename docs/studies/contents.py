@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 
+from benchmarks.grades import grades, grades_table
 from boulder_sweep.crash_tests.cases import rigid_wall_test, statement_table
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.crash_tests.validation import Validation, validate, wall_figures
@@ -217,6 +218,10 @@ def _forms_random_words(root: Path) -> str:
     return forms.random_words(root / GRID)
 
 
+def _grades(root: Path) -> str:
+    return grades_table(grades(root / GRID)).markdown()
+
+
 def _forms_free(root: Path) -> str:
     return free_region.region_table(root / GRID).markdown()
 
@@ -263,6 +268,7 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "forms-tests": _forms_tests,
     "forms-random": _forms_random,
     "forms-random-words": _forms_random_words,
+    "grades": _grades,
     "forms-free": _forms_free,
     "forms-free-words": _forms_free_words,
     "wild-families": _wild_families,
@@ -295,6 +301,6 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
 LONG = {
     *("readings-crash-tests", "readings-grid", "readings-words", "coverage", "box-shares", "front-face"),
     *(name for name in CONTENTS if name.startswith("forms-")),
-    *("wild-families", "moves", "partial-factors", "stone-site"),
+    *("grades", "wild-families", "moves", "partial-factors", "stone-site"),
 }
 """Blocks that take more than ten seconds, or share what does: computed again every night, not with every change."""

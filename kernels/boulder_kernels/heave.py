@@ -9,8 +9,10 @@ A point of the boulder at (a, b) from the common centre of mass, a to the right 
 
     X = a cos(theta) + b sin(theta),   Y = y_b - a sin(theta) + b cos(theta)
 
-Soil, base and sides are sums over `PIECES` pieces each, by `PARTS` partial sums, so that the bits are those of any
-processor. Every force is either the slope of one potential or takes energy out of the motion.
+Soil, foot and sides are sums over as many pieces each, of which 16 are enough: parts of the soil, along which pressures
+are averaged exactly, strips of the foot that are narrower at its ends, and Gauss's points of the sides. Pieces are
+added up in one order, so that the bits are those of any processor. Every force is either the slope of one potential or
+takes energy out of the motion.
 """
 
 from __future__ import annotations
@@ -23,23 +25,23 @@ import numpy as np
 from ._jit import inlined, kernel
 from .design import Constants, Design, G, boulder_mass, passive_pressure_coefficient, soil_mass
 from .dynamics import contact_displacement, contact_lever, spring_compression
-from .numerics import WIDTH, field, put, sine_versine
-from .soil import Kinematics, soil_kinematics
+from .numerics import field, put, sine_versine
+from .soil import TINY, Kinematics, soil_kinematics
 
-PIECES = WIDTH
-"""Elements of the soil over the depth, strips of the foot, and points of the sides."""
-PARTS = 8
-"""Partial sums: as many as numbers in the widest registers. Piece j belongs to that of j modulo PARTS."""
-EACH = PIECES // PARTS
-SIDE_ROWS, SIDE_COLUMNS = 8, 4
-"""Points of the sides over the depth and over the length."""
-SETS, FOOT, SIDE_A, SIDE_B, SIDE_DEPTH, RATIO, SUMS = (PIECES * n for n in range(7))
-"""Offsets in the workspace: sets of the strips and where they lie along the foot; points of the sides; middles of the
-soil elements as shares of the depth; partial sums of five numbers."""
-ROOM = SUMS + 5 * PARTS
+GROUP, FINEST = 16, 4
+"""Pieces of the coarsest solution: two of the widest registers; and what their number may be multiplied by, twice."""
+MOST = GROUP * FINEST * FINEST
+ROW = MOST + GROUP
+"""Numbers between the parts of a workspace; a power of two would crowd the processor's cache."""
+SETS, FOOT, STRIP, SIDE_A, SIDE_DEPTH, SIDE, ALONG_X, TURNING, LIFTING, FAR, NEAR = (ROW * n for n in range(11))
+"""Offsets in the workspace: sets of the strips, where they lie along the foot, and their shares of it; points of the
+sides, and their friction per depth; what all pieces have of five sums."""
+ROOM = 11 * ROW
 """Numbers in the workspace."""
-FULL_DRAG = 0.5
-"""A soil element drags in full where it is covered by this share of its height; the element at the soil line is."""
+SIDE_POINTS = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262)
+"""Gauss's four points of a length 1,"""
+SIDE_WEIGHTS = (0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692)
+"""and their weights: the sides are four points by four."""
 
 
 class Base(NamedTuple):
@@ -85,18 +87,20 @@ class HeaveConstants(NamedTuple):
     """Sum of m_n d_n^2 [kg m^2]."""
     L: float
     """Length of the boulder [m]."""
-    k_strip: float
-    """Stiffness of the base under one strip [N/m]."""
-    c_strip: float
+    pieces: int
+    """Parts of the soil, strips of the foot, and points of the sides: 16, 64, 144 or 256."""
+    k_foot: float
+    """Stiffness of the base under the whole foot [N/m]."""
+    c_foot: float
     """Its dashpot [N s/m]."""
-    q_strip: float
+    q_foot: float
     """Its bearing capacity [N]."""
     s_0: float
     """Settlement under the weight of the boulder [m]."""
     friction: float
     """Coefficient of friction tan(delta); 0 without friction."""
     side: float
-    """Friction of both sides at one of their points per depth of it [N/m]."""
+    """Friction of both sides per mean depth of their points [N/m]."""
     v_s: float
     """Speed of slip at which friction has 0.71 of its full value [m/s]."""
 
@@ -121,7 +125,7 @@ def bearing_capacity_factor(phi: float) -> float:
 
 
 @kernel
-def heave_constants(design: Design, c: Constants, form: HeaveOptions, base: Base) -> HeaveConstants:
+def heave_constants(design: Design, c: Constants, form: HeaveOptions, base: Base, fineness: int) -> HeaveConstants:
     """Constants of the motion with heave and friction (Eqs 131-134).
 
     Parameters
@@ -134,16 +138,17 @@ def heave_constants(design: Design, c: Constants, form: HeaveOptions, base: Base
         What is added to the planar motion.
     base
         The ground under the foot.
+    fineness
+        1 for 16 pieces, up to `FINEST`; their number grows by its square.
     """
     m_b = boulder_mass(design)
     soil = soil_mass(design, 0)
     a_b, b_b = 0.5 * design.L - c.c_x, 0.5 * design.H - c.c_y
     J_box = m_b / 12.0 * (design.H * design.H + design.L * design.L)
-    strip = design.W * design.L / PIECES
+    foot = design.W * design.L
     capacity = bearing_capacity_factor(design.phi)
     friction = math.tan(2.0 / 3.0 * design.phi) if form.friction else 0.0
     at_rest = 1.0 - math.sin(design.phi)
-    area = design.L * design.d / (SIDE_ROWS * SIDE_COLUMNS)
     return HeaveConstants(
         c,
         1.0 if form.heave else 0.0,
@@ -155,12 +160,13 @@ def heave_constants(design: Design, c: Constants, form: HeaveOptions, base: Base
         c.c_y * soil.mass - soil.first,
         c.c_y * c.c_y * soil.mass - 2.0 * c.c_y * soil.first + soil.second,
         design.L,
-        base.stiffness * strip,
-        design.rho_s * base.wave_speed * strip,
-        design.rho_s * G * design.d * capacity * strip,
-        m_b * G / (base.stiffness * design.L * design.W),
+        GROUP * fineness * fineness,
+        base.stiffness * foot,
+        design.rho_s * base.wave_speed * foot,
+        design.rho_s * G * design.d * capacity * foot,
+        m_b * G / (base.stiffness * foot),
         friction,
-        2.0 * friction * at_rest * design.rho_s * G * area,
+        2.0 * friction * at_rest * design.rho_s * G * design.L * design.d,
         base.slip_speed,
     )
 
@@ -169,32 +175,33 @@ def heave_constants(design: Design, c: Constants, form: HeaveOptions, base: Base
 def prepare(work: np.ndarray, f: HeaveConstants) -> None:
     """Fill a workspace, shape (ROOM,), for a design at rest."""
     c = f.c
-    for j in range(PIECES):
-        row, column = j // SIDE_COLUMNS, j % SIDE_COLUMNS
-        depth = (row + 0.5) * (c.d / SIDE_ROWS)
-        put(work, SETS, j, 0.0)
-        put(work, FOOT, j, (j + 0.5) * (f.L / PIECES) - c.c_x)
-        put(work, SIDE_A, j, (column + 0.5) * (f.L / SIDE_COLUMNS) - c.c_x)
-        put(work, SIDE_B, j, c.z_0 - depth)
-        put(work, SIDE_DEPTH, j, depth)
-        put(work, RATIO, j, (j + 0.5) * (1.0 / PIECES))
+    fineness = round(math.sqrt(f.pieces // GROUP))
+    edge = 0.0
+    for n in range(f.pieces):
+        # Strips between the feet of evenly spread points of a half circle.
+        next_edge = 0.5 * sine_versine(math.pi * (n + 1.0) / f.pieces).versin
+        put(work, SETS, n, 0.0)
+        put(work, FOOT, n, f.L * 0.5 * (edge + next_edge) - c.c_x)
+        put(work, STRIP, n, next_edge - edge)
+        edge = next_edge
+        square, point = n // GROUP, n % GROUP
+        row, column = point // 4, point % 4
+        put(work, SIDE_A, n, f.L * ((square % fineness + SIDE_POINTS[column]) / fineness) - c.c_x)
+        put(work, SIDE_DEPTH, n, c.d * ((square // fineness + SIDE_POINTS[row]) / fineness))
+        put(work, SIDE, n, f.side * SIDE_WEIGHTS[row] * SIDE_WEIGHTS[column] * GROUP / f.pieces)
 
 
 @inlined
-def summed(work: np.ndarray, n: int) -> float:
-    """Add up the partial sums of the number n, by halves."""
-    first = SUMS + n * PARTS
-    left = (field(work, first, 0) + field(work, first, 4)) + (field(work, first, 2) + field(work, first, 6))
-    right = (field(work, first, 1) + field(work, first, 5)) + (field(work, first, 3) + field(work, first, 7))
-    return left + right
-
-
-@inlined
-def add_to(work: np.ndarray, j: int, along_x: float, turning: float, lifting: float) -> None:
-    """Add to the partial sums j of the first three numbers: force along X, moment, force upwards."""
-    put(work, SUMS, j, field(work, SUMS, j) + along_x)
-    put(work, SUMS + PARTS, j, field(work, SUMS + PARTS, j) + turning)
-    put(work, SUMS + 2 * PARTS, j, field(work, SUMS + 2 * PARTS, j) + lifting)
+def summed(work: np.ndarray, offset: int, pieces: int) -> float:
+    """Add up what the pieces have of a sum, sixteen at a time by halves."""
+    result = 0.0
+    for n in range(offset, offset + pieces, GROUP):
+        one = (field(work, n, 0) + field(work, n, 8)) + (field(work, n, 4) + field(work, n, 12))
+        two = (field(work, n, 2) + field(work, n, 10)) + (field(work, n, 6) + field(work, n, 14))
+        three = (field(work, n, 1) + field(work, n, 9)) + (field(work, n, 5) + field(work, n, 13))
+        four = (field(work, n, 3) + field(work, n, 11)) + (field(work, n, 7) + field(work, n, 15))
+        result += (one + two) + (three + four)
+    return result
 
 
 @inlined
@@ -203,53 +210,132 @@ def slipping(v: float, f: HeaveConstants) -> float:
     return v / math.sqrt(v * v + f.v_s * f.v_s)
 
 
-class Element(NamedTuple):
-    """One soil element (Eq 132)."""
+class Parts(NamedTuple):
+    """What the parts of the soil have in common at a state."""
 
-    spring: float
-    """Force of its spring on the boulder [N]."""
+    share: float
+    """Height of each as a share of the depth."""
+    w: float
+    """Difference of the displacements at its ends [m]."""
+    inverse_w: float
+    """1/w [1/m]."""
+    slope_w: float
+    """Slope of w by the rotation [m]."""
+    stiffness: float
+    """Stiffness of its springs per depth [N/m^2]."""
     drag: float
-    """Its drag [N]."""
-    lever: float
-    """Their lever below the common centre of mass [m]."""
-    lift: float
-    """Vertical force: what its energy loses per rise of the face [N]."""
-    lift_lever: float
-    """Lever of that force [m]."""
-    energy: float
-    """Energy in its spring [J]."""
+    """Its drag at a velocity of 1 m/s [N s^2/m^2]."""
+    inverse_cover: float
+    """What its depth is multiplied by for the share of its drag: it drags in full where half of it is covered [1/m]."""
 
 
 @inlined
-def soil_element(
-    work: np.ndarray, j: int, y_b: float, sin: float, versin: float, k: Kinematics, f: HeaveConstants
-) -> Element:
-    """Forces and energy of soil element j; its depth follows the rise of the face that it presses on (Eq 132)."""
+def parts_of_soil(sin: float, k: Kinematics, f: HeaveConstants) -> Parts:
+    """Return what the parts of the soil have in common."""
+    share = 1.0 / f.pieces
+    w = max(abs(k.slope_x) * share, TINY)
+    slope_w = math.copysign(k.lever_d * share, sin)
+    inverse_d = 1.0 / f.c.d
+    return Parts(
+        share, w, 1.0 / w, slope_w, f.c.K_soil * share * inverse_d, f.c.R_soil * share, 2.0 * f.pieces * inverse_d
+    )
+
+
+class Beyond(NamedTuple):
+    """Averages along a part of the soil in which u goes in a line from u - w/2 to u + w/2 (Eq 132)."""
+
+    share: float
+    """Share of the part where u > q."""
+    energy: float
+    """(u - q)^2/2 where u > q, and 0 elsewhere [m^2]."""
+    slope: float
+    """Slope of that average by u at the middle [m]: u - q where u > q."""
+    widening: float
+    """Its slope by w [m]."""
+
+
+@inlined
+def beyond(u: float, q: float, p: Parts) -> Beyond:
+    """Return the averages beyond q, exactly, without a branch and without a difference of large numbers."""
+    over = max(u - q + 0.5 * p.w, 0.0)
+    length = min(over, p.w)
+    share, mean = length * p.inverse_w, over - 0.5 * length
+    energy = share * (0.5 * mean * mean + (1.0 / 24.0) * length * length)
+    return Beyond(share, energy, share * mean, share * length * (0.25 - (1.0 / 6.0) * share))
+
+
+class Pressed(NamedTuple):
+    """What one part of the soil does to one face."""
+
+    spring: float
+    """Force of its springs [N]."""
+    drag: float
+    """Its share of the drag, along X [N]."""
+    widening: float
+    """Slope of the energy by the difference of the displacements at its ends [N]."""
+    lift: float
+    """Vertical force: what its energy loses per rise of the face [N]."""
+    energy: float
+    """Energy in its springs [J]."""
+
+
+@inlined
+def pressed(u: float, drag: float, z: float, p: Parts, f: HeaveConstants) -> Pressed:
+    """Return what a part does to a face that presses on it where u > 0 and is in soil z deep, by its middle."""
+    all_of_it, yielded = beyond(u, 0.0, p), beyond(u, f.c.x_yield, p)
+    depth = max(z, 0.0)
+    energy = p.stiffness * (all_of_it.energy - yielded.energy)
+    covered = min(depth * p.inverse_cover, 1.0)
+    return Pressed(
+        p.stiffness * depth * (all_of_it.slope - yielded.slope),
+        all_of_it.share * covered * drag,
+        p.stiffness * depth * (all_of_it.widening - yielded.widening),
+        f.heave * energy if z > 0.0 else 0.0,
+        energy * depth,
+    )
+
+
+class Element(NamedTuple):
+    """One part of the soil (Eq 132)."""
+
+    spring: float
+    """Force of its springs on the boulder [N]."""
+    far: float
+    """Force of springs and drag where it is pushed forward [N]."""
+    near: float
+    """And where it is pushed back [N]."""
+    turning: float
+    """Their moment about the common centre of mass, that of the lift included [N m]."""
+    lift: float
+    """Vertical force [N]."""
+    energy: float
+    """Energy in its springs [J]."""
+
+
+@inlined
+def soil_element(n: int, y_b: float, sin: float, versin: float, k: Kinematics, p: Parts, f: HeaveConstants) -> Element:
+    """Forces and energy of part n of the soil: its depth follows the rise of the faces that press on it (Eq 132)."""
     c = f.c
-    ratio = field(work, RATIO, j)
-    u = k.A - k.slope_x * ratio
-    v = k.B - k.slope_v * ratio
+    ratio = (n + 0.5) * p.share
+    u, v = k.A - k.slope_x * ratio, k.B - k.slope_v * ratio
     alpha = c.d * ratio
-    d_n = alpha - c.z_0
-    edge = c.l_n if u > 0.0 else c.l_n - f.L
-    depth = max(alpha - f.heave * (y_b - edge * sin + d_n * versin), 0.0)
-    stiffness = c.K_soil * (1.0 / PIECES) / c.d
-    limited = min(max(u, -c.x_yield), c.x_yield)
-    stored = stiffness * (0.5 * limited * limited + c.x_yield * (abs(u) - abs(limited)))
-    covered = min(depth * (PIECES / (FULL_DRAG * c.d)), 1.0)
-    drag = -c.R_soil * (1.0 / PIECES) * covered * v * abs(v)
-    lift = f.heave * stored if depth > 0.0 else 0.0
-    lift_lever = d_n * sin - edge * (1.0 - versin)
-    return Element(-stiffness * depth * limited, drag, k.lever_d * ratio + k.q, lift, lift_lever, stored * depth)
+    d_n, l_near = alpha - c.z_0, c.l_n - f.L
+    drag = -p.drag * v * abs(v)
+    z = alpha - f.heave * (y_b + d_n * versin)
+    far = pressed(u, drag, z + f.heave * c.l_n * sin, p, f)
+    near = pressed(-u, drag, z + f.heave * l_near * sin, p, f)
+    F_far, F_near = far.drag - far.spring, near.drag + near.spring
+    lift = far.lift + near.lift
+    turning = lift * d_n * sin - (far.lift * c.l_n + near.lift * l_near) * (1.0 - versin)
+    turning -= (F_far + F_near) * (k.lever_d * ratio + k.q) + (far.widening + near.widening) * p.slope_w
+    return Element(near.spring - far.spring, F_far, F_near, turning, lift, far.energy + near.energy)
 
 
 class Strip(NamedTuple):
     """One strip of the foot (Eq 133)."""
 
-    elastic: float
-    """Force of the base's spring [N]."""
-    total: float
-    """With its dashpot: what the base pushes up with [N]."""
+    push: float
+    """What the base pushes up with, spring and dashpot [N]."""
     X: float
     """Position of the strip right of the common centre of mass [m]."""
     Y: float
@@ -271,15 +357,15 @@ def foot_strip(
     The dashpot grows with the pressure up to that of the boulder at rest, so that a strip that touches down meets no
     jump, and base and dashpot together neither pull nor push more than the bearing capacity.
     """
-    a, cos = field(work, FOOT, j), 1.0 - versin
+    a, cos, share = field(work, FOOT, j), 1.0 - versin, field(work, STRIP, j)
     X, Y = a * cos - f.c.c_y * sin, -a * sin - f.c.c_y * cos
-    elastic = min(max(f.k_strip * strip_depth(work, j, y_b, sin, versin, f), 0.0), f.q_strip)
-    on = min(elastic * (1.0 / (f.k_strip * f.s_0)), 1.0)
-    total = min(max(elastic - on * f.c_strip * (w_b - omega_b * X), 0.0), f.q_strip)
-    return Strip(elastic, total, X, Y)
+    elastic = min(max(f.k_foot * strip_depth(work, j, y_b, sin, versin, f), 0.0), f.q_foot)
+    on = min(elastic * (1.0 / (f.k_foot * f.s_0)), 1.0)
+    total = min(max(elastic - on * f.c_foot * (w_b - omega_b * X), 0.0), f.q_foot)
+    return Strip(share * total, X, Y)
 
 
-@kernel
+@inlined
 def forces(
     x_b: float,
     v_b: float,
@@ -314,55 +400,37 @@ def forces(
     sin, versin = sine_versine(theta_b)
     cos = 1.0 - versin
     k = soil_kinematics(x_b, v_b, omega_b, sin, versin, c)
-    for j in range(PARTS):
-        along_x = turning = lifting = far = near = 0.0
-        for part in range(EACH):
-            e = soil_element(work, j + part * PARTS, y_b, sin, versin, k, f)
-            F = e.spring + e.drag
-            along_x += F
-            turning += e.lift * e.lift_lever - F * e.lever
-            lifting += e.lift
-            far += max(-F, 0.0)
-            near += max(F, 0.0)
-        put(work, SUMS, j, along_x)
-        put(work, SUMS + PARTS, j, turning)
-        put(work, SUMS + 2 * PARTS, j, lifting)
-        put(work, SUMS + 3 * PARTS, j, far)
-        put(work, SUMS + 4 * PARTS, j, near)
-    far, near = summed(work, 3), summed(work, 4)
+    p = parts_of_soil(sin, k, f)
+    for n in range(f.pieces):
+        e = soil_element(n, y_b, sin, versin, k, p, f)
+        a, depth = field(work, SIDE_A, n), field(work, SIDE_DEPTH, n)
+        b = c.z_0 - depth
+        X, Y = a * cos + b * sin, b * cos - a * sin
+        v_x, v_y = v_b + omega_b * Y, w_b - omega_b * X
+        held = field(work, SIDE, n) * max(depth - f.heave * y_b, 0.0)
+        side_slip = math.sqrt(v_x * v_x + v_y * v_y + f.v_s * f.v_s)
+        s = foot_strip(work, n, y_b, w_b, omega_b, sin, versin, f)
+        slip = v_b + omega_b * s.Y
+        foot_slip = math.sqrt(slip * slip + f.v_s * f.v_s)
+        # One division for both shares of the full friction (Eq 134).
+        inverse = 1.0 / (side_slip * foot_slip)
+        share, push = -held * foot_slip * inverse, f.heave * s.push
+        rub = -f.friction * push * slip * side_slip * inverse
+        put(work, ALONG_X, n, e.far + e.near + share * v_x + rub)
+        put(work, TURNING, n, e.turning + share * (v_x * Y - v_y * X) + rub * s.Y - push * s.X)
+        put(work, LIFTING, n, e.lift + share * v_y + push)
+        put(work, FAR, n, max(-e.far, 0.0) + max(-e.near, 0.0))
+        put(work, NEAR, n, max(e.far, 0.0) + max(e.near, 0.0))
+    far, near = summed(work, FAR, f.pieces), summed(work, NEAR, f.pieces)
     # The faces slip along themselves, each with one speed all over.
     along = v_b * sin + w_b * cos
     F_far = -f.friction * far * slipping(along - omega_b * c.l_n, f)
     F_near = -f.friction * near * slipping(along + omega_b * (f.L - c.l_n), f)
-    Q_x = (F_far + F_near) * sin
-    Q_y = (F_far + F_near) * cos
-    Q_theta = F_near * (f.L - c.l_n) - F_far * c.l_n
-
-    for j in range(PARTS):
-        along_x = turning = lifting = 0.0
-        for part in range(EACH):
-            piece = j + part * PARTS
-            a, b = field(work, SIDE_A, piece), field(work, SIDE_B, piece)
-            X, Y = a * cos + b * sin, b * cos - a * sin
-            v_x, v_y = v_b + omega_b * Y, w_b - omega_b * X
-            pressed = f.side * max(field(work, SIDE_DEPTH, piece) - f.heave * y_b, 0.0)
-            share = -pressed / math.sqrt(v_x * v_x + v_y * v_y + f.v_s * f.v_s)
-            along_x += share * v_x
-            turning += share * (v_x * Y - v_y * X)
-            lifting += share * v_y
-        add_to(work, j, along_x, turning, lifting)
-
+    Q_x = summed(work, ALONG_X, f.pieces) + (F_far + F_near) * sin
+    Q_y = summed(work, LIFTING, f.pieces) + (F_far + F_near) * cos
+    Q_theta = summed(work, TURNING, f.pieces) + F_near * (f.L - c.l_n) - F_far * c.l_n
     weight = f.m_b * G
     if f.heave > 0.0:
-        for j in range(PARTS):
-            along_x = turning = lifting = 0.0
-            for part in range(EACH):
-                s = foot_strip(work, j + part * PARTS, y_b, w_b, omega_b, sin, versin, f)
-                rub = -f.friction * s.total * slipping(v_b + omega_b * s.Y, f)
-                along_x += rub
-                turning += rub * s.Y - s.total * s.X
-                lifting += s.total
-            add_to(work, j, along_x, turning, lifting)
         Q_theta += weight * (f.a_b * cos + f.b_b * sin)
         Q_y -= weight
     else:
@@ -373,9 +441,6 @@ def forces(
         Q_x += rub
         Q_theta += rub * Y + weight * (f.a_b * cos + f.b_b * sin - X)
 
-    Q_x += summed(work, 0)
-    Q_theta += summed(work, 1)
-    Q_y += summed(work, 2)
     u = spring_compression(x_v, v_v, contact_displacement(x_b, sin, versin, c), c)
     F_v = c.k_v * u if touching else 0.0
     return Forces(Q_x + F_v, Q_y, Q_theta + F_v * contact_lever(sin, versin, c), u)

@@ -1,8 +1,9 @@
 """Second opinions: impacts with heave and friction, from the first touch to a verdict that is proved.
 
 Nothing jumps in this motion, but forces bend where the truck comes off, where a strip of the foot touches or leaves and
-where a slip turns. So the step follows the embedded error of Dormand and Prince's method, and is cut at some instants
-(`boulder_kernels.heave_steps`).
+where a slip turns. So the step follows the embedded error of its method (`boulder_kernels.runge_kutta`), and is cut at
+some instants: where the truck comes off or touches again, where the rotation reaches its limit, and where a strip of
+the foot that is being pressed in comes back.
 
 Once the truck no longer drives forward, the energy of boulder, soil, base and crush can only fall. If it is below the
 least potential energy at the limit of rotation, forward and back, the boulder never gets there, and the motion ends.
@@ -10,63 +11,67 @@ least potential energy at the limit of rotation, forward and back, the boulder n
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import kernel
+from ._jit import inlined, kernel
 from .design import Constants, G, constants_of, corrected, design_in, is_computable
-from .dormand_prince import STAGES, displacement_at, slope_at, turning_point
+from .dormand_prince import displacement_at, slope_at, turning_point
 from .heave import (
-    EACH,
-    PARTS,
-    PIECES,
-    SUMS,
+    ALONG_X,
+    FINEST,
+    LIFTING,
+    STRIP,
+    TURNING,
     Base,
     Forces,
     HeaveConstants,
     HeaveOptions,
     heave_constants,
     inertia_at,
+    parts_of_soil,
     prepare,
     seated_sine,
     soil_element,
     strip_depth,
     summed,
 )
-from .heave_steps import (
+from .numerics import ITERATIONS, Bracket, field, narrowed, next_guess, put, sine_versine
+from .outcomes import Status
+from .runge_kutta import (
     AXES,
     RATES,
+    STAGES,
     START,
     TRIAL,
     WORKSPACE,
     Tracks,
-    attempt,
     compression_in,
     contact_change,
+    first_rate,
     foot_rises,
     keep,
     press_in,
+    step,
     time_of_limit,
     track_of,
-    write_rate,
 )
-from .numerics import ITERATIONS, Bracket, field, narrowed, next_guess, put, sine_versine
-from .outcomes import Status
 from .soil import soil_kinematics
 
 READINGS = corrected()
 """The only readings that there are second opinions of."""
 WHOLE, USUAL_BASE = HeaveOptions(heave=True, friction=True), Base()
 """The second opinion itself; other forms and bases are for comparison."""
-FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 2e-4, 8e-3, 1e-9
+FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 2e-4, 0.02, 1e-9
 """Lengths of steps [s]."""
 MOST_ATTEMPTS = 50_000
 CAUTION = 0.01
 """Share of the least energy by which the energy must be below it: the errors of integrator and search, and more."""
 TURNS = 3
 """How often the least energy is looked for along x_b and along y_b in turn."""
-PLACED = 1e-6
+PLACED = 1e-4
 """How precisely, as a share of the energy that lifts the boulder by its length."""
 
 
@@ -77,8 +82,12 @@ class HeaveControl(NamedTuple):
     """Limit of rotation [rad]."""
     longest: float
     """Longest simulated time [s]; a motion that is not proved to stay below the limit by then is not decided."""
-    tolerance: float = 1e-6
+    tolerance: float = 2e-4
     """Error of one step [m]: of velocities times its length, that of the rotation at `error_arm`."""
+    fineness: int = 1
+    """1 for 16 parts of the soil, strips of the foot and points of the sides, up to 4 for 256."""
+    margin: float = 0.0
+    """By how much the motion is proved to stay below the limit, unless it comes that near to it [rad]."""
     stop: bool = True
     """Whether the simulation ends at the limit, and where it is proved that it is not reached."""
 
@@ -150,20 +159,17 @@ def potential_energy(x_b: float, theta_b: float, y_b: float, work: np.ndarray, f
     """
     sin, versin = sine_versine(theta_b)
     k = soil_kinematics(x_b, 0.0, 0.0, sin, versin, f.c)
-    for j in range(PARTS):
-        energy = along_x = lifting = 0.0
-        for part in range(EACH):
-            piece = j + part * PARTS
-            e = soil_element(work, piece, y_b, sin, versin, k, f)
-            depth = max(strip_depth(work, piece, y_b, sin, versin, f), 0.0)
-            elastic = min(f.k_strip * depth, f.q_strip)
-            energy += e.energy + f.heave * elastic * (depth - elastic * (0.5 / f.k_strip))
-            along_x += e.spring
-            lifting += e.lift + f.heave * elastic
-        put(work, SUMS, j, energy)
-        put(work, SUMS + PARTS, j, along_x)
-        put(work, SUMS + 2 * PARTS, j, lifting)
-    V, Q_x, Q_y = summed(work, 0), summed(work, 1), summed(work, 2)
+    p = parts_of_soil(sin, k, f)
+    for n in range(f.pieces):
+        e = soil_element(n, y_b, sin, versin, k, p, f)
+        depth = max(strip_depth(work, n, y_b, sin, versin, f), 0.0)
+        elastic = min(f.k_foot * depth, f.q_foot)
+        share = f.heave * field(work, STRIP, n)
+        put(work, TURNING, n, e.energy + share * elastic * (depth - elastic * (0.5 / f.k_foot)))
+        put(work, ALONG_X, n, e.spring)
+        put(work, LIFTING, n, e.lift + share * elastic)
+    V, Q_x = summed(work, TURNING, f.pieces), summed(work, ALONG_X, f.pieces)
+    Q_y = summed(work, LIFTING, f.pieces)
     weight = f.m_b * G
     if f.heave > 0.0:
         V += weight * (y_b - f.a_b * sin - f.b_b * versin)
@@ -197,23 +203,30 @@ def least_energy(theta: float, work: np.ndarray, f: HeaveConstants) -> float:
     Along x_b alone, and along y_b alone, the energy is convex: its least is where its slope is zero, in either in turn.
     Along x_b it is between the positions where the uppermost and the lowest soil are as they were; along y_b between
     those where all strips carry what they can, which is more than the weight, and where the boulder is out of the soil.
-    There may be several: the search starts from both ends along x_b and from the middle.
+    There may be several, of large rotations: the search starts from both ends along x_b.
     """
     sin, versin = sine_versine(theta)
     upper = f.c.l_n * versin - f.c.z_0 * sin
     left, right = min(upper, upper + f.c.d * sin), max(upper, upper + f.c.d * sin)
     bottom, top = 0.0, f.L + 3.0 * f.c.d + f.s_0
-    for j in range(PIECES):
-        bottom = min(bottom, strip_depth(work, j, 0.0, sin, versin, f) - f.q_strip / f.k_strip)
+    for n in range(f.pieces):
+        bottom = min(bottom, strip_depth(work, n, 0.0, sin, versin, f) - f.q_foot / f.k_foot)
     least = np.inf
-    for start in range(3):
-        position = Equilibrium(left + 0.5 * start * (right - left), 0.0, np.inf)
+    for x in (left, right):
+        position = Equilibrium(x, 0.0, np.inf)
         for _ in range(TURNS):
             if f.heave > 0.0:
                 position = move_to_least_energy(position, False, bottom, top, theta, work, f)
             position = move_to_least_energy(position, True, left, right, theta, work, f)
         least = min(least, position.energy)
     return least
+
+
+@kernel
+def barrier_at(theta: float, work: np.ndarray, f: HeaveConstants) -> float:
+    """Energy below which the boulder never turns as far as theta [J]."""
+    least = least_energy(theta, work, f)
+    return least - CAUTION * abs(least)
 
 
 class Equilibrium(NamedTuple):
@@ -248,6 +261,12 @@ def move_to_least_energy(
     return Equilibrium(x, y, energy)
 
 
+@inlined
+def growth(tolerance: float, error: float) -> float:
+    """By what the next step may be longer: the error of one grows with the fourth power of its length."""
+    return 0.9 * math.sqrt(math.sqrt(tolerance / error))
+
+
 @kernel
 def simulate_heave(
     f: HeaveConstants, m_v: float, control: HeaveControl, work: np.ndarray, record: HeaveRecord
@@ -273,20 +292,21 @@ def simulate_heave(
         put(work, START, axis, 0.0)
     put(work, START, 7, c.v_0)
     t, h, touching = 0.0, FIRST_STEP, True
-    u = write_rate(work, START, 0, touching, f)
+    u = first_rate(work, touching, f)
     theta_max = x_b_max = y_b_max = x_v_max = 0.0
     t_limit, barrier, is_old = np.nan, np.inf, True
+    proved_at = control.theta_limit - control.margin
     written, attempts = 0, 0
     status = Status.STEP_BUDGET.value
     while attempts < MOST_ATTEMPTS:
         attempts += 1
         h = min(h, control.longest - t)
-        error, u_end = attempt(work, h, touching, f)
+        error, u_end = step(work, h, touching, f)
         if not error <= control.tolerance:
             if not h > SHORTEST_STEP:
                 status = Status.UNSTABLE.value
                 break
-            h *= max(0.9 * (control.tolerance / error) ** 0.2, 0.2) if error < np.inf else 0.2
+            h *= max(growth(control.tolerance, error), 0.2) if error < np.inf else 0.2
             continue
         q = Tracks(track_of(work, 0, h), track_of(work, 1, h), track_of(work, 2, h), track_of(work, 3, h))
         tau, changes = 1.0, False
@@ -329,19 +349,21 @@ def simulate_heave(
         else:
             u = u_end
         if tau < 1.0:
-            cut = write_rate(work, START, 0, touching, f)
+            cut = first_rate(work, touching, f)
             u = u if changes else cut
         else:
             for axis in range(AXES):
                 put(work, RATES, axis, field(work, RATES + AXES * (STAGES - 1), axis))
-        h = min(h * min(0.9 * (control.tolerance / max(error, 1e-30)) ** 0.2, 4.0), LONGEST_STEP)
+        h = min(h * min(growth(control.tolerance, max(error, 1e-30)), 4.0), LONGEST_STEP)
         if control.stop and field(work, START, 7) <= 0.0:
             held = energy_at(work, START, f) + (crush_energy(u, c) if touching else 0.0)
             # What is pressed in only lowers the least: it is looked for again where that may decide.
+            if theta_max >= proved_at and proved_at < control.theta_limit:
+                proved_at, barrier, is_old = control.theta_limit, np.inf, True
             if held < barrier and is_old:
-                forward = least_energy(control.theta_limit, work, f)
-                least = min(forward, least_energy(-control.theta_limit, work, f))
-                barrier, is_old = least - CAUTION * abs(least), False
+                barrier = barrier_at(proved_at, work, f)
+                if held < barrier:
+                    barrier, is_old = min(barrier, barrier_at(-proved_at, work, f)), False
             if held < barrier:
                 status = Status.BELOW_LIMIT.value
                 break
@@ -369,9 +391,9 @@ def run_second_opinions(
         c = constants_of(design, READINGS, 0)
         outcome = HeaveOutcome(Status.INVALID.value, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, 0.0)
         if is_computable(c):
-            f = heave_constants(design, c, form, base)
+            f = heave_constants(design, c, form, base, control.fineness)
             # A boulder that the base cannot carry is not at rest at first, and no depth of it is the least energy.
-            if not form.heave or f.k_strip * f.s_0 < f.q_strip:
+            if not form.heave or f.k_foot * f.s_0 < f.q_foot:
                 outcome = simulate_heave(f, design.m_v, control, work, record)
         o = outcome
         out[0, row], out[1, row], out[2, row], out[3, row] = o.status, o.theta_max, o.x_b_max, o.y_b_max
@@ -405,6 +427,8 @@ def second_opinions(
     HeaveOutcome
         Arrays of shape (n,).
     """
+    if not 1 <= control.fineness <= FINEST:
+        raise ValueError(f"the fineness is 1 to {FINEST}, not {control.fineness}")
     designs = np.stack(table)
     out = np.full((len(HeaveOutcome._fields), designs.shape[1]), np.nan)
     run_second_opinions(designs, form, base, control, np.empty(WORKSPACE), record or no_heave_record(), out)

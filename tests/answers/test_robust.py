@@ -28,7 +28,7 @@ def test_the_least_robust_depth_is_robust_and_the_next_one_is_not() -> None:
     assert len(rows) >= 3
     for row in rows:
         assert row["robustness"] == "robust"
-        assert row["stands_under"] == "paper;broms;width_capped"
+        assert row["stands_under"] in ("paper;width_capped", None)  # none is asked in the free region
         at = [row["passes_at"], row["fails_at"]]
         given = sweep.constants | {name: row[name] for name in ("boulder_height_m", "friction_angle_deg")}
         given.pop("embedment_ratio", None)

@@ -63,7 +63,7 @@ def test_what_stands_beside_a_pass(sweep):
 
 def test_a_pass_has_its_second_opinion_before_any_caution(sweep, tmp_path):
     robust = sweep("simulate", CONFIGS / "rwg.yaml")[1]
-    assert "\nrobust: stands with friction and vertical motion under three laws" in robust
+    assert "\nrobust: stands with friction and vertical motion under the weakest of three" in robust
     out = sweep("simulate", CONFIGS / "rwg.yaml", "--set", "soil.friction_angle=41 deg")[1]
     assert out.index("\nsensitive: a second opinion overturns it") < out.index("\ncaution: ")
     wet = sweep("simulate", CONFIGS / "rwg.yaml", "--set", "soil.water_table=1 m")[1]

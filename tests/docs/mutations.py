@@ -21,7 +21,7 @@ _WALL, _TRAJECTORY = "boulder_sweep/crash_tests/rigid_wall.py", "boulder_sweep/i
 _DESIGNS = "boulder_sweep/designs.py"
 _GROUND = "kernels/boulder_kernels/ground.py"
 _LAYERED, _LAYERS = (f"kernels/boulder_kernels/{name}.py" for name in ("layered", "layered_soil"))
-_HEAVE, _STEPS, _OPINION = (f"kernels/boulder_kernels/{name}.py" for name in ("heave", "heave_steps", "second_opinion"))
+_HEAVE, _STEPS, _OPINION = (f"kernels/boulder_kernels/{name}.py" for name in ("heave", "runge_kutta", "second_opinion"))
 _BESIDE, _OUTLINED = (f"kernels/boulder_kernels/{name}.py" for name in ("outlined", "outlined_soil"))
 
 MUTATIONS = (
@@ -99,11 +99,14 @@ MUTATIONS = (
     Mutation((131,), _HEAVE, "Q.Q_y / f.m_b + i.Y * omega_b * omega_b", "Q.Q_y / f.m_b - i.Y * omega_b * omega_b"),
     Mutation((131,), _HEAVE, "2.0 * l_n * sin * cos * f.M_first", "l_n * sin * cos * f.M_first"),
     Mutation((131,), _HEAVE, "A = f.J_b + turned if f.heave", "A = f.c.J_eff if f.heave"),
-    Mutation((132,), _HEAVE, "edge = c.l_n if u > 0.0 else c.l_n - f.L", "edge = c.l_n"),
-    Mutation((132,), _HEAVE, "y_b - edge * sin + d_n * versin", "y_b - edge * sin - d_n * versin"),
-    Mutation((132,), _HEAVE, "lift = f.heave * stored if depth > 0.0 else 0.0", "lift = 0.0"),
-    Mutation((132,), _HEAVE, "d_n * sin - edge * (1.0 - versin)", "d_n * sin + edge * (1.0 - versin)"),
-    Mutation((132,), _HEAVE, "(1.0 / PIECES) * covered * v * abs(v)", "(1.0 / PIECES) * v * abs(v)"),
+    Mutation((132,), _HEAVE, "d_n, l_near = alpha - c.z_0, c.l_n - f.L", "d_n, l_near = alpha - c.z_0, c.l_n"),
+    Mutation((132,), _HEAVE, "f.heave * (y_b + d_n * versin)", "f.heave * (y_b - d_n * versin)"),
+    Mutation((132,), _HEAVE, "f.heave * energy if z > 0.0 else 0.0", "0.0"),
+    Mutation((132,), _HEAVE, "near.lift * l_near) * (1.0 - versin)", "near.lift * c.l_n) * (1.0 - versin)"),
+    Mutation((132,), _HEAVE, "all_of_it.share * covered * drag", "all_of_it.share * drag"),
+    Mutation((132,), _HEAVE, "share * length * (0.25 - (1.0 / 6.0) * share)", "share * length * 0.25"),
+    Mutation((132,), _HEAVE, "0.5 * mean * mean + (1.0 / 24.0) * length * length", "0.5 * mean * mean"),
+    Mutation((132,), _HEAVE, "(far.widening + near.widening) * p", "(far.widening - near.widening) * p"),
     Mutation(
         (133,),
         _HEAVE,
@@ -113,28 +116,29 @@ MUTATIONS = (
     Mutation(
         (133,),
         _HEAVE,
-        "elastic = min(max(f.k_strip * strip_depth(work, j, y_b, sin, versin, f), 0.0), f.q_strip)",
-        "elastic = min(f.k_strip * strip_depth(work, j, y_b, sin, versin, f), f.q_strip)",
+        "elastic = min(max(f.k_foot * strip_depth(work, j, y_b, sin, versin, f), 0.0), f.q_foot)",
+        "elastic = min(f.k_foot * strip_depth(work, j, y_b, sin, versin, f), f.q_foot)",
     ),
     Mutation(
         (133,),
         _HEAVE,
-        "max(elastic - on * f.c_strip * (w_b - omega_b * X), 0.0)",
-        "max(elastic - f.c_strip * (w_b - omega_b * X), 0.0)",
+        "max(elastic - on * f.c_foot * (w_b - omega_b * X), 0.0)",
+        "max(elastic - f.c_foot * (w_b - omega_b * X), 0.0)",
     ),
     Mutation((133,), _HEAVE, "math.exp(math.pi * math.tan(phi))", "math.exp(math.tan(phi))"),
     Mutation((133,), _STEPS, "field(work, SETS, j) + over", "over"),
     Mutation((133,), _STEPS, "and at_end < 0.0 and reach > capacity", "and at_end > 0.0 and reach > capacity"),
     Mutation((134,), _HEAVE, "return v / math.sqrt(v * v + f.v_s * f.v_s)", "return v / (abs(v) + f.v_s)"),
     Mutation((134,), _HEAVE, "along - omega_b * c.l_n", "along + omega_b * c.l_n"),
-    Mutation((134,), _HEAVE, "near += max(F, 0.0)", "near += max(-F, 0.0)"),
-    Mutation((134,), _HEAVE, "rub = -f.friction * s.total * slipping", "rub = -f.friction * s.elastic * slipping"),
+    Mutation((134,), _HEAVE, "max(e.far, 0.0) + max(e.near, 0.0)", "max(e.far + e.near, 0.0)"),
+    Mutation((134,), _HEAVE, "rub = -f.friction * push * slip", "rub = f.friction * push * slip"),
+    Mutation((134,), _HEAVE, "-held * foot_slip * inverse", "-held * side_slip * inverse"),
     Mutation((134,), _HEAVE, "at_rest = 1.0 - math.sin(design.phi)", "at_rest = 1.0"),
     Mutation((134,), _HEAVE, "math.tan(2.0 / 3.0 * design.phi)", "math.tan(design.phi)"),
     Mutation((135,), _HEAVE, "a = f.a_b + 0.5 * f.L * min", "a = f.a_b - 0.5 * f.L * min"),
     Mutation((135,), _HEAVE, "return 6.0 * f.s_0 / f.L", "return 2.0 * f.s_0 / f.L"),
     Mutation(
-        (136,), _OPINION, "elastic * (depth - elastic * (0.5 / f.k_strip))", "elastic * (depth - elastic / f.k_strip)"
+        (136,), _OPINION, "elastic * (depth - elastic * (0.5 / f.k_foot))", "elastic * (depth - elastic / f.k_foot)"
     ),
     Mutation(
         (136,),
@@ -143,7 +147,7 @@ MUTATIONS = (
         "weight * (y_b - f.a_b * sin + f.b_b * versin)",
     ),
     Mutation((136,), _OPINION, "- (f.b_b + f.c.c_y) * versin)", "- f.b_b * versin)"),
-    Mutation((137,), _OPINION, "least - CAUTION * abs(least), False", "least + 2.0 * abs(least), False"),
+    Mutation((137,), _OPINION, "return least - CAUTION * abs(least)", "return least + 2.0 * abs(least)"),
     Mutation((137,), _OPINION, "bottom = min(bottom, ", "bottom = max(-0.5 * f.c.d, "),
     Mutation(
         (137,),

@@ -11,7 +11,7 @@ import pytest
 import boulder_sweep
 from boulder_sweep.answers.placing import boulder_block, placed
 from boulder_sweep.impact.simulation import simulate
-from boulder_sweep.settings.loader import ALL_OPINIONS
+from boulder_sweep.settings.loader import SECOND_OPINION
 from boulder_sweep.stones.weighing import scanned
 from tests.conftest import Command
 
@@ -70,7 +70,7 @@ def test_a_slower_truck_overturns_a_boulder_that_slides(table) -> None:
 
 
 def test_what_nobody_has_tested_is_flagged_and_not_robust(table) -> None:
-    rows = table("beyond_the_study.csv", ALL_OPINIONS).set_index("case_name")
+    rows = table("beyond_the_study.csv", SECOND_OPINION).set_index("case_name")
     flags = rows.validity.str.split(";")
     assert len(rows) == 7
     for name, found in flags.items():

@@ -9,7 +9,8 @@ import boulder_kernels as bk
 from boulder_kernels.design import constants_of
 from boulder_kernels.dynamics import State
 from boulder_kernels.heave import (
-    PIECES,
+    FINEST,
+    GROUP,
     ROOM,
     SETS,
     Base,
@@ -38,22 +39,24 @@ BASE = Base()
 NOTHING = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def constants(design: bk.Design, form: HeaveOptions, base: Base = BASE, **changes: float) -> HeaveConstants:
+def constants(
+    design: bk.Design, form: HeaveOptions, base: Base = BASE, fineness: int = 1, **changes: float
+) -> HeaveConstants:
     """Constants of the motion, with some of them changed."""
-    return heave_constants(design, constants_of(design, bk.corrected(), 0), form, base)._replace(**changes)
+    return heave_constants(design, constants_of(design, bk.corrected(), 0), form, base, fineness)._replace(**changes)
 
 
 def workspace(f: HeaveConstants, sets: np.ndarray | None = None) -> np.ndarray:
     work = np.full(ROOM, np.nan)
     prepare(work, f)
     if sets is not None:
-        work[SETS : SETS + PIECES] = sets
+        work[SETS : SETS + f.pieces] = sets
     return work
 
 
-def random_sets(rng: np.random.Generator) -> np.ndarray:
+def random_sets(rng: np.random.Generator, pieces: int = GROUP) -> np.ndarray:
     """What strips of the foot are pressed in for good [m], some of them nothing."""
-    return np.where(rng.random(PIECES) < 0.4, rng.uniform(0.0, 0.01, PIECES), 0.0)
+    return np.where(rng.random(pieces) < 0.4, rng.uniform(0.0, 0.01, pieces), 0.0)
 
 
 def random_motion(rng: np.random.Generator, form: HeaveOptions) -> tuple[State, float, float]:
@@ -80,14 +83,15 @@ def as_vector(Q: Forces, form: HeaveOptions) -> np.ndarray:
     return np.array([Q.Q_x, Q.Q_theta, Q.Q_y if form.heave else 0.0])
 
 
+@pytest.mark.parametrize("fineness", [1, 2, FINEST])
 @pytest.mark.parametrize("form", FORMS, ids=NAMES)
-def test_forces_and_accelerations_are_those_of_the_oracle(form: HeaveOptions) -> None:
+def test_forces_and_accelerations_are_those_of_the_oracle(form: HeaveOptions, fineness: int) -> None:
     rng = np.random.default_rng(251)
     for design in random_designs(4, seed=252):
-        f = constants(design, form)
-        body = Body(inputs_of(design), *form, OracleBase())
+        f = constants(design, form, fineness=fineness)
+        body = Body(inputs_of(design), *form, OracleBase(), fineness)
         for number in range(12):
-            sets, (y, rise, rate) = random_sets(rng), random_motion(rng, form)
+            sets, (y, rise, rate) = random_sets(rng, f.pieces), random_motion(rng, form)
             touching = number % 3 > 0
             found = forces_at(y, rise, rate, touching, workspace(f, sets), f)
             q, rates = coordinates(y, rise, rate)
@@ -211,13 +215,13 @@ def test_base_carries_on_the_side_that_is_pressed_in() -> None:
 
 def test_a_set_strip_carries_less() -> None:
     f = constants(RWG, FORMS[1])
-    sets = np.zeros(PIECES)
+    sets = np.zeros(GROUP)
     sets[5] = 0.25 * f.s_0
     work = workspace(f, sets)
-    held = f.m_b * bk.design.G
-    assert forces_at(NOTHING, 0.0, 0.0, False, work, f).Q_y == pytest.approx(-0.25 * held / PIECES, rel=1e-9)
+    held = f.m_b * bk.design.G * 0.5 * (np.cos(np.pi * 5 / 16) - np.cos(np.pi * 6 / 16))
+    assert forces_at(NOTHING, 0.0, 0.0, False, work, f).Q_y == pytest.approx(-0.25 * held, rel=1e-9)
     sets[5] = 7.0 * f.s_0
-    assert forces_at(NOTHING, 0.0, 0.0, False, workspace(f, sets), f).Q_y == pytest.approx(-held / PIECES, rel=1e-9)
+    assert forces_at(NOTHING, 0.0, 0.0, False, workspace(f, sets), f).Q_y == pytest.approx(-held, rel=1e-9)
 
 
 def test_friction_by_hand() -> None:

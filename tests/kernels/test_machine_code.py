@@ -152,7 +152,7 @@ def test_layers_and_pieces_of_soil_are_vectorised(soil, parts: int, kernel) -> N
 def test_pieces_of_a_second_opinion_are_vectorised() -> None:
     """Soil, sides and foot of one impact: roots and divisions in whole registers; only the ends of sums are left."""
     design = random_designs(1, seed=143)[0]
-    f = heave_constants(design, constants_of(design, bk.corrected(), 0), HeaveOptions(True, True), Base())
+    f = heave_constants(design, constants_of(design, bk.corrected(), 0), HeaveOptions(True, True), Base(), 1)
     work = np.zeros(ROOM)
     prepare(work, f)
     code = assembly(forces, 0.05, 1.0, 0.05, 0.5, 0.01, 0.1, 0.6, 12.0, True, work, f)
@@ -160,7 +160,7 @@ def test_pieces_of_a_second_opinion_are_vectorised() -> None:
     assert not CALL.search(code + held)
     found, register = widths(code), widest()
     if register and register != "xmm":
-        assert found[f"div {register}"] >= 2
+        assert found[f"div {register}"] >= 1
         assert found[f"sqr {register}"] >= 2
         assert widths(held)[f"max {register}"] >= 2
 

@@ -11,9 +11,20 @@ import pytest
 import boulder_kernels as bk
 from boulder_kernels import Status
 from boulder_kernels.design import G, constants_of
+from boulder_kernels.dormand_prince import Track
 from boulder_kernels.dynamics import contact_displacement, spring_compression
-from boulder_kernels.heave import PIECES, SETS, Base, HeaveConstants, HeaveOptions, heave_constants, prepare
-from boulder_kernels.heave_steps import START, WORKSPACE
+from boulder_kernels.heave import (
+    FINEST,
+    GROUP,
+    SETS,
+    STRIP,
+    Base,
+    HeaveConstants,
+    HeaveOptions,
+    heave_constants,
+    prepare,
+)
+from boulder_kernels.runge_kutta import START, WORKSPACE, Tracks
 from boulder_kernels.second_opinion import (
     CAUTION,
     PLACED,
@@ -22,10 +33,12 @@ from boulder_kernels.second_opinion import (
     HeaveOutcome,
     HeaveRecord,
     energy_at,
+    foot_rises,
     least_energy,
     move_to_least_energy,
     no_heave_record,
     potential_energy,
+    press_in,
     second_opinions,
     simulate_heave,
 )
@@ -74,13 +87,13 @@ def simulate(
     base: Base = BASE,
     record: HeaveRecord | None = None,
     *,
-    elements: int = 0,
     planar: dict[str, float] | None = None,
     **changes: float,
 ) -> Motion:
     """Simulate one impact, with some constants of the planar motion or of the other changed."""
-    c = constants_of(design, bk.corrected(), elements)._replace(**(planar or {}))
-    f, work = heave_constants(design, c, form, base)._replace(**changes), np.full(WORKSPACE, np.nan)
+    c = constants_of(design, bk.corrected(), 0)._replace(**(planar or {}))
+    f = heave_constants(design, c, form, base, how.fineness)._replace(**changes)
+    work = np.full(WORKSPACE, np.nan)
     return Motion(simulate_heave(f, design.m_v, how, work, record or no_heave_record()), f, work)
 
 
@@ -94,13 +107,13 @@ def assert_as_the_oracle(
     """Hold an impact against the oracle: 1e-3 degrees, 1e-5 m and s."""
     inputs = replace(inputs_of(design), resistance=law)
     known = known_impact(inputs, heave=form.heave, friction=form.friction, horizon=horizon, limit=LIMIT)
-    found, _, work = simulate(under(design, law), form, HeaveControl(LIMIT, horizon, tolerance, False))
-    stopped, *_ = simulate(under(design, law), form, HeaveControl(LIMIT, horizon, tolerance, True))
+    found, _, work = simulate(under(design, law), form, HeaveControl(LIMIT, horizon, tolerance, stop=False))
+    stopped, *_ = simulate(under(design, law), form, HeaveControl(LIMIT, horizon, tolerance, stop=True))
     if np.isinf(known.t_limit):
         assert found.status == Status.HORIZON
         assert np.isnan(found.t_limit)
         assert found.theta_max * DEGREE == pytest.approx(known.theta_max * DEGREE, abs=1e-3)
-        compared, sets = found, work[SETS : SETS + PIECES]
+        compared, sets = found, work[SETS : SETS + GROUP]
         assert sets == pytest.approx(known.sets, abs=1e-5)
     else:
         assert stopped.status == Status.LIMIT
@@ -165,7 +178,7 @@ def test_energy_stays_where_nothing_dissipates() -> None:
             Base(wave_speed=0.0),
             record,
             planar={"R_soil": 1e-9, "tau_v": 0.0},
-            q_strip=1e15,
+            q_foot=1e15,
         )
         found = energies(design, record)
         assert np.abs(found - found[0]).max() < 1e-6
@@ -187,12 +200,12 @@ def test_what_is_pressed_in_stays() -> None:
     """The set of the base only grows, on the side that the boulder turns to; none where the base can carry anything."""
     found = 0
     for design in some_designs(12, seed=262):
-        ends = [HeaveControl(1.2, end, 1e-12, False) for end in np.linspace(0.03, 0.3, 10)]
-        sets = np.array([simulate(design, RISE, how).work[SETS : SETS + PIECES] for how in ends])
+        ends = [HeaveControl(1.2, end, 1e-12, stop=False) for end in np.linspace(0.03, 0.3, 10)]
+        sets = np.array([simulate(design, RISE, how).work[SETS : SETS + GROUP] for how in ends])
         assert np.diff(sets, axis=0).min() > -1e-6  # the last steps of two ends are not the same
         assert sets[:, 0].max() == 0.0
-        firm = simulate(design, RISE, ends[-1], q_strip=1e15)
-        assert firm.work[SETS : SETS + PIECES].max() == 0.0
+        firm = simulate(design, RISE, ends[-1], q_foot=1e15)
+        assert firm.work[SETS : SETS + GROUP].max() == 0.0
         found += sets.max() > 1e-3
     assert found >= 3
 
@@ -203,14 +216,49 @@ def test_what_is_pressed_in_does_not_depend_on_where_steps_end() -> None:
     gaps = []
     for design in some_designs(24, seed=262):
         exact, usual = (
-            simulate(design, RISE, HeaveControl(1.2, 0.3, tolerance, False)).work[SETS : SETS + PIECES]
-            for tolerance in (1e-11, HeaveControl(1.2, 0.3).tolerance)
+            simulate(design, RISE, HeaveControl(1.2, 0.3, tolerance, stop=False)).work[SETS : SETS + GROUP]
+            for tolerance in (1e-11, 1e-6)
         )
         if exact.max() > 1e-4:
             gaps.append(np.abs(usual - exact).max())
     assert len(gaps) >= 12
-    assert np.mean(gaps) < 3e-5
-    assert np.max(gaps) < 2e-4
+    assert np.mean(gaps) < 1e-5
+    assert np.max(gaps) < 6e-5
+
+
+def test_a_step_ends_where_a_strip_that_is_pressed_in_comes_back() -> None:
+    """The step is cut at the greatest depth of the first strip, and what is pressed in is that of the interpolant."""
+    f = heave_constants(RWG, constants_of(RWG, bk.corrected(), 0), BOTH, BASE, 1)
+    work, h = np.zeros(WORKSPACE), 4e-3
+    prepare(work, f)
+    still = Track(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    capacity = f.q_foot / f.k_foot
+    for beyond, end in ((0.004, 0.4), (-0.004, 1.0)):
+        # It sinks to its greatest depth at 0.4 of the step.
+        start = f.s_0 - capacity - beyond
+        sinking = Track(start, -0.8 * 1e-3, 1e-3, 0.0, 0.0, 0.0)
+        q = Tracks(still, still, sinking, still)
+        assert foot_rises(work, q, 1.0, h, f) == pytest.approx(end, abs=1e-6)
+        assert foot_rises(work, q, 0.3, h, f) == 0.3
+    assert foot_rises(work, Tracks(still, still, Track(np.nan, np.nan, 0, 0, 0, 0), still), 1.0, h, f) == 1.0
+
+
+def test_pressing_in_by_hand() -> None:
+    """What a strip is pressed in beyond q/k_b stays, once, and adds up (Eq 133)."""
+    f = heave_constants(RWG, constants_of(RWG, bk.corrected(), 0), BOTH, BASE, 1)
+    work = np.zeros(WORKSPACE)
+    prepare(work, f)
+    deepest = RWG.rho_s * G * RWG.d * np.exp(np.pi * np.tan(RWG.phi)) * np.tan(np.pi / 4 + RWG.phi / 2) ** 2 / 100e6
+    settlement = f.m_b * G / (100e6 * RWG.L * RWG.W)
+    for depth, known, pressed in (
+        (0.9 * deepest, 0.0, False),
+        (deepest + 0.01, 0.01, True),
+        (deepest + 0.005, 0.01, False),
+        (deepest + 0.03, 0.03, True),
+    ):
+        work[START + 2] = settlement - depth
+        assert press_in(work, f) == pressed
+        assert work[SETS : SETS + GROUP] == pytest.approx(np.full(GROUP, known), abs=1e-12)
 
 
 @pytest.mark.compiled
@@ -222,7 +270,8 @@ def test_a_strip_pressed_beyond_its_capacity_takes_energy() -> None:
         how = HeaveControl(1.2, 0.2, 1e-12)
         m = simulate(design, RISE, how, Base(wave_speed=0.0), record, planar={"R_soil": 1e-9, "tau_v": 0.0})
         energy = energies(design, record)
-        taken = m.f.q_strip * m.work[SETS : SETS + PIECES].sum() / (0.5 * design.m_v * design.v_0**2)
+        pressed = m.work[SETS : SETS + GROUP] @ m.work[STRIP : STRIP + GROUP]
+        taken = m.f.q_foot * pressed / (0.5 * design.m_v * design.v_0**2)
         if taken > 1e-4:
             found += 1
         assert energy[0] - energy[-1] == pytest.approx(taken, rel=0.02, abs=1e-5)
@@ -232,14 +281,14 @@ def test_a_strip_pressed_beyond_its_capacity_takes_energy() -> None:
 @pytest.mark.compiled
 @pytest.mark.parametrize("law", LAWS)
 def test_without_rise_and_friction_on_a_stiff_base_it_is_the_planar_motion(law: str) -> None:
-    """By 32 elements. What is left is the rotation at which the base gives way; it shrinks with its stiffness."""
-    how = HeaveControl(LIMIT, 0.35, 1e-9, False)
+    """What is left is the rotation at which the base gives way; it shrinks with its stiffness."""
+    how = HeaveControl(LIMIT, 0.35, 1e-9, FINEST, stop=False)
     for design in [RWG, ABG, *random_designs(6, seed=263)]:
         design = under(design, law)
-        exact = control(2.5e-4, 0.35, LIMIT, PIECES)._replace(locate_yield=True)
+        exact = control(2.5e-4, 0.35, LIMIT, 0)._replace(locate_yield=True)
         known = bk.simulate_design(design, bk.corrected(), exact, bk.no_record()).maxima
         for stiffness, degrees, metres in ((1e11, 0.03, 3e-3), (1e13, 3e-3, 2e-4)):
-            found = simulate(design, NEITHER, how, Base(stiffness=stiffness), elements=PIECES).outcome
+            found = simulate(design, NEITHER, how, Base(stiffness=stiffness)).outcome
             assert found.theta_max * DEGREE == pytest.approx(known.theta * DEGREE, abs=degrees)
             assert found.x_b_max == pytest.approx(known.x_b, abs=metres)
             assert found.x_v_max == pytest.approx(known.x_v, abs=metres)
@@ -252,8 +301,8 @@ def test_on_a_stiff_base_it_turns_about_the_far_end_of_its_foot(number: int) -> 
     """Up to where the truck comes off, for designs that stay on their base: by another integrator, with two axes."""
     design = under([RWG, ABG, *random_designs(6, seed=263)][number], "broms")
     record = empty_record(0.16, 81)
-    how = HeaveControl(1.2, 0.16, 1e-9, False)
-    simulate(design, RISE, how, Base(stiffness=1e13, wave_speed=0.0), record, q_strip=1e18)
+    how = HeaveControl(1.2, 0.16, 1e-9, stop=False)
+    simulate(design, RISE, how, Base(stiffness=1e14, wave_speed=0.0), record, q_foot=1e18)
     known = rolling(Body(inputs_of(design), True, False, OracleBase()), record.times)
     assert len(known) > 30
     found = record.states[: len(known)]
@@ -280,14 +329,34 @@ def test_what_is_proved_to_stay_below_the_limit_does(form: HeaveOptions, degrees
     assert np.all(later.theta_max >= found.theta_max[proved] - 1e-12)
 
 
+@pytest.mark.compiled
+def test_with_a_margin_what_turns_less_is_proved_to_stay_that_far_below() -> None:
+    """And what comes nearer is proved to stay below the limit itself, as without a margin."""
+    limit, margin = np.radians(20.0), np.radians(3.0)
+    table = table_of(some_designs(600, seed=265))
+    without = second_opinions(table, HeaveControl(limit, 3.0))
+    found = second_opinions(table, HeaveControl(limit, 3.0, margin=margin))
+    assert np.array_equal(found.status, without.status)
+    proved = found.status == Status.BELOW_LIMIT
+    nearer = proved & (found.theta_max >= limit - margin)
+    assert nearer.sum() >= 3
+    well_below = np.flatnonzero(proved & ~nearer)
+    later = second_opinions(some_rows(table, well_below), HeaveControl(limit, 5.0, stop=False))
+    assert well_below.size > 40
+    assert np.all(later.theta_max < limit - margin)
+    assert np.mean(found.t_end[well_below] > without.t_end[well_below]) > 0.1
+    with pytest.raises(ValueError, match="fineness is 1 to 4"):
+        second_opinions(table, HeaveControl(limit, 3.0, fineness=FINEST + 1))
+
+
 def test_no_place_costs_less_than_the_least_energy() -> None:
     """At either limit, wherever it stands, for boulders deep and shallow; with strips that were pressed in (Eq 137)."""
     rng = np.random.default_rng(273)
     for design in [RWG, *some_designs(3, seed=274), *map(shallow, some_designs(4, seed=275))]:
-        f = heave_constants(design, constants_of(design, bk.corrected(), 0), BOTH, BASE)
+        f = heave_constants(design, constants_of(design, bk.corrected(), 0), BOTH, BASE, 1)
         work = np.full(WORKSPACE, np.nan)
         prepare(work, f)
-        work[SETS : SETS + PIECES] = np.where(rng.random(PIECES) < 0.2, rng.uniform(0.0, 0.05, PIECES), 0.0)
+        work[SETS : SETS + GROUP] = np.where(rng.random(GROUP) < 0.2, rng.uniform(0.0, 0.05, GROUP), 0.0)
         for theta in (-LIMIT, np.radians(20.0)):
             least = least_energy(theta, work, f)
             cloud = np.column_stack((rng.uniform(-1.5, 1.5, 150), rng.uniform(-1.2, 1.2, 150)))
@@ -303,7 +372,7 @@ def test_eased_is_where_a_step_either_way_costs_more() -> None:
     """Along either axis, from any place between the ends: to `PLACED` of the weight times the length."""
     rng = np.random.default_rng(279)
     for design in some_designs(6, seed=280):
-        f = heave_constants(design, constants_of(design, bk.corrected(), 0), BOTH, BASE)
+        f = heave_constants(design, constants_of(design, bk.corrected(), 0), BOTH, BASE, 1)
         work = np.full(WORKSPACE, np.nan)
         prepare(work, f)
         enough = PLACED * f.m_b * G * design.L
@@ -347,10 +416,10 @@ def shallow(design: bk.Design) -> bk.Design:
 
 @pytest.mark.compiled
 def test_rotation_converges_with_the_tolerance() -> None:
-    """By the default tolerance within 0.01 degrees, and no verdict depends on it."""
+    """By the default tolerance within 0.2 degrees, and no verdict depends on it."""
     table = table_of(some_designs(100, seed=264))
-    exact = second_opinions(table, HeaveControl(1.0, 1.0, 1e-10))
-    within = {1e-5: 0.1, 1e-6: 0.01, 1e-8: 0.001}
+    exact = second_opinions(table, HeaveControl(1.0, 1.0, 1e-11))
+    within = {2e-4: 0.2, 1e-5: 0.03, 1e-7: 0.003}
     mean = []
     for tolerance, degrees in within.items():
         found = second_opinions(table, HeaveControl(1.0, 1.0, tolerance))
@@ -359,7 +428,7 @@ def test_rotation_converges_with_the_tolerance() -> None:
         assert gaps.max() < degrees
         mean.append(gaps.mean())
     assert mean[0] > 3 * mean[1] > 9 * mean[2]
-    assert HeaveControl(1.0, 1.0).tolerance == 1e-6
+    assert HeaveControl(1.0, 1.0).tolerance == 2e-4
 
 
 @pytest.mark.compiled
@@ -406,7 +475,7 @@ def test_a_boulder_that_the_base_cannot_carry_has_no_second_opinion() -> None:
     ("change", "statuses"),
     [
         ({"c_v": 1e-3}, {Status.STEP_BUDGET}),
-        ({"rho_b": 1e-3}, {Status.STEP_BUDGET}),
+        ({"rho_b": 1e-3}, {Status.LIMIT}),
         ({"k_v": 1e18}, {Status.UNSTABLE, Status.STEP_BUDGET}),
         ({"v_0": 0.0}, {Status.BELOW_LIMIT}),
         ({"v_0": 200.0}, {Status.LIMIT}),

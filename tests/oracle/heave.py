@@ -24,9 +24,9 @@ from .vehicle import crush_force, jerk
 
 Array = NDArray[np.float64]
 
-PIECES = 32
-"""Depths of the soil, strips of the foot, points of the sides."""
-_SIDE_ROWS, _SIDE_COLUMNS = 8, 4
+GROUP = 16
+"""Parts of the soil, strips of the foot, and points of the sides, for each square of the fineness."""
+_GAUSS = np.polynomial.legendre.leggauss(4)
 _LONGEST_STEP = 1e-3  # [s]: what is pressed in for good is noted after each
 _ABSOLUTE = np.array([1e-11, 1e-11, 1e-11, 1e-10, 1e-10, 1e-10, 1e-11, 1e-10, 1e-8])
 _SAMPLES = 8
@@ -52,28 +52,36 @@ class Body:
     heave: bool
     friction: bool
     base: Base
+    fineness: int = 1
     constants: Constants = field(init=False)
     own: Array = field(init=False)
     """The boulder's own centre."""
     alpha: Array = field(init=False)
-    """Depths of the soil elements [m]."""
-    height: Array = field(init=False)
+    """Depths of the middles of the parts of the soil [m]."""
+    height: float = field(init=False)
     d_n: Array = field(init=False)
     foot: Array = field(init=False)
+    strips: Array = field(init=False)
+    """Areas of the strips of the foot [m^2]."""
     sides: Array = field(init=False)
     side_depth: Array = field(init=False)
+    side_area: Array = field(init=False)
+    """Areas of one side that its points stand for [m^2]."""
     soil_masses: Array = field(init=False)
     soil_points: Array = field(init=False)
 
     def __post_init__(self) -> None:
         inputs = self.inputs
         c = constants(inputs, CORRECTED)
-        alpha = element_depths(inputs.d, PIECES)
-        rows = inputs.d / _SIDE_ROWS * (np.arange(_SIDE_ROWS) + 0.5)
-        columns = inputs.L / _SIDE_COLUMNS * (np.arange(_SIDE_COLUMNS) + 0.5)
-        depth, along = (grid.ravel() for grid in np.meshgrid(rows, columns, indexing="ij"))
+        pieces = GROUP * self.fineness**2
+        alpha = element_depths(inputs.d, pieces)
+        cells = np.arange(self.fineness)[:, None] + (_GAUSS[0] + 1) / 2
+        share = np.tile(_GAUSS[1] / 2, self.fineness) / self.fineness
+        depth, along = np.meshgrid(inputs.d / self.fineness * cells, inputs.L / self.fineness * cells, indexing="ij")
+        depth, along = depth.ravel(), along.ravel()
         surface = inputs.d - c.c_y  # soil line over the centre of mass
-        strips = inputs.L / PIECES * (np.arange(PIECES) + 0.5)
+        edges = inputs.L / 2 * (1 - np.cos(np.linspace(0, pi, pieces + 1)))
+        strips = (edges[1:] + edges[:-1]) / 2
         nodes, weights = np.polynomial.legendre.leggauss(3)
         where = inputs.d * (nodes + 1) / 2
         wedge = inputs.rho_s * inputs.W * tan(shear_wedge_angle(inputs.phi)) * (inputs.d - where)  # Eq 2 per height
@@ -81,11 +89,13 @@ class Body:
             "constants": c,
             "own": np.array([[inputs.L / 2 - c.c_x, inputs.H / 2 - c.c_y]]),
             "alpha": alpha,
-            "height": np.full(PIECES, inputs.d / PIECES),
+            "height": inputs.d / pieces,
             "d_n": alpha - surface,
-            "foot": np.column_stack((strips - c.c_x, np.full(PIECES, -c.c_y))),
+            "foot": np.column_stack((strips - c.c_x, np.full(pieces, -c.c_y))),
+            "strips": inputs.W * np.diff(edges),
             "sides": np.column_stack((along - c.c_x, surface - depth)),
             "side_depth": depth,
+            "side_area": inputs.L * inputs.d * np.outer(share, share).ravel(),
             "soil_masses": weights * inputs.d / 2 * wedge,
             "soil_points": np.column_stack((np.full(3, c.l_n), surface - where)),
         }.items():
@@ -100,11 +110,6 @@ class Body:
     def settlement(self) -> float:
         """Settlement s_0 of the base at rest [m]."""
         return self.weight / (self.base.stiffness * self.inputs.L * self.inputs.W)
-
-    @property
-    def strip_area(self) -> float:
-        """Area of a strip of the foot [m^2]."""
-        return self.inputs.L * self.inputs.W / PIECES
 
     @property
     def bearing_capacity(self) -> float:
@@ -155,42 +160,86 @@ def opposing(body: Body, speed: Array) -> Array:
     return np.asarray(-speed / np.sqrt(speed**2 + body.base.slip_speed**2))
 
 
-def pressed_faces(body: Body, q: Array) -> tuple[Array, Array, Array]:
-    """Displacement of each soil element, the point of the face that it presses on, and its depth, Eq 132."""
-    far = np.column_stack((np.full(PIECES, body.constants.l_n), -body.d_n))
-    dx = q[0] + turned(far, q[1])[:, 0] - far[:, 0]  # Eq 22
-    face = far.copy()
-    face[dx <= 0, 0] -= body.inputs.L
-    rise = rises(face, q) if body.heave else np.zeros(PIECES)
-    return dx, face, np.maximum(body.alpha - rise, 0.0)
+@dataclass(frozen=True)
+class Stretches:
+    """The soil along each part, cut where it changes the face and where it yields, as points with weights: exact.
+
+    Arrays have the shape (parts, points) but where said; of faces the far one is first.
+    """
+
+    points: Array
+    """Points of the far face, shape (parts, points, 2)."""
+    weights: Array
+    """Shares of the part."""
+    dx: Array
+    """Displacement, Eq 22 [m]."""
+    is_far: Array
+    faces: Array
+    """Middles of the parts on either face, shape (2, parts, 2)."""
+    depth: Array
+    """Depths of the soil there [m], shape (2, parts), Eq 132."""
+
+
+def stretches(body: Body, q: Array) -> Stretches:
+    """Cut the parts of the soil, and put three Gauss points between the cuts."""
+    inputs, l_n = body.inputs, body.constants.l_n
+    surface = body.d_n[0] - body.alpha[0]
+
+    def displacement(alpha: Array) -> Array:
+        points = np.stack((np.full_like(alpha, l_n), -(alpha + surface)), axis=-1)
+        return np.asarray(q[0] + turned(points, q[1])[..., 0] - l_n)
+
+    unit = np.ones(1)
+    k_n, F_u = (of(inputs, unit, unit)[0] for of in (spring_constants, ultimate_forces))
+    top = displacement(np.zeros(1))[0]
+    slope = displacement(np.ones(1))[0] - top
+    ends = body.alpha[:, None] + body.height / 2 * np.array([-1.0, 1.0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cuts = (np.array([-F_u / k_n, 0.0, F_u / k_n]) - top) / slope
+    cuts = np.sort(np.clip(np.nan_to_num(cuts), ends[:, :1], ends[:, 1:]), axis=1)
+    cuts = np.hstack((ends[:, :1], cuts, ends[:, 1:]))
+    nodes, weights = np.polynomial.legendre.leggauss(3)
+    middles, halves = (cuts[:, 1:] + cuts[:, :-1]) / 2, np.diff(cuts, axis=1) / 2
+    alpha = (middles[..., None] + halves[..., None] * nodes).reshape(len(cuts), -1)
+    points = np.stack((np.full_like(alpha, l_n), -(alpha + surface)), axis=-1)
+    share = (halves[..., None] * weights / body.height).reshape(len(cuts), -1)
+    dx = displacement(alpha)
+    faces = np.stack([np.column_stack((np.full_like(body.d_n, a), -body.d_n)) for a in (l_n, l_n - inputs.L)])
+    risen = np.stack([rises(face, q) for face in faces]) if body.heave else np.zeros((2, len(cuts)))
+    return Stretches(points, share, dx, dx > 0, faces, np.maximum(body.alpha - risen, 0.0))
+
+
+def springs_per_depth(body: Body, dx: Array, *, energy: bool) -> Array:
+    """Forces, or energies, of a part of the soil by its displacement per metre of depth."""
+    unit = np.ones_like(dx)
+    of = spring_energies if energy else spring_forces
+    k_n, F_u = (each(body.inputs, unit, unit * body.height) for each in (spring_constants, ultimate_forces))
+    return np.asarray(of(k_n, F_u, dx))
 
 
 def soil_loads(body: Body, q: Array, rates: Array) -> Array:
     """Generalised forces of springs, drag, and the friction of both faces, Eqs 132 and 134."""
-    inputs = body.inputs
-    dx, face, depth = pressed_faces(body, q)
-    far = np.column_stack((np.full(PIECES, body.constants.l_n), -body.d_n))
-    v_n = velocities(far, q, rates)[:, 0]
-    spring = spring_forces(
-        spring_constants(inputs, depth, body.height), ultimate_forces(inputs, depth, body.height), dx
-    )
-    covered = np.minimum(depth / (body.height / 2), 1.0)
-    F_n = -spring - drag_forces(inputs, body.height, v_n) * covered
-    found = generalised(far, np.column_stack((F_n, np.zeros(PIECES))), q[1])
-    if body.heave:  # energy of an element per depth, as vertical force on the face that it presses on
-        unit = np.ones(PIECES)
-        lift = spring_energies(
-            spring_constants(inputs, unit, body.height), ultimate_forces(inputs, unit, body.height), dx
-        )
-        found += generalised(face, np.column_stack((np.zeros(PIECES), np.where(depth > 0, lift, 0.0))), q[1])
+    inputs, l_n, soil = body.inputs, body.constants.l_n, stretches(body, q)
+    middles = soil.faces[0]
+    drag = drag_forces(inputs, np.full(len(middles), body.height), velocities(middles, q, rates)[:, 0])
+    found, pressed = np.zeros(3), np.zeros(2)
+    for side, mine in enumerate((soil.is_far, ~soil.is_far)):
+        weights, depth = np.where(mine, soil.weights, 0.0), soil.depth[side]
+        spring = weights * springs_per_depth(body, soil.dx, energy=False) * depth[:, None]
+        along_x = np.stack((-spring, np.zeros_like(spring)), axis=-1)
+        found += generalised(soil.points.reshape(-1, 2), along_x.reshape(-1, 2), q[1])
+        resisted = -weights.sum(axis=1) * drag * np.minimum(depth / (body.height / 2), 1.0)
+        found += generalised(middles, np.column_stack((resisted, np.zeros_like(resisted))), q[1])
+        F_n = resisted - spring.sum(axis=1)
+        pressed += [-np.minimum(F_n, 0).sum(), np.maximum(F_n, 0).sum()]
+        if body.heave:  # energy of a part per depth, as vertical force on the face that presses on it
+            lift = (weights * springs_per_depth(body, soil.dx, energy=True)).sum(axis=1) * (depth > 0)
+            found += generalised(soil.faces[side], np.column_stack((np.zeros_like(lift), lift)), q[1])
     along = turned(np.array([[0.0, 1.0]]), q[1])
-    for a, pressed in (
-        (body.constants.l_n, -np.minimum(F_n, 0).sum()),
-        (body.constants.l_n - inputs.L, np.maximum(F_n, 0).sum()),
-    ):
+    for a, normal in zip((l_n, l_n - inputs.L), pressed, strict=True):
         point = np.array([[a, 0.0]])
         slip = velocities(point, q, rates) @ along[0]
-        found += generalised(point, body.tan_delta * pressed * opposing(body, slip)[:, None] * along, q[1])
+        found += generalised(point, body.tan_delta * normal * opposing(body, slip)[:, None] * along, q[1])
     return found
 
 
@@ -200,7 +249,7 @@ def side_loads(body: Body, q: Array, rates: Array) -> Array:
     v = velocities(body.sides, q, rates)
     depth = np.maximum(body.side_depth - (q[2] if body.heave else 0.0), 0.0)
     pressure = (1 - sin(inputs.phi)) * inputs.rho_s * GRAVITY * depth
-    full = 2 * body.tan_delta * pressure * inputs.L * inputs.d / PIECES
+    full = 2 * body.tan_delta * pressure * body.side_area
     share = full / np.sqrt((v**2).sum(axis=1) + body.base.slip_speed**2)
     return generalised(body.sides, -share[:, None] * v, q[1])
 
@@ -220,7 +269,7 @@ def base_loads(body: Body, q: Array, rates: Array, sets: Array) -> Array:
         share = np.minimum(spring / (body.weight / (body.inputs.L * body.inputs.W)), 1.0)
         v = velocities(foot, q, rates)
         dashpot = -body.inputs.rho_s * body.base.wave_speed * v[:, 1] * share
-        push = np.clip(spring + dashpot, 0.0, q_u) * body.strip_area
+        push = np.clip(spring + dashpot, 0.0, q_u) * body.strips
     else:
         s = 6 * body.settlement / body.inputs.L
         a = body.own[0, 0] + body.inputs.L / 2 * np.clip(sin(q[1]) / s, -1, 1)
@@ -244,7 +293,7 @@ def loads(body: Body, q: Array, rates: Array, a_v: float, touching: bool, sets: 
         Acceleration of the truck [m/s^2] while it touches.
     touching : bool
         Whether it does.
-    sets : ndarray, shape (32,)
+    sets : ndarray, shape (n,)
         What each strip of the base is pressed in for good [m].
     """
     found = soil_loads(body, q, rates) + base_loads(body, q, rates, sets)
@@ -287,18 +336,17 @@ def energy(body: Body, q: Array, rates: Array, sets: Array) -> float:
     """Kinetic energy of boulder and soil, and what soil, base and weight hold [J], Eqs 131 and 136."""
     M, _ = inertia(body, q, rates)
     moving = np.where([True, True, body.heave], rates, 0.0)
-    dx, _, depth = pressed_faces(body, q)
-    covered = depth > 0
-    k_n = spring_constants(body.inputs, depth, body.height)[covered]
-    F_u = ultimate_forces(body.inputs, depth, body.height)[covered]
-    found = float(moving @ M @ moving / 2 + spring_energies(k_n, F_u, dx[covered]).sum())
+    soil = stretches(body, q)
+    depth = np.where(soil.is_far, soil.depth[0][:, None], soil.depth[1][:, None])
+    held = soil.weights * depth * springs_per_depth(body, soil.dx, energy=True)
+    found = float(moving @ M @ moving / 2 + held.sum())
     if body.heave:
         found += body.weight * float(rises(body.own, q)[0])
         deepest = body.bearing_capacity / body.base.stiffness
         p = np.maximum(pressed_in(body, q, sets), 0.0)
         elastic = np.minimum(p, deepest)
         pressed = body.base.stiffness * elastic**2 / 2 + body.bearing_capacity * (p - elastic)
-        return found + float(pressed.sum() * body.strip_area)
+        return found + float(pressed @ body.strips)
     s = 6 * body.settlement / body.inputs.L
     lean = abs(sin(q[1]))
     lift = lean**2 / (2 * s) if lean < s else lean - s / 2
@@ -327,12 +375,13 @@ def simulate_heave(
     heave: bool = True,
     friction: bool = True,
     base: Base = Base(),
+    fineness: int = 1,
     horizon: float = 0.4,
     limit: float = pi,
     rtol: float = 1e-8,
 ) -> HeaveImpact:
     """Simulate one impact to the horizon [s], or to the limit of rotation [rad], whichever comes first."""
-    return _Run(Body(inputs, heave, friction, base), horizon, limit, rtol).run()
+    return _Run(Body(inputs, heave, friction, base, fineness), horizon, limit, rtol).run()
 
 
 class _Run:
@@ -340,7 +389,7 @@ class _Run:
 
     def __init__(self, body: Body, horizon: float, limit: float, rtol: float) -> None:
         self.body, self.horizon, self.limit, self.rtol = body, horizon, limit, rtol
-        self.sets = np.zeros(PIECES)
+        self.sets = np.zeros(len(body.foot))
         self.touching, self.gap_at_release, self.changes = True, 0.0, 0
 
     def rate(self, _t: float, state: Array) -> Array:

@@ -1,33 +1,77 @@
-"""A step of a second opinion, and the instants within it at which the step is cut.
+"""One step of a second opinion by the pair of Bogacki and Shampine, and the instants within it at which it is cut.
 
-The truck comes off or touches again, the rotation reaches its limit, or a strip of the foot that is being pressed in
-comes back. What a step needs lies in one workspace, behind what `boulder_kernels.heave` keeps there.
+Source: P. Bogacki and L. F. Shampine, A 3(2) pair of Runge-Kutta formulas, Appl. Math. Lett. 2 (1989), 321-325.
+
+Forces that bend at the pieces of soil, foot and sides gain nothing by a higher order. As in
+`boulder_kernels.dormand_prince`, stage displacements need the stage accelerations only, and within a step the motion is
+given by the polynomials of degree five through both of its ends. A step is cut where the truck comes off or touches
+again, where the rotation reaches its limit, and where a strip of the foot that is being pressed in comes back. What a
+step needs lies in one workspace, behind what `boulder_kernels.heave` keeps there.
 """
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
 
 from ._jit import inlined, kernel
 from .design import Constants, error_arm
-from .dormand_prince import AA, ERROR, STAGES, A, C, Track, displacement_at, slope_at, track
+from .dormand_prince import Track, displacement_at, slope_at, track
 from .dynamics import contact_displacement, spring_compression
-from .heave import FOOT, PIECES, ROOM, SETS, HeaveConstants, accelerations, forces, strip_depth
+from .heave import FOOT, ROOM, SETS, HeaveConstants, accelerations, forces, strip_depth
 from .numerics import ITERATIONS, Bracket, field, narrowed, next_guess, put, sine_versine
 
+_A = (
+    (),
+    (Fraction(1, 2),),
+    (Fraction(0), Fraction(3, 4)),
+    (Fraction(2, 9), Fraction(1, 3), Fraction(4, 9)),
+)
+_C = (Fraction(0), Fraction(1, 2), Fraction(3, 4), Fraction(1))
+_B_SECOND = (Fraction(7, 24), Fraction(1, 4), Fraction(1, 3), Fraction(1, 8))
+STAGES = 4
+
+
+def _entry(i: int, j: int) -> Fraction:
+    return _A[i][j] if j < len(_A[i]) else Fraction(0)
+
+
+def _check() -> None:
+    """Refuse to import with a mistyped coefficient: row sums and quadrature conditions."""
+    for i in range(STAGES):
+        assert sum(_A[i], Fraction(0)) == _C[i], f"row {i} of the tableau does not sum to its node"
+    for weights, order in (((*_A[3], Fraction(0)), 3), (_B_SECOND, 2)):
+        for power in range(order):
+            quadrature = sum(w * c**power for w, c in zip(weights, _C, strict=True))
+            assert quadrature == Fraction(1, power + 1), "the weights miss a quadrature condition"
+
+
+_check()
+
+C = tuple(float(c) for c in _C)
+"""Nodes, shape (4,)."""
+A = tuple(tuple(float(_entry(i, j)) for j in range(STAGES)) for i in range(STAGES))
+"""Stage weights, shape (4, 4); the last row is the third-order solution."""
+ERROR = tuple(float(_entry(3, j) - _B_SECOND[j]) for j in range(STAGES))
+"""Weights of the accelerations in the difference of the solutions of third and of second order, shape (4,)."""
+AA = tuple(
+    tuple(float(sum((_entry(i, m) * _entry(m, j) for m in range(STAGES)), Fraction(0))) for j in range(STAGES))
+    for i in range(STAGES)
+)
+"""Weights of the accelerations in the stage displacements, A A, shape (4, 4)."""
+LEAST_SINKING = 1e-9
+"""Velocity below which a strip has come to rest, so that no step is cut twice where one turns back [m/s]."""
 AXES = 4
 """Displacements: x_b, theta_b, y_b, x_v."""
 START, TRIAL, RATES = ROOM, ROOM + 2 * AXES, ROOM + 4 * AXES
 """Offsets in the workspace: displacements and velocities at the start of a step and within it; rates of all stages."""
 WORKSPACE = RATES + STAGES * AXES
 """Numbers in the workspace of one impact."""
-LEAST_SINKING = 1e-9
-"""Velocity below which a strip has come to rest, so that no step is cut twice where one turns back [m/s]."""
 
 
-@kernel
+@inlined
 def write_rate(work: np.ndarray, at: int, stage: int, touching: bool, f: HeaveConstants) -> float:
     """Write the accelerations at a state as those of a stage, and return the compression of the vehicle's spring."""
     x, theta, y, x_v = field(work, at, 0), field(work, at, 1), field(work, at, 2), field(work, at, 3)
@@ -40,7 +84,13 @@ def write_rate(work: np.ndarray, at: int, stage: int, touching: bool, f: HeaveCo
 
 
 @kernel
-def attempt(work: np.ndarray, h: float, touching: bool, f: HeaveConstants) -> tuple[float, float]:
+def first_rate(work: np.ndarray, touching: bool, f: HeaveConstants) -> float:
+    """Write the accelerations at the start of a step; return the compression of the vehicle's spring there [m]."""
+    return write_rate(work, START, 0, touching, f)
+
+
+@inlined
+def step(work: np.ndarray, h: float, touching: bool, f: HeaveConstants) -> tuple[float, float]:
     """Try a step of length h [s] into `TRIAL`; return its error [m] and the compression at its end [m]."""
     u = 0.0
     for stage in range(1, STAGES):
@@ -63,6 +113,15 @@ def attempt(work: np.ndarray, h: float, touching: bool, f: HeaveConstants) -> tu
     return h * h * error, u
 
 
+class Tracks(NamedTuple):
+    """The motion within a step."""
+
+    x_b: Track
+    theta_b: Track
+    y_b: Track
+    x_v: Track
+
+
 @inlined
 def track_of(work: np.ndarray, axis: int, h: float) -> Track:
     """Motion along one axis within the step that was tried last."""
@@ -77,13 +136,16 @@ def track_of(work: np.ndarray, axis: int, h: float) -> Track:
     )
 
 
-class Tracks(NamedTuple):
-    """The motion within a step."""
-
-    x_b: Track
-    theta_b: Track
-    y_b: Track
-    x_v: Track
+@inlined
+def keep(work: np.ndarray, q: Tracks, tau: float, h: float) -> None:
+    """Go on from the fraction tau of the step that was tried last."""
+    for axis in range(AXES):
+        if tau >= 1.0:
+            x, v = field(work, TRIAL, axis), field(work, TRIAL, AXES + axis)
+        else:
+            x, v = displacement_at(q[axis], tau), slope_at(q[axis], tau) / h
+        put(work, START, axis, x)
+        put(work, START, AXES + axis, v)
 
 
 @inlined
@@ -118,21 +180,21 @@ def time_of_limit(q: Track, limit: float, tau_end: float) -> float:
     return high
 
 
-@kernel
+@inlined
 def foot_rises(work: np.ndarray, q: Tracks, tau_end: float, h: float, f: HeaveConstants) -> float:
     """Fraction of a step at which the first strip that is pressed in comes back; tau_end if none does.
 
     What is pressed in is kept at the end of a step (`press_in`), so no step may go on from where a strip is deepest.
     """
-    tau, capacity = tau_end, f.q_strip / f.k_strip
+    tau, capacity = tau_end, f.q_foot / f.k_foot
     start, end = foot_at(q, 0.0), foot_at(q, tau)
     coming_back = 0
-    for j in range(PIECES):
+    for j in range(f.pieces):
         sinking, at_end = sinking_in(work, j, start, f), sinking_in(work, j, end, f)
         coming_back += int((sinking > LEAST_SINKING * h) & (at_end < 0.0))
     if coming_back == 0:
         return tau
-    for j in range(PIECES):
+    for j in range(f.pieces):
         sinking, at_end = sinking_in(work, j, start, f), sinking_in(work, j, end, f)
         # A strip that slows down gets no deeper than it would at the speed that it has.
         reach = strip_depth(work, j, start.y, start.sin, start.versin, f) + sinking * tau
@@ -175,25 +237,13 @@ def sinking_in(work: np.ndarray, j: int, m: FootMotion, f: HeaveConstants) -> fl
     return (field(work, FOOT, j) * (1.0 - m.versin) - f.c.c_y * m.sin) * m.turning - m.rising
 
 
-@kernel
-def keep(work: np.ndarray, q: Tracks, tau: float, h: float) -> None:
-    """Go on from the fraction tau of the step that was tried last."""
-    for axis in range(AXES):
-        if tau >= 1.0:
-            x, v = field(work, TRIAL, axis), field(work, TRIAL, AXES + axis)
-        else:
-            x, v = displacement_at(q[axis], tau), slope_at(q[axis], tau) / h
-        put(work, START, axis, x)
-        put(work, START, AXES + axis, v)
-
-
-@kernel
+@inlined
 def press_in(work: np.ndarray, f: HeaveConstants) -> bool:
     """Keep what a strip of the foot is pressed in beyond its bearing capacity as its set; whether any was."""
     sin, versin = sine_versine(field(work, START, 1))
     any_pressed = False
-    for j in range(PIECES):
-        over = strip_depth(work, j, field(work, START, 2), sin, versin, f) - f.q_strip / f.k_strip
+    for j in range(f.pieces):
+        over = strip_depth(work, j, field(work, START, 2), sin, versin, f) - f.q_foot / f.k_foot
         if over > 0.0 and f.heave > 0.0:
             put(work, SETS, j, field(work, SETS, j) + over)
             any_pressed = True
