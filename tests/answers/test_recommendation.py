@@ -293,6 +293,7 @@ def test_plain_data_has_the_recommendation() -> None:
             assert plain["recommendation"]["design"]["embedment_depth_m"] == best.design.sizes[DEPTH]
 
 
-def test_what_cannot_be_preferred_is_refused() -> None:
+def test_what_cannot_be_preferred_is_refused_and_nothing_need_be() -> None:
+    assert need(site(), prefer=None).recommendation is None
     with pytest.raises(QuestionError, match="--prefer height: must be mass, depth, excavation"):
         need(site(), prefer="height")
