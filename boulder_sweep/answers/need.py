@@ -63,8 +63,8 @@ class Need(Result):
     robust : bool
         Whether only a pass counts that stands under every second opinion with the margin.
     recommendation : Recommendation or None
-        The design to build, and why; None where the question is not about a least size, mass or embedment, or the
-        answers were read from a file.
+        The design to build, and why; None where the question is not about a least size, mass or embedment, none was
+        wanted, or the answers were read from a file.
     """
 
     key: Key
@@ -148,13 +148,13 @@ class Asked:
         The question.
     probability : float or None
         Probability of passing asked for.
-    prefer : str
-        What is least of the design that is recommended, a key of `PREFERENCES`.
+    prefer : str or None
+        What is least of the design that is recommended, a key of `PREFERENCES`; None for no recommendation.
     """
 
     question: Question | LightestQuestion
     probability: float | None
-    prefer: str
+    prefer: str | None
 
     def answers(self, jobs: int | None = None, progress: ProgressCallback | None = None) -> Need:
         """Return the answers; arguments: see `need`."""
@@ -173,7 +173,7 @@ class Asked:
         question |= {} if chance is None else {"probability": chance}
         question |= {"robust": True} if judges.robust else {}
         table = joined_tables(tables, asked.sweep, judges, "boulder_sweep.need", question)
-        best = recommended(asked, table, self.prefer)
+        best = None if self.prefer is None else recommended(asked, table, self.prefer)
         return Need(asked.sweep, table, key, judges.least_margin, simulated, chance, judges.robust, best)
 
 
@@ -187,7 +187,7 @@ def need(
     seed: int = 0,
     between: Ends = None,
     robust: bool | None = None,
-    prefer: str = "mass",
+    prefer: str | None = "mass",
     jobs: int | None = None,
     progress: ProgressCallback | None = None,
 ) -> Need:
@@ -214,7 +214,8 @@ def need(
         `boulder_sweep.judge.robustness`. By default so where second opinions know such designs and no probability is
         asked for.
     prefer
-        What is to be least among designs that qualify: ``mass``, ``depth`` or ``excavation``.
+        What is to be least among designs that qualify: ``mass``, ``depth`` or ``excavation``; None where no design is
+        to be recommended, which takes its own simulations.
     jobs
         Threads; all cores by default. The answers do not depend on it.
     progress
@@ -261,14 +262,14 @@ def asked_of(
     seed: int = 0,
     between: Ends = None,
     robust: bool | None = None,
-    prefer: str = "mass",
+    prefer: str | None = "mass",
 ) -> Asked:
     """Return a question, or refuse it, before anything is computed; arguments and errors: see `need`."""
     if probability is None:
         sweep = at_values(sweep)
     if least and most:
         raise QuestionError("use either --least or --most, not both")
-    if prefer not in PREFERENCES:
+    if prefer is not None and prefer not in PREFERENCES:
         raise QuestionError(f"--prefer {prefer}: must be {', '.join(PREFERENCES)}")
     word = most or least or "embedment_depth"
     key = key_of(word, most=bool(most))

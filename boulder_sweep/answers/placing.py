@@ -164,7 +164,7 @@ def placed(
     for done, standing in enumerate(flat):
         if progress is not None:
             progress(done, len(flat))
-        answers = need(site(boulder_block(stone, standing)), Placing.key.name, margin=margin, robust=False)
+        answers = need(site(boulder_block(stone, standing)), Placing.key.name, margin=margin, robust=False, prefer=None)
         cases = len(answers)
         ways.append(Way(standing, *_common(answers)))
     if progress is not None:

@@ -54,7 +54,7 @@ def embassy_street(file: Path, picture: Path) -> str:
     narrow = blocked[blocked.boulder_width_m == blocked.boulder_width_m.min()]
     width, height, depth = (best[name] for name in ("boulder_width_m", "boulder_height_m", "embedment_depth_m"))
     return (
-        "The lightest boulder that passes with a quarter to spare, under every second opinion, has "
+        "The lightest boulder that is robust with a quarter to spare has "
         f"{best['boulder_mass_kg'] / 1e3:.1f} t: {width:.1f} m wide, {height:.1f} m high and {depth:.2f} m deep; "
         f"{height - depth:.2f} m stand above the ground. Of those {narrow.boulder_width_m.min():.1f} m wide, heights "
         f"up to {narrow.boulder_height_m.max():.1f} m are blocked: buried deep enough, they no longer reach the bumper."

@@ -13,7 +13,7 @@ import pytest
 import boulder_sweep
 from boulder_sweep.answers.advice import advice
 from boulder_sweep.answers.need import Need, need
-from boulder_sweep.answers.recommendation import PREFERENCES, Design
+from boulder_sweep.answers.recommendation import PREFERENCES, Design, _Boulders
 from boulder_sweep.answers.trials import judges_of
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings import Sweep, load, load_text
@@ -115,6 +115,14 @@ def test_a_robust_boulder_goes_before_a_lighter_one_that_is_sensitive() -> None:
     assert design.grade == "robust"
     assert design.sizes["boulder_mass_kg"] == found.frame.boulder_mass_kg.max()
     assert "Of 13 boulders that qualify, 12 are not robust; it is the other." in said(found)
+
+
+def test_a_boulder_whose_grade_turns_out_worse_waits_for_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As if all had been robust at their answers."""
+    file, figures = CONFIGS / "embassy_street.yaml", _Boulders._figures
+    expected = design_of(need(file, robust=False)).sizes
+    monkeypatch.setattr(_Boulders, "_figures", lambda self: (figures(self)[0], np.zeros_like(figures(self)[1])))
+    assert design_of(need(file, robust=False)).sizes == expected
 
 
 def test_a_sensitive_boulder_is_recommended_as_such_only() -> None:
@@ -285,6 +293,7 @@ def test_plain_data_has_the_recommendation() -> None:
             assert plain["recommendation"]["design"]["embedment_depth_m"] == best.design.sizes[DEPTH]
 
 
-def test_what_cannot_be_preferred_is_refused() -> None:
+def test_what_cannot_be_preferred_is_refused_and_nothing_need_be() -> None:
+    assert need(site(), prefer=None).recommendation is None
     with pytest.raises(QuestionError, match="--prefer height: must be mass, depth, excavation"):
         need(site(), prefer="height")

@@ -48,6 +48,9 @@ def test_every_command_is_run_and_leads_on(sweep, tmp_path, monkeypatch, words):
     assert out.count("sweep ") == len(commands), "nothing else looks like a command"
     for program, *command in commands:
         assert program == "sweep"
+        options = [word for word in command if word.startswith("--") and word != "--set"]
+        assert len(options) == len(set(options))
+        assert not {"--robust", "--any"} <= set(options)
         assert sorted(command) != sorted(["need", "my site.yaml", *words[1:]])
         for option, value in pairwise(words):
             if option in KEPT:

@@ -21,11 +21,11 @@ PAGE = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
 NAMES = [site.name for site in SITES]
 MOST_BYTES = 150_000
 SAID = {
-    "embassy_street": r"1\.8 +3\.2 +2\.2[45]\d +0\.\d+ +0\.95 +27\.5 .*robust",
+    "embassy_street": r"→ +1\.8 +3\.4 +2\.43\d +0\.\d+ +0\.97 +29\.2 .*robust",
     "wet_backfill": r"pass +\d+",
     "clayey_terrace": r"PASS, 16\.8° of 20°",
     "embankment": r"2\.3 +3 +13\.97",
-    "quarry_stone": r"36 +2\.424",
+    "quarry_stone": r"\(23\.0 t\)\s+2\.424 m deep",
     "uncertain_site": r"2\.322",
 }
 """What the commands print of the answer."""
