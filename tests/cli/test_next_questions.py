@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-LOW = ("--set", "boulder.height=[2.6 m, 3.2 m]")
+LOW = ("--set", "boulder.height=[2.6 m, 3 m]")
 ASKED = {
     "less margin, and another boulder": ("site", *LOW),
     "all that was asked is kept": ("site", *LOW, "--units", "us", "--prefer", "depth", "--set", "vehicle.speed=31 mph"),

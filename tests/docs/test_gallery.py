@@ -21,7 +21,7 @@ PAGE = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
 NAMES = [site.name for site in SITES]
 MOST_BYTES = 150_000
 SAID = {
-    "embassy_street": r"→ +1\.8 +3\.4 +2\.43\d +0\.\d+ +0\.97 +29\.2 .*robust",
+    "embassy_street": r"→ +1\.8 +3\.4 +2\.41\d +0\.\d+ +0\.98 +29\.2 .*robust",
     "wet_backfill": r"pass +\d+",
     "clayey_terrace": r"PASS, 16\.8° of 20°",
     "embankment": r"2\.3 +3 +13\.97",
