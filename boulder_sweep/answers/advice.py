@@ -34,7 +34,7 @@ MOST_NAMED = 6
 ROUNDED = 0.01
 """By how much a side may be less than the usual one for having been rounded."""
 USUALLY = (0.35, 0.75)
-"""Embedments, as shares of the height, in which another boulder is looked for: those of the study of grades."""
+"""Embedments, as shares of the height, in which another boulder is looked for; the study of grades has the same."""
 
 
 class Again(NamedTuple):
@@ -52,7 +52,7 @@ class Again(NamedTuple):
     options: tuple[tuple[str, ...], ...] = ()
 
     def asking(self, *options: tuple[str, ...], without: tuple[str, ...] = ()) -> str:
-        """Return the command that asks with other options; those of the same name, and some more, are left out.
+        """Return the command that asks with other options. Options of the same name, and some more, are left out.
 
         Of entries of the file, all remain that are not set anew. The boulder's embedment is one entry by two names.
         """

@@ -137,7 +137,7 @@ class Recommendation:
         The best by the other preferences, where it is another boulder.
     boulders, qualified, alike, conditions : int
         Number of boulders, of those with an answer under all conditions, of these the ones whose grade is no worse than
-        that of the design, and of conditions: soils and vehicles, combined.
+        the grade of the design, and of conditions: soils and vehicles, combined.
     nearest : Nearest or None
         What comes nearest where none qualifies, of depths without a probability.
     """

@@ -90,7 +90,7 @@ ROUNDING = 1e-9
 NEAR_DEG = 1.0
 """Within this of the limit of rotation,"""
 NEAR_M = 0.01
-"""or of that of penetration, a second opinion is simulated again finely. It turned too little by 0.32 deg at most."""
+"""or of the limit of penetration, a second opinion is simulated again finely. It turned too little by 0.32 deg at most."""
 FINENESS, TOLERANCE_M = 2, 1e-6
 """Fineness and error of a step of the fine solution (`boulder_kernels.second_opinion.HeaveControl`),"""
 ERROR_DEG, ERROR_M = 0.05, 1e-3
@@ -205,8 +205,8 @@ def with_second_opinions(
     """Return judged rows with passes simulated again.
 
     Where `DECISIVE` is asked and a pass stands, it is robust, or open outside the study; where a law overturns it, it
-    is sensitive. If `DECISIVE` alone is asked, passes that are robust without asking are not simulated, and those that
-    it overturns, and those of which another law resists less, are simulated under that law, too.
+    is sensitive. If `DECISIVE` alone is asked, passes that are robust without asking are not simulated. Passes that it
+    overturns, and passes where another law resists less, are simulated under that law, too.
 
     Parameters
     ----------

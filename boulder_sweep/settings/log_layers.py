@@ -115,7 +115,7 @@ def layers_of(readings: list[dict[str, Any]], foot_m: float, scatter_deg: float,
         The deepest foot [m]; the last reading stands for the soil down to it. One below it counts in full where it is
         weaker than the one above, else for its share of the soil down to the foot.
     scatter_deg
-        Standard deviation of the correlation [deg]: means that differ by more are those of two layers.
+        Standard deviation of the correlation [deg]: means that differ by more belong to two layers.
     is_cone
         Whether a reading is the mean of `WINDOW_M`; a boundary then lies at its end, else at the depth of the stronger
         reading of the two.

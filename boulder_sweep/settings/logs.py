@@ -240,7 +240,7 @@ def _column(name: str) -> tuple[str, str]:
 
 
 def _size(unit: str, key: str, position: Position) -> float:
-    """Return the size of a unit in that of the readings."""
+    """Return the size of a unit in the unit of the readings."""
     if key not in _UNITS:
         return 0.01 if "%" in unit else 1.0
     plain = re.sub(r"\s*(bgl|bgs|below.*)$", "", unit, flags=re.IGNORECASE)

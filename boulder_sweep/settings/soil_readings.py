@@ -521,7 +521,7 @@ def unfold_soils(
     mistakes : Mistakes
         Receives what is wrong with them.
     read_log : callable
-        Reads the file of a log, by its name and that of the hole.
+        Reads a log, by the names of its file and hole.
 
     Returns
     -------
