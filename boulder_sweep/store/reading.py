@@ -398,10 +398,10 @@ class FinishedRows:
                     other = _table_of(self._folder, part, file)
                     if unlike := differences(self._table.described, other.described):
                         raise self._damaged(part, f"of another run: {unlike[0]}")
-                _own(self._folder, part, file, self._table)
                 if not file.schema.equals(self._schema):
-                    raise self._damaged(part, "its columns are of other types than in the first part")
+                    raise self._damaged(part, "its columns differ from the first part's")
                 table = file.read(columns)
+                _own(self._folder, part, file, self._table)
             except ParquetLimitError as problem:
                 raise failures.ImpossibleRecordsError(self._folder / part.name, str(problem)) from problem
             except (OSError, ParquetError) as problem:

@@ -13,7 +13,7 @@ from boulder_sweep.judge.accuracy import Accuracy, Steps
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 
 COMPILING = "compiling kernels, once on this machine, about "
-KERNEL = "run_lanes"
+KERNEL = "a_kernel"
 CONFIGS = Path(__file__).parents[2] / "configs"
 SITE = CONFIGS / "site.yaml"
 ONE = ("--set", "boulder.height=3.4 m", "--set", "soil.friction_angle=40 deg")
