@@ -410,7 +410,7 @@ def screen_lines(need: Need, units: str = "si") -> list[str]:
 
 
 def _by_boulder(need: Need, rows: Sequence[Row], units: str) -> tuple[list[Row], list[Column]]:
-    """Return the boulders, each with its rows, and columns: the value that all rows need, and the value of each row if they fit.
+    """Return the boulders, each with its rows, and columns: the value that all rows need, and each row's if they fit.
 
     Whoever builds chooses the boulder and its embedment; the other inputs are conditions.
     """

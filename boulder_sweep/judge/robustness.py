@@ -90,7 +90,7 @@ ROUNDING = 1e-9
 NEAR_DEG = 1.0
 """Within this of the limit of rotation,"""
 NEAR_M = 0.01
-"""or of the limit of penetration, a second opinion is simulated again finely. It turned too little by 0.32 deg at most."""
+"""or of the limit of penetration, a second opinion is simulated again finely: it turned up to 0.32 deg too little."""
 FINENESS, TOLERANCE_M = 2, 1e-6
 """Fineness and error of a step of the fine solution (`boulder_kernels.second_opinion.HeaveControl`),"""
 ERROR_DEG, ERROR_M = 0.05, 1e-3
