@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 
 from boulder_sweep.cli.options import SYSTEMS, OutputPath, grid_argument, load_sweep, set_option
-from boulder_sweep.cli.output import show
+from boulder_sweep.cli.output import say, show
 
 NEW_EXAMPLES = """\b
 Examples:
@@ -100,9 +100,13 @@ def check(grid: str, overrides: tuple[str, ...]) -> int:
     The log of a borehole or of a cone is drawn, with the layers made of it.
     """
     from boulder_sweep.cli import console
+    from boulder_sweep.errors import EXIT_WRONG_USE
     from boulder_sweep.views.log_text import log_lines
 
     sweep = load_sweep(grid, overrides, quiet=False)
+    if why := sweep.why_none_runs():
+        say(f"{grid}: no design can be computed: {why}")
+        return EXIT_WRONG_USE
     logs = [log_lines(data) for data in sweep.derived.get("soil", ()) if "log" in data]
     show(f"{grid}: valid", *console.grid_lines(sweep), *(line for lines in logs for line in ("", *lines)))
     return 0

@@ -20,6 +20,8 @@ from boulder_sweep.settings.soil_readings import soil_words
 from boulder_sweep.settings.values import is_unusual
 from boulder_sweep.settings.vehicle import APPROACH, approach_words
 
+_AT_ONCE = 65_536
+"""Designs looked at together."""
 MAX_LISTED = 1000
 """Longest axis that `Sweep.resolved` lists value by value."""
 
@@ -223,6 +225,13 @@ class Sweep:
             The rows are not within the sweep.
         """
         return self.plan.block(start, stop)
+
+    def why_none_runs(self) -> str:
+        """Return why no design can be computed, by the first one; empty where one can."""
+        for start in range(0, self.n_designs, _AT_ONCE):
+            if not self.block(start, min(start + _AT_ONCE, self.n_designs)).reasons.codes.all():
+                return ""
+        return self.block(0, 1).reasons[0]
 
     def resolved(self) -> dict[str, Any]:
         """Return everything that decides the results, and the heading, as plain data.

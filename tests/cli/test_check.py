@@ -31,6 +31,13 @@ def test_an_axis_is_shown_from_its_least_to_its_largest_value(sweep, grid):
     assert ["subgrade_reaction_MN_m3", "1 value   60 MN/m^3"] in lines
 
 
+def test_a_file_of_which_no_design_can_run_is_refused(sweep, grid):
+    code, out, err = sweep("check", grid, "--set", "site.embedment_depth=3.5 m")
+    assert (code, out) == (2, "")
+    assert err.endswith("grid.yaml: no design can be computed: embedment depth is not less than the boulder's height\n")
+    assert sweep("check", grid, "--set", "site.embedment_depth=3.4 m")[0] == 0, "one can"
+
+
 def test_remarks_go_to_stderr(sweep, grid):
     code, out, err = sweep("check", grid, "--set", "vehicle.speed=30")
     assert code == 0
