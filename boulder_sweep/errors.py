@@ -94,6 +94,11 @@ class ScanError(BoulderSweepError):
     """A scan of a stone that cannot be used."""
 
 
+def safe_words(rows_done: int | None, rows: int) -> str:
+    """Say how many rows of a table are safe; None stands for those of an earlier run that were not counted yet."""
+    return f"{'the rows that were there' if rows_done is None else f'{rows_done:,} of {rows:,} rows'} are safe"
+
+
 class Interrupted(KeyboardInterrupt):
     """A run was stopped by a signal; the finished rows are safe and the run can be resumed.
 
@@ -104,19 +109,19 @@ class Interrupted(KeyboardInterrupt):
     signum
         The signal.
     rows_done, rows
-        Rows that are safe on disk, and rows of the whole table.
+        Rows that are safe on disk, None where they were not counted yet, and rows of the whole table.
     resume_command
         Command that resumes the run.
     """
 
-    def __init__(self, signum: int, rows_done: int = 0, rows: int = 0, resume_command: str = ""):
+    def __init__(self, signum: int, rows_done: int | None = 0, rows: int = 0, resume_command: str = ""):
         self.signum = signum
         self.rows_done, self.rows = rows_done, rows
         self.resume_command = resume_command
         name = signal.Signals(signum).name
         text = f"interrupted by {name}"
         if resume_command:
-            text += f"; {rows_done:,} of {rows:,} rows are safe. Resume with: {resume_command}"
+            text += f"; {safe_words(rows_done, rows)}. Resume with: {resume_command}"
         super().__init__(text)
 
     @property

@@ -19,7 +19,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from boulder_sweep.errors import BackendError, ClusterLostError, ComputationError, Interrupted
+from boulder_sweep.errors import BackendError, ClusterLostError, ComputationError, Interrupted, safe_words
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import Evaluation, Simulate, by_kernels, evaluation_of
 from boulder_sweep.judge.firmness import firmness_of
@@ -166,6 +166,7 @@ def run(
     with noted_signals() as signals, _folder(out):
         signals.defer()
         whole = _Run(out, signals, sweep.n_designs, jobs, backend, scheduler)
+        whole.is_counted = not resume
         try:
             with telling_start_failure(jobs):
                 signals.call(lambda: _refuse_taken(out, resume, overwrite))
@@ -173,14 +174,14 @@ def run(
                     raise failures.DoesNotFitError(said)  # a row takes a byte or more; nothing is compiled yet
                 plan = signals.call(lambda: _planned(sweep, simulate))
                 plan.there = signals.call(lambda: _there(plan, out, overwrite))
-                whole.done = plan.rows_done
+                whole.done, whole.is_counted = plan.rows_done, True
                 firmness = signals.call(lambda: _firmness(plan, out))
                 whole.compute(plan, plan.metadata(firmness), progress)
                 signals.call(lambda: _check_whole(out, plan, whole.written))
         except Interrupted as stop:
-            raise Interrupted(stop.signum, whole.done, sweep.n_designs, again) from None
+            raise Interrupted(stop.signum, whole.rows_safe, sweep.n_designs, again) from None
         except (ClusterLostError, ComputationError, failures.WriteError) as problem:
-            safe = f"{whole.done:,} of {sweep.n_designs:,} rows are safe"
+            safe = safe_words(whole.rows_safe, sweep.n_designs)
             raise type(problem)(f"{problem}. {safe}. Resume with: {again}") from problem
     parts: list[Described | Written] = [*plan.there.intact.values(), *whole.written]
     reasons = sum((Counter(part.verdicts) for part in parts), Counter[str]())
@@ -210,7 +211,9 @@ class _Run:
     Attributes
     ----------
     done : int
-        Rows that are safe.
+        Rows that are safe,
+    is_counted : bool
+        and whether those of an earlier run are among them.
     written : list of Written
         Parts written by this run.
     jobs : int
@@ -220,12 +223,17 @@ class _Run:
     def __init__(
         self, out: Location, signals: Signals, rows: int, jobs: int, backend: str, scheduler: str | None
     ) -> None:
-        self.done, self.written, self.jobs = 0, list[Written](), jobs
+        self.done, self.written, self.jobs, self.is_counted = 0, list[Written](), jobs, True
         self._out, self._signals, self._rows = out, signals, rows
         self._backend, self._scheduler = backend, scheduler
         self._stopped = threading.Event()
         self._ticked = 0
         self._problem: BaseException | None = None
+
+    @property
+    def rows_safe(self) -> int | None:
+        """Rows that are safe; None where nobody knows yet."""
+        return self.done if self.is_counted else None
 
     def compute(self, plan: _Plan, metadata: dict[bytes, bytes], progress: Report | None) -> None:
         """Compute and write what is missing; raises as `run`."""

@@ -130,7 +130,7 @@ def on_a_failing_store(runs: int, chance: random.Random, whole: dict[str, bytes]
                     chance.uniform(0.5, LONGEST_LIFE_S),
                 )
                 told[f"exit {code}"] += 1
-                if complaints or (code not in (-9, 3) and "resume=True" not in last.get("problem", "")):
+                if complaints or (code not in (-9, -15, 3) and "--resume" not in last.get("problem", "--resume")):
                     faults.append(f"{number}: {code}, {last}, {complaints[-300:]}")
                 if code == 3:
                     break
@@ -173,7 +173,7 @@ def on_workers(
                     faults.append(f"{number}: {problem}")
         if not disturb.done:
             faults.append(f"{number}: the run was done before")
-        if parts_of(out) != whole:
+        if not out.exists() or parts_of(out) != whole:
             run(grid_of(ROWS), out, resume=True, simulate=plausible)
         if parts_of(out) != whole or not nothing_left(out):
             faults.append(f"{number}: other files, or something is left")

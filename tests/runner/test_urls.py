@@ -80,6 +80,17 @@ def test_a_store_that_lists_nothing_any_more_ends_the_run_in_words(monkeypatch, 
         run(grid(), OUT, overwrite=True, **HOW)
 
 
+def test_rows_of_an_earlier_run_are_not_said_to_be_none_before_they_are_counted(monkeypatch):
+    run(grid(), OUT, **HOW)
+
+    def refuse(self, path, **more):
+        raise ConnectionResetError("not now")
+
+    monkeypatch.setattr(MemoryFileSystem, "ls", refuse)
+    with pytest.raises(WriteError, match=r"not now\. the rows that were there are safe\. Resume with: "):
+        run(grid(), OUT, resume=True, **HOW)
+
+
 def test_a_row_in_a_store_is_explained():
     run(grid(), OUT, jobs=2)
     found = recompute(OUT, 7)
