@@ -1,12 +1,12 @@
-"""Kill runs with SIGKILL, again and again, and resume them.
+"""End runs by SIGKILL, SIGTERM and SIGINT, again and again, and resume them.
 
-The kills come just before or after a change of the output folder: a file is made, flushed or gets its name, a folder
-is made or removed. Which change is drawn with a seed. A share of the kills may come
-after a random time instead: those are not the same every time.
+The signals come just before or after a change of the output folder: a file is made, flushed or gets its name, a folder
+is made or removed. Which signal and which change is drawn with a seed. A share of them may come after a random time
+instead: those are not the same every time.
 
-A process that has loaded everything once forks a child for every run, so that a kill costs a fraction of a
-second. Prints one JSON object: kills, tables finished, and what was wrong. Run from the root of the repository as
-``python -m tests.faults.kills FOLDER KILLS SEED SHARE``, the last one the share after a random time.
+A process that has loaded everything once forks a child for every command, so that a kill costs a fraction of a
+second. Prints one JSON object: kills, kills by signal, tables finished, and what was wrong. Run from the root of the
+repository as ``python -m tests.faults.kills FOLDER KILLS SEED SHARE``, the last one the share after a random time.
 """
 
 from __future__ import annotations
@@ -19,82 +19,89 @@ import random
 import signal
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pandas as pd
 import pyarrow as pa
 
+from boulder_sweep.cli.main import main
+from boulder_sweep.errors import EXIT_INTERRUPTED
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
-from boulder_sweep.runner.run import run
 from boulder_sweep.store.failures import NotASweepError
 from boulder_sweep.store.reading import contents, finished_table
-from tests.runner.grids import grid_of, same_bits
+from tests.runner.grids import grid_of, grid_of_text, same_bits
 from tests.store.folders import nothing_left
 from tests.waiting import HANG_GUARD_S
 
 ROWS = 20_000
+SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 LONGEST_LIFE_S = 0.6
-"""Before a kill after a random time [s]; a run that is quicker is done, and another one is killed in its place."""
+"""Before a signal after a random time [s]; a run that is quicker is done, and another one is killed in its place."""
 CHANGES = {"mkdir": 40, "open": 120, "fsync": 80, "rename": 40, "rmdir": 40}
 """Calls that change a folder, and about how often a run makes them."""
 
 
 class Aim(NamedTuple):
-    """When to kill: at a call that changes the folder."""
+    """When to send a signal: at a call that changes the folder."""
 
     call: str
     number: int
     before: bool
 
-    def take(self) -> None:
-        """Let this process die at the call."""
+    def take(self, kind: signal.Signals) -> None:
+        """Let this process send itself a signal at the call."""
         real, calls = getattr(os, self.call), itertools.count(1)
 
         def deadly(*arguments: Any, **options: Any) -> Any:
             now = next(calls) == self.number
             if now and self.before:
-                os.kill(os.getpid(), signal.SIGKILL)
+                os.kill(os.getpid(), kind)
             found = real(*arguments, **options)
             if now:
-                os.kill(os.getpid(), signal.SIGKILL)
+                os.kill(os.getpid(), kind)
             return found
 
         setattr(os, self.call, deadly)
 
 
-def one_run(out: Path) -> None:
-    """Resume the run in this process."""
-    run(
-        grid_of(ROWS, soil="{elements: 100}"),
-        out,
-        jobs=2,
-        resume=True,
-    )
+def command(settings: Path, out: Path) -> int:
+    """Resume the run in this process as the command does; return its exit code."""
+    silence = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(silence, 1)
+    os.dup2(silence, 2)
+    try:
+        main(["run", str(settings), "--output", str(out), "--jobs", "2", "--resume"])
+    except SystemExit as end:
+        return int(end.code or 0)
+    except KeyboardInterrupt:  # before the command notes signals
+        return EXIT_INTERRUPTED
 
 
-def in_a_child(out: Path, life: float | Aim | None) -> bool:
-    """Resume the run in a child, which is killed after a while [s] or at a call; True if it was."""
+def in_a_child(
+    settings: Path, out: Path, life: float | Aim | None = None, kind: signal.Signals = signal.SIGKILL
+) -> bool:
+    """Resume the run in a child, which gets a signal after a while [s] or at a call; True if that has ended it."""
     faulthandler.dump_traceback_later(HANG_GUARD_S, exit=True)  # hang guard
     child = os.fork()
     if child == 0:
+        code = 1
         try:
             if isinstance(life, Aim):
-                life.take()
-            one_run(out)
-            os._exit(0)
+                life.take(kind)
+            code = command(settings, out)
         finally:
-            os._exit(1)
+            os._exit(code)
     if isinstance(life, float):
         time.sleep(life)
-        os.kill(child, signal.SIGKILL)
+        os.kill(child, kind)
     _, how = os.waitpid(child, 0)
-    if os.WIFSIGNALED(how):
-        return True
-    if os.WEXITSTATUS(how) != 0:
-        raise RuntimeError("a run failed without being killed")
-    return False
+    code = os.waitstatus_to_exitcode(how)
+    if code not in (0, -kind, 128 + kind):
+        raise RuntimeError(f"a run ended with {code}")
+    return code != 0
 
 
 def look_at(out: Path, faults: list[str]) -> None:
@@ -125,15 +132,17 @@ def tally(table: pa.Table, whole: pa.Table) -> dict[str, int]:
     }
 
 
-def main() -> None:
-    """Kill as often as asked for and print what came of it."""
+def end_and_resume() -> None:
+    """End runs as often as asked for, resume them, and print the result."""
     folder, kills, seed, by_time = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), float(sys.argv[4])
     chance = random.Random(seed)
     small = grid_of(10, soil="{elements: 100}")
     evaluation_of(small, accuracy_of(small)).warm_up()
+    settings = folder / "grid.yaml"
+    settings.write_text(grid_of_text(ROWS, soil="{elements: 100}"))
     whole_out = folder / "whole"
-    in_a_child(whole_out, None)
-    done, tables, faults = 0, [], []
+    in_a_child(settings, whole_out)
+    done, tables, faults = Counter[str](), [], list[str]()
     outs = []
 
     def life() -> float | Aim:
@@ -142,23 +151,26 @@ def main() -> None:
         call = chance.choice(list(CHANGES))
         return Aim(call, chance.randint(1, CHANGES[call]), chance.random() < 0.5)
 
-    while done < kills:
+    while done.total() < kills:
         out = folder / f"killed-{len(outs)}"
         outs.append(out)
-        while done < kills and in_a_child(out, life()):
-            done += 1
+        clean = True
+        while done.total() < kills and in_a_child(settings, out, life(), kind := chance.choice(SIGNALS)):
+            done[kind.name] += 1
             look_at(out, faults)
+            clean, before = nothing_left(out), clean
+            if before and not clean and kind != signal.SIGKILL:
+                faults.append(f"{kind.name} leaves something over")
     whole = finished_table(whole_out)
     for out in outs:
-        in_a_child(out, None)
+        in_a_child(settings, out)
         tables.append(tally(finished_table(out), whole))
         if not nothing_left(out) or sorted(path.name for path in out.iterdir()) != sorted(
             path.name for path in whole_out.iterdir()
         ):
             faults.append("something is left over, or a file differs")
-    result: dict[str, Any] = {"kills": done, "tables": tables, "faults": faults}
-    print(json.dumps(result))
+    print(json.dumps({"kills": done.total(), "by_signal": done, "tables": tables, "faults": faults}))
 
 
 if __name__ == "__main__":
-    main()
+    end_and_resume()

@@ -37,14 +37,27 @@ DEFAULTS = {
 
 def grid(**changes: str) -> Sweep:
     """Return a sweep of 441 designs (7 heights, 7 ratios, 3 friction angles, 3 subgrade reactions), or another."""
-    return load_text(GRID.format(**{**DEFAULTS, **changes}), Path("test.yaml"))
+    return load_text(grid_text(**changes), Path("test.yaml"))
+
+
+def grid_text(**changes: str) -> str:
+    """Return the settings file of `grid`."""
+    return GRID.format(**{**DEFAULTS, **changes})
 
 
 def grid_of(rows: int, **changes: str) -> Sweep:
     """Return a sweep of as many designs as asked for, all along the axis of the subgrade reaction."""
-    one = {"height": "2.6 m", "site": "embedment_ratio: 0.5", "friction": "40 deg"}
-    axis = f"{{from: 20 MN/m^3, to: 100 MN/m^3, count: {rows}}}"
-    return grid(**{**one, "subgrade": axis, **changes})
+    return grid(**{**_one_axis(rows), **changes})
+
+
+def grid_of_text(rows: int, **changes: str) -> str:
+    """Return the settings file of `grid_of`."""
+    return grid_text(**{**_one_axis(rows), **changes})
+
+
+def _one_axis(rows: int) -> dict[str, str]:
+    subgrade = f"{{from: 20 MN/m^3, to: 100 MN/m^3, count: {rows}}}"
+    return {"height": "2.6 m", "site": "embedment_ratio: 0.5", "friction": "40 deg", "subgrade": subgrade}
 
 
 def plausible(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
