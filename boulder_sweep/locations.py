@@ -27,7 +27,7 @@ from urllib.parse import unquote
 
 from boulder_sweep.errors import BoulderSweepError, LinkError
 from boulder_sweep.signals import undone, until_end
-from boulder_sweep.text import one_line
+from boulder_sweep.text import install, one_line
 
 if TYPE_CHECKING:
     from upath import UPath
@@ -106,7 +106,7 @@ def _opened(scheme: str, shown: str) -> UPath:
         path = UPath(shown, **options)
         _ = path.fs  # imports what the scheme needs
     except ImportError as missing:
-        extra = "pip install 'boulder-sweep[s3]'" if scheme in _S3 or missing.name else one_line(missing)
+        extra = install("s3") if scheme in _S3 or missing.name else one_line(missing)
         raise LocationError(f"{shown}: {scheme}:// needs another package: {extra}") from None
     except ValueError as unknown:
         raise LocationError(f"{shown} cannot be opened: {one_line(unknown)}") from None

@@ -19,6 +19,11 @@ NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 NO_BREAK_SPACE = "\N{NO-BREAK SPACE}"
 
 
+def install(extra: str) -> str:
+    """Return how to install what a command lacks; no package index has boulder-sweep, a clone has everything."""
+    return f"in a clone of boulder-sweep, pip install '.[{extra}]'"
+
+
 def size_text(size: float) -> str:
     """Format a number of bytes: ``512 bytes``, ``1.5 MB``."""
     for unit in ("bytes", "kB", "MB", "GB", "TB"):

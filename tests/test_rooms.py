@@ -1,4 +1,4 @@
-"""The layout in CONTRIBUTING.md: imports point down, none runs in a circle, the wheel holds the two packages only."""
+"""The layout in CONTRIBUTING.md: imports point down, none runs in a circle. What the wheel holds."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def test_drawing_imports_views_only() -> None:
     assert re.findall(r"import_module\((.*?)\)", source) == ['f"boulder_sweep.views.{view}"']
 
 
-def test_the_wheel_holds_the_two_packages_and_nothing_else() -> None:
+def test_the_wheel_holds_the_two_packages_the_examples_and_nothing_else() -> None:
     files = {Path(file.distribution_path) for file in WheelBuilder(str(ROOT)).recurse_included_files()}
     wanted = {
         Path(package) / file.relative_to(folder)
@@ -118,5 +118,6 @@ def test_the_wheel_holds_the_two_packages_and_nothing_else() -> None:
         for file in folder.rglob("*")
         if file.is_file() and "__pycache__" not in file.parts
     }
-    assert files == wanted
-    assert {file.suffix for file in files} <= {".py", ".typed", ".html", ".css", ".js", ".wasm"}
+    examples = {Path("boulder_sweep", "examples", file.name) for file in (ROOT / "configs").iterdir()}
+    assert files == wanted | examples
+    assert {file.suffix for file in files - examples} <= {".py", ".typed", ".html", ".css", ".js", ".wasm"}

@@ -19,10 +19,11 @@ import click
 # Every command imports heavy packages (numba, pandas, pyarrow, even numpy) inside its function, so that
 # `sweep --help` and `sweep check` are instant.
 from boulder_sweep.cli.ask import capacity, need, uncertainty
+from boulder_sweep.cli.doctor import doctor
 from boulder_sweep.cli.output import ready_streams, say
 from boulder_sweep.cli.quality import fit_vehicle, tradeoff, validate
 from boulder_sweep.cli.run import compare, run
-from boulder_sweep.cli.settings_files import check, new
+from boulder_sweep.cli.settings_files import check, examples, new
 from boulder_sweep.cli.share import explore, export, plot, report
 from boulder_sweep.cli.simulate import simulate
 from boulder_sweep.cli.stone import stone
@@ -67,10 +68,10 @@ def start_light() -> None:
 
 
 GROUPS = {
-    "Ask": (new, check, stone, need, uncertainty, capacity, simulate, explore),
+    "Ask": (new, examples, check, stone, need, uncertainty, capacity, simulate, explore),
     "Tables": (run, compare),
     "Share": (plot, report, export),
-    "Model": (tradeoff, validate, fit_vehicle),
+    "Model": (tradeoff, validate, fit_vehicle, doctor),
 }
 """As in ``sweep --help``: what answers a question, what makes and reads tables, what goes to others, what is behind."""
 COMMANDS = tuple(command for group in GROUPS.values() for command in group)

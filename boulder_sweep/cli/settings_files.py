@@ -61,6 +61,35 @@ def new(file: Path | None, vehicle: str | None, units: str | None, output: Path 
     return 0
 
 
+@click.command(short_help="Copy the example files into a folder.")
+@click.argument("folder", type=OutputPath(file_okay=False, path_type=Path), default="configs")
+def examples(folder: Path) -> int:
+    """Copy the example files into FOLDER [configs], which must not be there yet, and list their questions."""
+    import shutil
+
+    from boulder_sweep.errors import ExistingFileError
+
+    package = Path(__file__).parents[1]
+    source = package / "examples"
+    if not source.is_dir():  # a clone that is not built
+        source = package.parent / "configs"
+    try:
+        shutil.copytree(source, folder)
+    except FileExistsError:
+        raise ExistingFileError(f"{folder} exists already; name another folder") from None
+    files = sorted(folder.glob("*.yaml"))
+    width = max(len(str(file)) for file in files)
+    show(*(f"{file!s:{width}}  {_question_of(file)}" for file in files))
+    return 0
+
+
+def _question_of(file: Path) -> str:
+    """Return the first sentence of the comment at the top of a settings file."""
+    lines = file.read_text(encoding="utf-8").splitlines()
+    comment = " ".join(line.removeprefix("#").strip() for line in lines[: lines.index("#")])
+    return re.split(r"(?<=[.?]) ", comment, maxsplit=1)[0]
+
+
 def _lines_to_fill_in(file: Path, vehicle: str, units: int) -> list[str]:
     """Return which entries of a vehicle have no published values, and how to measure them."""
     from boulder_sweep.settings.starter import CATEGORIES, CLASSES

@@ -17,7 +17,7 @@ from boulder_sweep.locations import Location, location_of, replacing
 from boulder_sweep.settings.shown_units import Shown, check_system, shown_as, shown_column, shown_settings
 from boulder_sweep.store.folder import check_target
 from boulder_sweep.store.reading import FinishedRows
-from boulder_sweep.text import printable, why
+from boulder_sweep.text import install, printable, why
 from boulder_sweep.views.wording import NOT_A_TEST
 
 if TYPE_CHECKING:
@@ -228,7 +228,7 @@ def _sheet(target: BinaryIO, finished: Exportable, units: str) -> int:
         from openpyxl import Workbook
         from openpyxl.utils import get_column_letter
     except ImportError as lacking:
-        raise ReportError("spreadsheets need openpyxl: pip install 'boulder-sweep[report]'") from lacking
+        raise ReportError(f"spreadsheets need openpyxl: {install('report')}") from lacking
 
     rows, columns, book = 0, list[Shown](), Workbook(write_only=True)
     designs = book.create_sheet("designs")

@@ -31,7 +31,7 @@ from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.store.folder import check_target
 from boulder_sweep.store.provenance import identity as identity_of
 from boulder_sweep.store.provenance import versions
-from boulder_sweep.text import counted, printable, why
+from boulder_sweep.text import counted, install, printable, why
 from boulder_sweep.views.wording import name_of, value_text
 
 KINDS = (".html", ".htm", ".pdf")
@@ -216,7 +216,7 @@ def _page_maker() -> Callable[..., str]:
     try:
         from boulder_sweep.report.page import assembled
     except ImportError as lacking:
-        raise ReportError(f"reports need {lacking.name}: pip install 'boulder-sweep[report]'") from lacking
+        raise ReportError(f"reports need {lacking.name}: {install('report')}") from lacking
     kernel()  # refused here, before a result is read and its answer computed
     return assembled
 

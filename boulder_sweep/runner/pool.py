@@ -15,7 +15,7 @@ from importlib import import_module
 from typing import Any
 
 from boulder_sweep.errors import BackendError, BoulderSweepError, ClusterLostError
-from boulder_sweep.text import one_line
+from boulder_sweep.text import install, one_line
 
 THREADING, DASK = "threading", "dask"
 BACKENDS = (THREADING, DASK)
@@ -167,7 +167,7 @@ def cluster(jobs: int | None, scheduler: str | None) -> Iterator[Cluster]:
     try:
         distributed = import_module("distributed")  # an extra: most users have no cluster
     except ImportError:
-        raise BackendError("the backend dask needs a package: pip install 'boulder-sweep[dask]'") from None
+        raise BackendError(f"the backend dask needs a package: {install('dask')}") from None
     with _silenced_loggers():
         ends: list[Callable[..., Any]] = []
         try:

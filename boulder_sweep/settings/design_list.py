@@ -35,7 +35,7 @@ from boulder_sweep.settings.text_table import MAX_BYTES, MAX_COLUMNS, Row, TextT
 from boulder_sweep.settings.tree import Scalar
 from boulder_sweep.settings.units import factor, name_suffix, suffix_unit
 from boulder_sweep.settings.values import outside
-from boulder_sweep.text import size_text, why
+from boulder_sweep.text import install, size_text, why
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -134,7 +134,7 @@ def open_table(path: Location, most_rows: int, known: Sequence[str], problems: P
     try:
         from openpyxl import load_workbook  # an extra, for tables in this format only
     except ImportError:
-        raise refuse(label, "spreadsheets need openpyxl: pip install 'boulder-sweep[report]'") from None
+        raise refuse(label, f"spreadsheets need openpyxl: {install('report')}") from None
     yield TextTable(label, _sheet_rows(path, load_workbook), "", known, problems)
 
 

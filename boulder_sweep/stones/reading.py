@@ -14,7 +14,7 @@ import numpy as np
 
 from boulder_sweep.errors import ScanError
 from boulder_sweep.stones.formats import DECIMATE, READERS, Part, check_count, parts_of
-from boulder_sweep.text import why
+from boulder_sweep.text import install, why
 
 MAX_BYTES = 400_000_000
 """Largest file that is read."""
@@ -60,7 +60,7 @@ def require_trimesh() -> None:
     from importlib.util import find_spec  # an extra: files with sizes or profiles do not need it
 
     if find_spec("trimesh") is None:
-        raise ScanError("scans need trimesh, which is not installed: pip install 'boulder-sweep[scan]'")
+        raise ScanError(f"scans need trimesh, which is not installed: {install('scan')}")
 
 
 def read_scan(path: str | Path, metres: float = 1.0) -> ScannedSurface:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from boulder_sweep.errors import PictureError
 from boulder_sweep.locations import replacing
 from boulder_sweep.store.folder import check_target
-from boulder_sweep.text import NO_BREAK_SPACE, printable, why
+from boulder_sweep.text import NO_BREAK_SPACE, install, printable, why
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -70,7 +70,7 @@ def require_matplotlib() -> None:
     from importlib.util import find_spec  # matplotlib is an extra: tables and verdicts do not need it
 
     if find_spec("matplotlib") is None:
-        raise PictureError("pictures need matplotlib, which is not installed: pip install 'boulder-sweep[plot]'")
+        raise PictureError(f"pictures need matplotlib, which is not installed: {install('plot')}")
 
 
 def checked_kind(path: str | Path, kinds: tuple[str, ...] = KINDS) -> Path:

@@ -46,6 +46,7 @@ def test_help_groups_the_commands(sweep):
     ask = out[out.index("Ask:") : out.index("Tables:")]
     assert re.findall(r"^  (\S+)", ask, re.MULTILINE) == [
         "new",
+        "examples",
         "check",
         "stone",
         "need",

@@ -41,6 +41,8 @@ COMMANDS = {
     "export": ("export", "stones.sweep", "-o", "table.xlsx"),
     "compare": ("compare", "stones.sweep", "stones.sweep"),
     "new": ("new", "n.yaml"),
+    "examples": ("examples",),
+    "doctor": ("doctor",),
 }
 
 

@@ -117,7 +117,7 @@ def test_without_the_extra_it_says_what_to_install(sweep, grid, monkeypatch):
     monkeypatch.delitem(sys.modules, "boulder_sweep.report.page", raising=False)
     monkeypatch.setitem(sys.modules, "jinja2", None)
     code, _, err = sweep("report", "small-grid.sweep")
-    assert (code, err) == (2, "error: reports need jinja2: pip install 'boulder-sweep[report]'\n")
+    assert (code, err) == (2, "error: reports need jinja2: in a clone of boulder-sweep, pip install '.[report]'\n")
 
 
 def test_one_design_is_no_plural(sweep, possible_grid):

@@ -226,7 +226,7 @@ def test_a_folder_in_the_way_is_reported(held: Trajectory, tmp_path: Path) -> No
 def test_missing_matplotlib_is_reported(held: Trajectory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     found = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "matplotlib" else found(name))
-    with pytest.raises(PictureError, match=r"pip install 'boulder-sweep\[plot\]'"):
+    with pytest.raises(PictureError, match=r"pip install '.\[plot\]'"):
         held.plot(tmp_path / "picture.png")
 
 
