@@ -13,11 +13,11 @@ import sys
 import textwrap
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
-from boulder_sweep.text import duration_text, printable
+from boulder_sweep.text import printable
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 PLAIN_EVERY_S = 10.0
 """Time between two lines of progress where there is no terminal."""
-USUALLY_S = 20.0
-"""How long compiling takes, where that is not known of this machine."""
 
 
 def ready_streams() -> None:
@@ -80,7 +78,7 @@ def wrap(text: str, width: int = 80) -> list[str]:
 
 @contextmanager
 def announced(say_so: Callable[[str], None], resume: Callable[[], None]) -> Iterator[None]:
-    """Say, once, that kernels are compiled, if any are; and keep how long it took for the next version of the kernels.
+    """Say, once, that kernels are compiled, if any are.
 
     Parameters
     ----------
@@ -90,19 +88,19 @@ def announced(say_so: Callable[[str], None], resume: Callable[[], None]) -> Iter
         Called whenever one has been compiled.
     """
     from boulder_kernels import _jit
+    from boulder_kernels._cache import CACHE_FOLDER
 
-    kernels: dict[str, float] = {}
+    said = False
 
     @contextmanager
-    def compiling(kernel: str) -> Iterator[None]:
-        """Take the time."""
-        if not kernels:
-            say_so(f"compiling kernels, once on this machine, about {max(_took_s(kernel), 1.0):.0f} s")
-        begun = time.monotonic()
+    def compiling(_: str) -> Iterator[None]:
+        nonlocal said
+        if not said:
+            said = True
+            say_so("compiling kernels; later commands load them" if CACHE_FOLDER else "compiling kernels")
         try:
             yield
         finally:
-            kernels[kernel] = time.monotonic() - begun
             resume()
 
     before, _jit.announce = _jit.announce, compiling
@@ -110,28 +108,6 @@ def announced(say_so: Callable[[str], None], resume: Callable[[], None]) -> Iter
         yield
     finally:
         _jit.announce = before
-        for first in list(kernels)[:1]:
-            _remember(first, sum(kernels.values()))
-
-
-def _took_s(kernel: str) -> float:
-    """Seconds that a compilation took the last time that it began with this kernel, of whatever version."""
-    with suppress(OSError, ValueError):  # no earlier compilation on this machine
-        return float(_seconds_file(kernel).read_text())
-    return USUALLY_S
-
-
-def _remember(kernel: str, seconds: float) -> None:
-    """Keep how long a compilation took."""
-    with suppress(OSError):
-        _seconds_file(kernel).write_text(f"{seconds:.1f}")
-
-
-def _seconds_file(kernel: str) -> Path:
-    """Return the file with the seconds that a compilation took which began with this kernel."""
-    from boulder_kernels._cache import CACHE_FOLDER
-
-    return Path(CACHE_FOLDER or "").parent.parent / f"{kernel}-and-more-in-seconds"
 
 
 @contextmanager
@@ -220,10 +196,9 @@ class _PlainLines:
         if time.monotonic() - self.last < PLAIN_EVERY_S:
             return
         self.last = time.monotonic()
-        left = "" if now.seconds_left is None else f", {duration_text(now.seconds_left)} left"
         say(
             f"{now.rows_done / max(now.rows, 1):6.1%}  {now.rows_done:,} of {now.rows:,} {self._of}, "
-            f"{now.rows_per_second:,.0f} per second{left}"
+            f"{now.rows_per_second:,.0f} per second"
         )
 
 
@@ -232,19 +207,19 @@ def _bar(notes: Notes, doing: str) -> Iterator[Callable[[Progress], None]]:
     """Show a bar; give the function that shows progress."""
     # rich is for terminals only. It honours NO_COLOR by itself.
     from rich.console import Console
-    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
     from rich.progress import Progress as Bars
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[numbers]}"))
-    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
+    words, numbers = TextColumn("{task.description}"), TextColumn("{task.fields[numbers]}")
+    times = TimeElapsedColumn(), numbers, TextColumn("left:"), TimeRemainingColumn()  # at the speed of the last 30 s
+    with Bars(words, BarColumn(), *times, console=Console(stderr=True), transient=True) as bars:
         # Before the first block is done there is no progress to show; the bar pulses.
         task = bars.add_task(printable(doing), total=None, numbers="")
 
         def show(now: Progress) -> None:
             for note in notes.new(now.notes):
                 bars.console.print(f"note: {printable(note)}", markup=False, highlight=False)
-            left = "" if now.seconds_left is None else f", {duration_text(now.seconds_left)} left"
-            numbers = f"{now.rows_done:,} of {now.rows:,}, {now.rows_per_second:,.0f}/s{left}"
+            numbers = f"{now.rows_done:,} of {now.rows:,}, {now.rows_per_second:,.0f}/s"
             bars.update(task, total=now.rows, completed=now.rows_done, numbers=numbers)
 
         def describe(words: str = doing) -> None:

@@ -150,12 +150,6 @@ class Progress:
         """Rows computed by this run in a second."""
         return self.rows_computed / self.seconds if self.seconds > 0 else 0.0
 
-    @property
-    def seconds_left(self) -> float | None:
-        """Time that is left at this speed; None before there is one."""
-        speed = self.rows_per_second
-        return (self.rows - self.rows_done) / speed if speed > 0 else None
-
 
 @dataclass(frozen=True)
 class Summary:
