@@ -17,6 +17,7 @@ from boulder_kernels import Control, Readings
 from boulder_sweep.report.contents import held_at, page_data, reading_words, table_data, thinned
 from boulder_sweep.report.export import setting_lines
 from boulder_sweep.report.figures import curves, sketch_of, verdict_map
+from boulder_sweep.report.log_chart import log_charts
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import shown_settings
 from boulder_sweep.text import script_data
@@ -127,6 +128,7 @@ def assembled(
         facts=facts,
         notes=notes,
         heading=heading,
+        logs=log_charts(settings),
         sketch=sketch_of(chosen[0]["inputs"], settings) if chosen else None,
         settings=settings,
         lines=setting_lines(shown_settings(settings, units)),

@@ -434,11 +434,27 @@ def _constant_words(data: dict[str, Any], angles: dict[str, float], of: str, uni
     return parts
 
 
+def log_title(data: dict[str, Any]) -> str:
+    """Return the file of a log, and the hole in it."""
+    return ", hole ".join(filter(None, (data["log"]["file"], data["log"]["hole"])))
+
+
+def shown_readings(data: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the readings of a log from the ground down, but those below the first one under the deepest foot."""
+    shown = (one for one in data["readings"] if one.get("left_out") != BELOW_FOOT)
+    return sorted(shown, key=lambda one: one["depth_m"])
+
+
+def strength(reading: dict[str, Any]) -> float:
+    """Return the value of a reading that is drawn: q_c [MPa], or blows."""
+    return float(reading.get("q_c_MPa", reading.get("n", reading.get("n1_60", 0.0))))
+
+
 def _log_words(data: dict[str, Any], units: str) -> list[str]:
     """Return what is taken of the layers of a log."""
-    layers, log = data["layers"], data["log"]
+    layers = data["layers"]
     kind = f"means of the cone over {quantity_text('m', units, WINDOW_M)}" if data["method"] == "cpt" else "blow counts"
-    parts = [", hole ".join(filter(None, (log["file"], log["hole"])))]
+    parts = [log_title(data)]
     if "weakest_layer" in data:
         parts.append(f"the weakest of {len(layers)} layers stands for all depths")
         layers = [layers[data["weakest_layer"]]]

@@ -29,6 +29,7 @@ from boulder_sweep.settings.model import (
 )
 from boulder_sweep.settings.problems import shorten
 from boulder_sweep.settings.shape import ProfilePoint, Scan
+from boulder_sweep.settings.soil_readings import shown_readings, strength
 from boulder_sweep.settings.sweep import IMPACT_HEIGHT_RULE, Heading, derived_words, wrong_with
 
 _NAMES = {entry.name for entry in INPUTS}
@@ -266,6 +267,9 @@ def _inconsistencies(settings: dict[str, Any]) -> Iterator[str]:
     try:
         for units in ("si", "us"):
             derived_words(settings.get("derived", {}), units)
+        for soil in settings.get("derived", {}).get("soil", ()):
+            if "log" in soil:
+                _ = max(map(strength, shown_readings(soil))) + soil.get("foot_m", 0.0)
         ends = [point["height"] for point in settings["model"].get("profile", ())]
         if ends and not (ends == sorted({*ends}) and (ends[0], ends[-1]) == (0.0, 1.0)):
             yield "model.profile is no outline from the foot to the top"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from boulder_sweep.settings.soil_readings import BELOW_FOOT
+from boulder_sweep.settings.soil_readings import log_title, shown_readings, strength
 from boulder_sweep.text import counted
 
 MOST_ROWS = 18
@@ -21,48 +21,45 @@ def log_lines(data: dict[str, Any]) -> list[str]:
         One of ``derived["soil"]`` of `boulder_sweep.settings.Sweep.derived`, made of a log. Readings below the first
         one under the deepest foot are counted only, and of many the weaker ones stand for their neighbours.
     """
-    shown = sorted(
-        (one for one in data["readings"] if one.get("left_out") != BELOW_FOOT), key=lambda one: one["depth_m"]
-    )
+    shown = shown_readings(data)
     each = -(-len(shown) // MOST_ROWS)
-    rows = [min(shown[at : at + each], key=_strength) for at in range(0, len(shown), each)]
-    most = max(*map(_strength, rows), 1e-9)
+    rows = [min(shown[at : at + each], key=strength) for at in range(0, len(shown), each)]
+    most = max(*map(strength, rows), 1e-9)
     marks = [(one["depth_m"], 1, _row(one, most)) for one in rows]
     for at, layer in enumerate(data.get("layers", ())):
-        marks.append((layer["from_m"], 0, f"--- {_layer(data, layer, at)} ".ljust(78, "-")))
+        marks.append(
+            (layer["from_m"], 0, f"--- from {layer['from_m']:.3g} m: {layer_words(data, layer, at)} ".ljust(78, "-"))
+        )
     if "foot_m" in data:
         marks.append((data["foot_m"], 2, f"=== deepest foot of a boulder, {data['foot_m']:.4g} m ".ljust(78, "=")))
-    name = "q_c [MPa]" if data["method"] == "cpt" else "N" if "n" in shown[0] else "(N1)60"
     left = len(data["readings"]) - len(shown)
-    hole = data["log"]["hole"] and f", hole {data['log']['hole']}"
     return [
-        f"{data['log']['file']}{hole}",
-        f"{'depth [m]':>9} {name:>9} {'angle [deg]':>11}",
+        log_title(data),
+        f"{'depth [m]':>9} {quantity(data):>9} {'angle [deg]':>11}",
         *(line for *_, line in sorted(marks)),
         *([f"{counted(left, 'deeper reading')} left out"] if left else []),
     ]
 
 
-def _strength(reading: dict[str, Any]) -> float:
-    """Return what is drawn of a reading."""
-    return float(reading.get("q_c_MPa", reading.get("n", reading.get("n1_60", 0.0))))
+def quantity(data: dict[str, Any]) -> str:
+    """Return the quantity of which a log has readings, with its unit."""
+    return "q_c [MPa]" if data["method"] == "cpt" else "N" if "n" in data["readings"][0] else "(N1)60"
 
 
 def _row(reading: dict[str, Any], most: float) -> str:
-    value = f"{'>' if reading.get('at_least') else ''}{_strength(reading):.3g}"
+    value = f"{'>' if reading.get('at_least') else ''}{strength(reading):.3g}"
     angle = f"{reading['friction_angle_deg']:.1f}" if "friction_angle_deg" in reading else "-"
-    bar = "#" * max(1, round(_BAR * _strength(reading) / most))
+    bar = "#" * max(1, round(_BAR * strength(reading) / most))
     why = f"  left out: {reading['left_out']}" if "left_out" in reading else ""
     return f"{reading['depth_m']:>9.2f} {value:>9} {angle:>11}  {bar}{why}"
 
 
-def _layer(data: dict[str, Any], layer: dict[str, Any], at: int) -> str:
-    """Return what is taken of a layer."""
-    words = f"from {layer['from_m']:.3g} m: "
+def layer_words(data: dict[str, Any], layer: dict[str, Any], at: int) -> str:
+    """Return the friction angle that is taken of a layer."""
     if "friction_angle_deg" not in layer:
-        return words
+        return ""
     mean = f"{layer['friction_angle_deg']:.1f} deg, sd {layer['friction_angle_sd_deg']:.1f} deg"
     if data.get("weakest_layer", at) != at:
-        return f"{words}{mean}, not taken"
+        return f"{mean}, not taken"
     weak = f"taken as {layer['weak']['friction_angle_deg']:.1f} deg, the 5 % of " if "weak" in layer else ""
-    return f"{words}{weak}{mean}"
+    return f"{weak}{mean}"
