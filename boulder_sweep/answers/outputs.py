@@ -29,7 +29,7 @@ from boulder_sweep.settings.fields import BY_NAME, INPUTS
 from boulder_sweep.settings.model import Criterion
 from boulder_sweep.settings.problems import shorten
 from boulder_sweep.settings.stored import check_entries
-from boulder_sweep.settings.sweep import Axis, DesignList, allowed_in
+from boulder_sweep.settings.sweep import Axis, DesignList, allowed_in, units_in
 from boulder_sweep.store.failures import settings_file
 from boulder_sweep.store.folder import part_file
 from boulder_sweep.store.provenance import check_identity, identity_in, judged_by, other_version, settings_sha256
@@ -355,6 +355,7 @@ def asked_sweep(identity: Mapping[str, Any], table: pa.Table) -> Sweep:
         table=listed,
         criterion=Criterion(**settings["criterion"]),
         model=model_of(settings, Control(**identity["control"])),
+        units=units_in(settings),
         allowed=allowed_in(settings),
     )
 

@@ -85,7 +85,7 @@ def need(
     grid: str,
     out: str | None,
     picture: str | None,
-    units: str,
+    units: str | None,
     at: str | None,
     jobs: int | None,
     quiet: bool,
@@ -117,6 +117,7 @@ def need(
     if question["probability"] is not None and at is not None:
         raise click.UsageError("--at and --probability cannot be used together")
     sweep = load_sweep(grid, overrides, quiet=True)
+    units = units or sweep.units
     if question["probability"] is None:
         sweep = at_values(sweep, at)
     asked = asked_of(sweep, **question)
@@ -186,7 +187,7 @@ def uncertainty(
     out: str | None,
     picture: str | None,
     design: int,
-    units: str,
+    units: str | None,
     quiet: bool,
     overrides: tuple[str, ...],
     as_json: bool,
@@ -202,6 +203,7 @@ def uncertainty(
 
     refuse_units_of_json(units, as_json)
     sweep = load_sweep(grid, overrides, quiet, units)
+    units = units or sweep.units
     refuse_missing(sweep, grid, design)
     refuse_unwritable(out, picture)
     if not quiet:
@@ -241,7 +243,7 @@ def capacity(
     at: str | None,
     jobs: int | None,
     out: str | None,
-    units: str,
+    units: str | None,
     quiet: bool,
     overrides: tuple[str, ...],
     as_json: bool,
@@ -256,6 +258,7 @@ def capacity(
 
     refuse_units_of_json(units, as_json)
     sweep = take_values(load_sweep(grid, overrides, quiet, units), at, quiet, units)
+    units = units or sweep.units
     refuse_unwritable(out)
     with working(quiet) as progress:
         result = reserves(sweep, jobs=jobs, progress=progress)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.columns import BY_NAME, VERDICTS, WAY_OUT
 from boulder_sweep.settings.model import FOOT_WORDS, RESISTANCES
+from boulder_sweep.settings.shown_units import Shown, shown_column, shown_settings, shown_unit
 from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.text import counted, duration_text, size_text
 
@@ -21,21 +22,25 @@ if TYPE_CHECKING:
 def grid_lines(sweep: Sweep) -> list[str]:
     """Return a description of the designs: how many, and over which axes."""
     count = counted(sweep.n_designs, "design")
-    ground = [f"  {words}" for words in (sweep.model.ground.words, sweep.model.shape.words) if words]
+    soil = sweep.model.ground.words_in(shown_unit("m", sweep.units), shown_unit("kPa", sweep.units))
+    ground = [f"  {words}" for words in (soil, sweep.model.shape.words) if words]
     if sweep.table is not None:
         carried = f", with {', '.join(sweep.table.labels)}" if sweep.table.labels else ""
         return [f"{sweep.name}: {count} from {sweep.table.file}{carried}", *_uncertain_lines(sweep), *ground]
     lines = [f"{sweep.name}: {count}"]
     for axis in sweep.axes:
-        unit = BY_NAME[axis.name].unit if axis.name in BY_NAME else "1"
+        shown = (
+            shown_column(axis.name, sweep.units) if axis.name in BY_NAME else Shown(axis.name, axis.name, "", 1.0, "")
+        )
         if axis.labels:
             noun = "set" if len(axis) == 1 else "sets"
             lines.append(f"  {axis.name:<26}{len(axis):>9,} {noun:<8}{', '.join(axis.labels)}")
             continue
-        least, largest = min(axis.values), max(axis.values)
+        least, largest = (end / shown.size for end in (min(axis.values), max(axis.values)))
         ends = f"{least:g} to {largest:g}" if len(axis) > 1 else f"{least:g}"
         noun = "value" if len(axis) == 1 else "values"
-        lines.append(f"  {axis.name:<26}{len(axis):>9,} {noun:<8}{ends}{'' if unit == '1' else ' ' + unit}")
+        unit = "" if shown.unit in ("", "1") else f" {shown.unit}"
+        lines.append(f"  {shown.name:<26}{len(axis):>9,} {noun:<8}{ends}{unit}")
     return [*lines, *_uncertain_lines(sweep), *ground]
 
 
@@ -43,9 +48,9 @@ def _uncertain_lines(sweep: Sweep) -> list[str]:
     """Return one line for each input that has a distribution."""
     lines = []
     for name, spread in sweep.distributions.items():
-        mean = f", mean {sweep.constants[name]:.4g}" if name in sweep.constants else ""
-        unit = BY_NAME[name].unit if name in BY_NAME else "1"
-        lines.append(f"  {name:<26}uncertain         {spread.words(unit)}{mean}")
+        shown = shown_column(name, sweep.units)
+        mean = f", mean {sweep.constants[name] / shown.size:.4g}" if name in sweep.constants else ""
+        lines.append(f"  {shown.name:<26}uncertain         {spread.words(shown.unit, shown.size)}{mean}")
     return lines
 
 
@@ -155,7 +160,7 @@ def dry_run_lines(sweep: Sweep, out: Location, effort: Estimate, objection: str)
     return [
         *grid_lines(sweep),
         "",
-        *value_lines(sweep.resolved()),
+        *value_lines(shown_settings(sweep.resolved(), sweep.units)),
         "",
         f"would simulate {effort.rows_to_compute:,} of {counted(effort.rows, 'design')} into {out}",
         f"about {duration_text(effort.seconds)} with {counted(effort.jobs, 'worker')}, "

@@ -78,7 +78,7 @@ at_option = click.option(
     help="Uncertain inputs: at both ends, p5 [default], p10, ..., and the mean, or mean alone.",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout.")
-units_option = click.option("--units", type=click.Choice(SYSTEMS), default="si", show_default=True, help="Units shown.")
+units_option = click.option("--units", type=click.Choice(SYSTEMS), help="Units shown [those of the file].")
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="No notes.")
 margin_option = click.option("--margin", default="0", metavar="SHARE", help="Least margin to the limits, e.g. '25 %'.")
 second_opinion_option = click.option(
@@ -103,7 +103,7 @@ def talk_options(function: Command) -> Command:
 
 
 def load_sweep(
-    path: str, overrides: Sequence[str], quiet: bool, units: str = "si", *, second_opinion: bool = False
+    path: str, overrides: Sequence[str], quiet: bool, units: str | None = None, *, second_opinion: bool = False
 ) -> Sweep:
     """Load settings and print the notes on them; see `say_notes`."""
     from boulder_sweep.settings import load
@@ -115,14 +115,15 @@ def load_sweep(
     return sweep
 
 
-def say_notes(sweep: Sweep, units: str = "si") -> None:
+def say_notes(sweep: Sweep, units: str | None = None) -> None:
     """Print the notes on settings, how inputs follow from the data of a site, and which values uncertain inputs have.
 
-    Where the soil has too few elements, some designs are simulated to say what that costs.
+    They are in the units of the file where none are asked for. Where the soil has too few elements, some designs are
+    simulated to say what that costs.
     """
     from boulder_sweep.settings.sweep import derived_words
 
-    for words in derived_words(sweep.derived, units):
+    for words in derived_words(sweep.derived, units or sweep.units):
         say("\n".join(textwrap.wrap(f"note: {words}", 80, subsequent_indent="  ")))
     for note in sweep.notes:
         say(f"note: {note}")
@@ -143,15 +144,15 @@ def say_percents(**shares: str | None) -> None:
                 say(f"note: --{name.replace('_', '-')} {text} is read as {text} %")
 
 
-def say_values(sweep: Sweep, units: str = "si") -> None:
+def say_values(sweep: Sweep, units: str | None = None) -> None:
     """Print the values that uncertain inputs are taken at, if any are."""
     from boulder_sweep.judge.quantiles import words_of
 
     if sweep.taken_at:
-        say("\n".join(wrap(f"note: {words_of(sweep, units)}")))
+        say("\n".join(wrap(f"note: {words_of(sweep, units or sweep.units)}")))
 
 
-def take_values(sweep: Sweep, at: str | None, quiet: bool, units: str = "si") -> Sweep:
+def take_values(sweep: Sweep, at: str | None, quiet: bool, units: str | None = None) -> Sweep:
     """Return settings with one value for every uncertain input, and print these values."""
     from boulder_sweep.judge.quantiles import at_values
 
@@ -168,9 +169,9 @@ def refuse_missing(sweep: Sweep, path: str, number: int) -> None:
         raise click.UsageError(f"{path} holds {held}, numbered from 0; there is no {number}")
 
 
-def refuse_units_of_json(units: str, as_json: bool) -> None:
+def refuse_units_of_json(units: str | None, as_json: bool) -> None:
     """Refuse ``--json`` in US units, for commands whose objects are in those of the table."""
-    if as_json and units != "si":
+    if as_json and units == "us":
         raise click.UsageError(f"--json is in SI units for this command; leave out --units {units} or --json")
 
 

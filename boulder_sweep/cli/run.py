@@ -78,6 +78,7 @@ def run(
 ) -> int:
     """Simulate every design of GRID and write the table of verdicts."""
     from boulder_sweep.cli import console
+    from boulder_sweep.settings.shown_units import shown_settings
 
     if options["resume"] and options["overwrite"]:
         raise click.UsageError("--resume and --overwrite cannot be used together")
@@ -89,7 +90,7 @@ def run(
     if dry_run:
         return _dry_run(sweep, target, options, as_json)
     if verbose:
-        say("\n".join(console.value_lines(sweep.resolved())))
+        say("\n".join(console.value_lines(shown_settings(sweep.resolved(), sweep.units))))
     if not quiet:
         say(f"{sweep.name}: {counted(sweep.n_designs, 'design')} into {target}")
     from boulder_sweep.runner.run import run as run_sweep
@@ -145,7 +146,7 @@ LEAST = {"mass_kg": ("lightest boulder", "kg"), "depth_m": ("shallowest depth", 
 )
 @units_option
 @json_option
-def compare(before: str, after: str, listed: int, units: str, as_json: bool) -> int:
+def compare(before: str, after: str, listed: int, units: str | None, as_json: bool) -> int:
     """Compare the results in BEFORE and AFTER design by design, matched by the inputs they share.
 
     They are folders of runs, or files that -o of `sweep need`, `capacity` or `uncertainty` wrote, whose answers are
@@ -158,6 +159,7 @@ def compare(before: str, after: str, listed: int, units: str, as_json: bool) -> 
 
     refuse_units_of_json(units, as_json)
     comparison = match(before, after)
+    units = units or comparison.units
     if as_json:
         show(json.dumps(comparison.to_dict()))
         return 0

@@ -136,6 +136,6 @@ def check(grid: str, overrides: tuple[str, ...]) -> int:
     if why := sweep.why_none_runs():
         say(f"{grid}: no design can be computed: {why}")
         return EXIT_WRONG_USE
-    logs = [log_lines(data) for data in sweep.derived.get("soil", ()) if "log" in data]
+    logs = [log_lines(data, sweep.units) for data in sweep.derived.get("soil", ()) if "log" in data]
     show(f"{grid}: valid", *console.grid_lines(sweep), *(line for lines in logs for line in ("", *lines)))
     return 0

@@ -54,7 +54,7 @@ COLUMN = "COLUMN"
     help="Hold another input at a value [default: its middle one] (may be repeated).",
 )
 @units_option
-def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes: Any) -> int:
+def plot(out: str, picture: str | None, at: tuple[str, ...], units: str | None, **axes: Any) -> int:
     """Draw a map of the verdicts in OUT: embedment across, height up, one map for each soil.
 
     OUT is the folder of a run, perhaps in progress, of which finished designs are drawn. Of a file that -o of
@@ -70,6 +70,7 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes:
         given[name] = text
     from boulder_sweep.answers.outputs import AnswerFile, result_of
     from boulder_sweep.errors import PictureError
+    from boulder_sweep.settings.sweep import units_in
     from boulder_sweep.views.pictures import checked_kind, require_matplotlib
     from boulder_sweep.views.slices import finished_pieces
     from boulder_sweep.views.verdict_map import draw_verdict_map
@@ -78,11 +79,12 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str, **axes:
     require_matplotlib()
     finished = result_of(location_of(out), PictureError)
     target = checked_kind(picture or beside(location_of(out.removesuffix(".parquet")), ".png"))
+    settings = finished.identity["settings"]
+    units = units or units_in(settings)
     if isinstance(finished, AnswerFile):
         return _plot_answers(finished, target, units, [*filter(None, axes.values()), *given])
     if finished.rows_done == 0:
         raise PictureError(f"{out} holds no finished designs yet")
-    settings = finished.identity["settings"]
     sets = settings.get("labels", {}) if settings["order"] != "table" else {}
     held = {name: _held(name, text, sets) for name, text in given.items()}
     judged = finished.judged_by
@@ -192,7 +194,7 @@ Examples:
 @click.option("--author", metavar="TEXT", help="The same of the author.")
 @click.option("--date", metavar="TEXT", help="The same of the date.")
 @units_option
-def report(out: str, page: str | None, designs: tuple[int, ...], units: str, **heading: str | None) -> int:
+def report(out: str, page: str | None, designs: tuple[int, ...], units: str | None, **heading: str | None) -> int:
     """Write the result in OUT as one HTML file: the answer, the map, and the simulator, which runs in the page.
 
     OUT is the folder of a run, or a file that -o of `sweep need`, `capacity` or `uncertainty` wrote: the answers then
@@ -239,7 +241,7 @@ Examples:
 @result_argument
 @click.option("-o", "--output", "file", type=OUTPUT, required=True, metavar="F.xlsx|.csv|.parquet", help="The table.")
 @units_option
-def export(out: str, file: str, units: str) -> int:
+def export(out: str, file: str, units: str | None) -> int:
     """Write the result in OUT as one table for colleagues, in SI or US customary units.
 
     OUT is the folder of a run, or a file that -o of `sweep need`, `capacity` or `uncertainty`, or --trajectory wrote.
@@ -275,7 +277,7 @@ def explore(
     page: str | None,
     no_open: bool,
     at: str | None,
-    units: str,
+    units: str | None,
     overrides: tuple[str, ...],
 ) -> int:
     """Write a page with one design of CASE and open it in the browser.

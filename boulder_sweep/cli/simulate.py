@@ -67,7 +67,7 @@ def simulate(
     energy: str | None,
     every: bool,
     animate: str | None,
-    units: str,
+    units: str | None,
     at: str | None,
     overrides: tuple[str, ...],
     as_json: bool,
@@ -80,7 +80,7 @@ def simulate(
     not every outcome is the same to the last bit, what has changed since is printed: versions, kernels, rules.
     """
     from boulder_sweep.cli import console
-    from boulder_sweep.settings.shown_units import shown_values
+    from boulder_sweep.settings.shown_units import shown_settings, shown_unit, shown_values
 
     number, again, location = design or 0, None, location_of(case)
     if _is_result(location):
@@ -95,18 +95,20 @@ def simulate(
         refuse_missing(sweep, case, number)
         refuse_unwritable_history(plot, trajectory, energy, animate)
         designs, reason = sweep.n_designs, sweep.block(number, number + 1).reasons[0]
+    in_json = units or "si"
+    units = units or sweep.units
     if design is None and designs > 1 and not quiet:
         say(f"note: {case} holds {designs:,} designs; this is number 0 (--design N for another)")
     if reason:
         say(f"design {number} cannot be computed: {reason}")
         if again is not None:
-            lone = {"design_id": number} | shown_values(again.inputs | again.stored, units) | again.compared(units)
+            lone = {"design_id": number} | shown_values(again.inputs | again.stored, in_json) | again.compared(in_json)
             show(*[json.dumps(lone)] if as_json else _compared_lines(again))
         return EXIT_SOME_ROWS_FAILED
-    if (words := sweep.model.ground.words) and not quiet:
+    if (words := sweep.model.ground.words_in(shown_unit("m", units), shown_unit("kPa", units))) and not quiet:
         say(f"note: {words}")
     if verbose:
-        say("\n".join(console.value_lines(sweep.resolved())))
+        say("\n".join(console.value_lines(shown_settings(sweep.resolved(), sweep.units))))
     from boulder_sweep.impact.simulation import simulate as simulate_design
     from boulder_sweep.judge.quantiles import words_of
     from boulder_sweep.views.wording import verdict_line
@@ -120,9 +122,9 @@ def simulate(
         say("\n".join(wrap(f"note: what follows is decided and drawn with {words_of(decided_at[0], units)}")))
     # Before anything else: there may be nothing to draw, and a film takes a while.
     row = result.summary() if again is None else {"design_id": number, **again.inputs, **again.stored}
-    whole = shown_values(row | _to_build(result), units)
+    whole = shown_values(row | _to_build(result), in_json if as_json else units)
     if as_json:
-        show(json.dumps(whole if again is None else whole | again.compared(units)))
+        show(json.dumps(whole if again is None else whole | again.compared(in_json)))
     else:
         lines = [] if row["max_rotation_deg"] is None else impact_lines(row, result, units)
         compared = [] if again is None else _compared_lines(again)

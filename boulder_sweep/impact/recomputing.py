@@ -25,7 +25,7 @@ from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import Criterion, Ground, Model, ReadingChoice, SolverSettings
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import shown_values
-from boulder_sweep.settings.sweep import DesignList, allowed_in
+from boulder_sweep.settings.sweep import DesignList, allowed_in, units_in
 from boulder_sweep.store.part import part_table
 from boulder_sweep.store.provenance import differences, identity, judged_by
 from boulder_sweep.store.reading import FinishedRows
@@ -172,6 +172,7 @@ def one_design(settings: dict[str, Any], inputs: dict[str, float | None], contro
             step_s=step_s,
             horizon_s=control.horizon,
         ),
+        units=units_in(settings),
         allowed=allowed_in(settings),
     )
 

@@ -11,7 +11,8 @@ from boulder_sweep.answers.outputs import MARKS, NEED, RUN, UNCERTAINTY, AnswerF
 from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.errors import ReportError
 from boulder_sweep.locations import Location, location_of
-from boulder_sweep.settings.sweep import IMPACT_HEIGHT_RULE
+from boulder_sweep.settings.shown_units import SYSTEMS
+from boulder_sweep.settings.sweep import IMPACT_HEIGHT_RULE, units_in
 from boulder_sweep.store.provenance import differences
 from boulder_sweep.store.reading import FinishedRows, read
 from boulder_sweep.text import counted
@@ -51,6 +52,8 @@ class Comparison:
         The command that wrote both results.
     answers : dict of str to str
         Columns of answers, each with its unit; none for the results of runs.
+    units : str
+        In which the later result is shown, ``si`` or ``us``.
     """
 
     matched: pd.DataFrame
@@ -63,6 +66,7 @@ class Comparison:
     least: dict[str, tuple[float | None, float | None]]
     kind: str = RUN
     answers: Mapping[str, str] = field(default_factory=dict)
+    units: str = SYSTEMS[0]
 
     @property
     def flipped(self) -> pd.DataFrame:
@@ -181,6 +185,7 @@ def compare(before: str | Location, after: str | Location) -> Comparison:
         },
         kind=asked[0].command,
         answers=answers,
+        units=units_in(other.identity["settings"]),
     )
 
 

@@ -14,7 +14,8 @@ from boulder_sweep.columns import BOULDER_MASS, BY_NAME
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.quantities import NEEDED, QUANTITIES, quantities_by
 from boulder_sweep.locations import Location, location_of, replacing
-from boulder_sweep.settings.shown_units import Shown, check_system, shown_as, shown_column, shown_settings
+from boulder_sweep.settings.shown_units import Shown, check_system, in_unit, shown_as, shown_column, shown_settings
+from boulder_sweep.settings.sweep import units_in
 from boulder_sweep.store.folder import check_target
 from boulder_sweep.store.reading import FinishedRows
 from boulder_sweep.text import install, printable, why
@@ -35,7 +36,7 @@ FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
 """First characters of text that a spreadsheet takes for a formula."""
 
 
-def export(out: str | Location, file: str | Path, *, units: str = "si") -> int:
+def export(out: str | Location, file: str | Path, *, units: str | None = None) -> int:
     """Write a result as one table.
 
     Parameters
@@ -46,7 +47,8 @@ def export(out: str | Location, file: str | Path, *, units: str = "si") -> int:
     file
         The table: ``.xlsx``, with a second sheet of units, settings and versions, ``.csv`` or ``.parquet``.
     units
-        ``si`` for the table as it is, ``us`` for US customary units; column names end in the unit.
+        ``si`` for the table as it is, ``us`` for US customary units, by default those of the settings file; column
+        names end in the unit.
 
     Returns
     -------
@@ -63,8 +65,10 @@ def export(out: str | Location, file: str | Path, *, units: str = "si") -> int:
     ValueError
         The units are unknown.
     """
-    check_system(units)
+    if units is not None:
+        check_system(units)
     target, finished = Path(file), result_of(location_of(out), ReportError, histories=True)
+    units = units or units_in(finished.identity["settings"])
     kind = target.suffix.lower()
     if kind not in KINDS:
         raise ReportError(f"{file}: the name must end in {', '.join(KINDS[:-1])} or {KINDS[-1]}")
@@ -121,7 +125,6 @@ def setting_lines(settings: Mapping[str, Any], indent: str = "") -> list[str]:
 def _tables(finished: Exportable, units: str) -> Iterator[tuple[list[Shown], pa.Table]]:
     """Yield the rows piece by piece in the requested units."""
     import pyarrow as pa
-    import pyarrow.compute as pc
 
     for table in finished.tables():
         if finished.judged_by:
@@ -135,8 +138,8 @@ def _tables(finished: Exportable, units: str) -> Iterator[tuple[list[Shown], pa.
         columns = [_shown(field, units) for field in table.schema]
         for index, column in enumerate(columns):
             if column.size != 1.0:
-                values = pc.divide(table.column(index), column.size)
-                table = table.set_column(index, column.name, values)
+                values = in_unit(table.column(index).to_numpy(), column.size)
+                table = table.set_column(index, column.name, pa.array(values, from_pandas=True))
         yield columns, table.rename_columns([column.name for column in columns])
 
 

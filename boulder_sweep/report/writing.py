@@ -25,7 +25,7 @@ from boulder_sweep.report.rows import MOST_ELEMENTS, inputs_of, read_rows
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import FOOT_WORDS, SolverSettings
 from boulder_sweep.settings.shown_units import check_system, quantity_text
-from boulder_sweep.settings.sweep import NO_HEADING, SECTION, Heading, derived_words, wrong_with
+from boulder_sweep.settings.sweep import NO_HEADING, SECTION, Heading, derived_words, units_in, wrong_with
 from boulder_sweep.signals import end_group, undone
 from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.store.folder import check_target
@@ -68,7 +68,7 @@ def write_report(
     page: str | Path,
     *,
     designs: Sequence[int] = (),
-    units: str = "si",
+    units: str | None = None,
     command: str = "",
     heading: Heading = NO_HEADING,
 ) -> Path:
@@ -83,7 +83,7 @@ def write_report(
     designs
         Rows to be shown in full; by default those named in the answer.
     units
-        Units shown first, ``si`` or ``us``; the reader can switch.
+        Units shown first, ``si`` or ``us``, by default those of the settings file; the reader can switch.
     command
         Command that regenerates the page.
     heading
@@ -104,7 +104,8 @@ def write_report(
     ValueError
         The units are unknown.
     """
-    check_system(units)
+    if units is not None:
+        check_system(units)
     for key, text in heading.given().items():
         if wrong := wrong_with(text):
             raise ReportError(f"--{key}: {wrong}")
@@ -122,6 +123,7 @@ def write_report(
     identity = rows.finished.identity
     notes = _notes_on_rules(rows.finished.judged_by)
     settings, control = identity["settings"], Control(**identity["control"])
+    units = units or units_in(settings)
     readings = Readings(**identity["readings"])
     text = assembled(
         heading=Heading(**{**settings.get(SECTION, {}), **heading.given()}).given(),
@@ -140,7 +142,7 @@ def write_report(
     return _written(target, text)
 
 
-def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str = "si", command: str = "") -> Path:
+def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str | None = None, command: str = "") -> Path:
     """Write the page for one design of a settings file.
 
     Parameters
@@ -161,6 +163,7 @@ def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str = 
         The units are unknown.
     """
     target = checked_page(page)
+    units = units or sweep.units
     check_system(units)
     sweep = at_values(sweep)
     if not 0 <= number < sweep.n_designs:

@@ -30,6 +30,7 @@ from boulder_sweep.settings.problems import (
     refuse,
     shorten,
 )
+from boulder_sweep.settings.shown_units import system_of
 from boulder_sweep.settings.sweep import DesignList
 from boulder_sweep.settings.text_table import MAX_BYTES, MAX_COLUMNS, Row, TextTable, open_text
 from boulder_sweep.settings.tree import Scalar
@@ -168,7 +169,8 @@ def _designs_of(table: TextTable, path: Location, problems: ProblemList) -> Desi
         if column is not None and column.field is None and _are_numbers(words[column.name].codes):
             check_numbers(column, position, problems)
     values_of = {name: np.concatenate(parts or [np.empty(0)]) for name, parts in numbers.items()}
-    return DesignList(path.name, values_of, {name: own.label() for name, own in words.items()})
+    labels = {name: own.label() for name, own in words.items()}
+    return DesignList(path.name, values_of, labels, _system(columns))
 
 
 class _Words:
@@ -299,13 +301,14 @@ def _checked_columns(file: TableFile, path: Location, problems: ProblemList) -> 
     label = str(path)
     position = Position(label)
     alike = Alike(problems)
-    designs = DesignList(path.name, {})
     if file.rows == 0:
         raise refuse(label, "has no rows")
     names = file.schema.names
     if len(names) > MAX_COLUMNS:
         raise refuse(label, f"has {len(names):,} columns; at most {MAX_COLUMNS:,} are read")
-    for name, column in zip(names, read_header(names, [position] * len(names), problems), strict=True):
+    columns = read_header(names, [position] * len(names), problems)
+    designs = DesignList(path.name, {}, units=_system(columns))
+    for name, column in zip(names, columns, strict=True):
         if column is None:
             continue
         cells = file.read([name]).column(0)
@@ -399,6 +402,12 @@ def read_header(names: list[str], positions: list[Position], problems: ProblemLi
             problems.add(position, shorten(name) or "(empty)", column)
         columns.append(column if isinstance(column, TableColumn) else None)
     return columns
+
+
+def _system(columns: Sequence[TableColumn | None]) -> str:
+    """Return the units of the column with the heights, see `DesignList`."""
+    sizes = (one.factor for one in columns if one and one.field and one.field.name == "boulder_height_m")
+    return system_of(next(sizes, 1))
 
 
 def _key(column: TableColumn) -> str:

@@ -76,14 +76,15 @@ class Distribution:
         assert self.mode is not None
         return self.mode
 
-    def words(self, unit: str) -> str:
-        """Return kind and spread in words, for messages; `unit` is that of the column."""
+    def words(self, unit: str, size: float = 1.0) -> str:
+        """Return kind and spread in words, in a unit of which one is `size` in the unit of the column."""
         unit = "" if unit == "1" else f" {unit}"
-        spread = f"sd {self.sd}{unit}" if self.cov is None else f"cov {100.0 * self.cov:g} %"
-        ends = f"{self.low:g} to {self.high:g}{unit}"
+        sd, mode = (None if value is None else f"{value / size:.6g}{unit}" for value in (self.sd, self.mode))
+        spread = f"sd {sd}" if self.cov is None else f"cov {100.0 * self.cov:g} %"
+        ends = f"{self.low / size:g} to {self.high / size:g}{unit}"
         return {
             "uniform": f"uniform, {ends}",
-            "triangular": f"triangular, {ends}, most likely {self.mode}{unit}",
+            "triangular": f"triangular, {ends}, most likely {mode}",
             "beta": f"beta, {spread}, {ends}",
         }.get(self.kind, f"{self.kind}, {spread}")
 
@@ -113,9 +114,9 @@ class SetDistributions:
         """Where the first of them stands in the file."""
         return next(spread.position for spread in self.each if spread is not None)
 
-    def words(self, unit: str) -> str:
-        """Return kind and spread of each in words; `unit` is that of the column."""
-        return "; ".join("certain" if spread is None else spread.words(unit) for spread in self.each)
+    def words(self, unit: str, size: float = 1.0) -> str:
+        """Return kind and spread of each in words; see `Distribution.words`."""
+        return "; ".join("certain" if spread is None else spread.words(unit, size) for spread in self.each)
 
     def to_dict(self) -> dict[str, Any]:
         """Return what is given as plain data."""

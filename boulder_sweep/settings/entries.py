@@ -17,9 +17,11 @@ from boulder_sweep.settings.distributions import Distribution, Input, SetDistrib
 from boulder_sweep.settings.log_layers import Log
 from boulder_sweep.settings.problems import Mistakes, Position, ProblemList, shorten, unknown_word, wrong
 from boulder_sweep.settings.shape import ProfilePoint
+from boulder_sweep.settings.shown_units import SYSTEMS, system_of
 from boulder_sweep.settings.soil_readings import CORRELATION, ENERGY, HOLE, METHODS, SOIL_KEYS, TOPSOIL, unfold_soils
-from boulder_sweep.settings.sweep import SECTION, DesignList
+from boulder_sweep.settings.sweep import SECTION, UNITS, DesignList
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
+from boulder_sweep.settings.units import factor
 from boulder_sweep.settings.values import meant_by, read_single
 from boulder_sweep.settings.vehicle import APPROACH, unfold_approaches
 
@@ -29,7 +31,7 @@ NAME = re.compile(r"\w[\w .+-]{0,79}")
 """Names of sweeps and of named sets."""
 NAME_RULE = "must be at most 80 letters, digits, spaces and - _ . +, as in m30-sizing"
 """The same in words."""
-TOP_KEYS = ("name", *fields.SECTIONS, "table", SECTION, fields.ALLOW_UNUSUAL)
+TOP_KEYS = ("name", *fields.SECTIONS, "table", SECTION, UNITS, fields.ALLOW_UNUSUAL)
 SITE_KEYS = {"soil": (*METHODS, HOLE, ENERGY, TOPSOIL.key), "vehicle": (APPROACH,)}
 """Keys of a block that stand for others, as the site gives them."""
 DRAWN_SD = 5.0
@@ -319,6 +321,15 @@ class Entries:
             return self.table.columns[name]
         leaf = self.leaves.get(name)
         return np.empty(0) if leaf is None else leaf.values
+
+    @property
+    def written_units(self) -> str:
+        """The system of the unit in which the height of the boulder is written; ``si`` of a bare number."""
+        height = fields.BY_NAME["boulder_height_m"]
+        if self.table is not None and height.name in self.table.columns:
+            return self.table.units
+        leaf = self.leaves.get(height.name)
+        return system_of(factor(leaf.written, height.unit)) if leaf is not None and leaf.written else SYSTEMS[0]
 
     @property
     def gives_mass(self) -> bool:

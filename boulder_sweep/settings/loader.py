@@ -30,7 +30,8 @@ from boulder_sweep.settings.problems import (
     refuse,
     shorten,
 )
-from boulder_sweep.settings.sweep import SECTION, Axis, Heading, Sweep, wrong_with
+from boulder_sweep.settings.shown_units import SYSTEMS
+from boulder_sweep.settings.sweep import SECTION, UNITS, Axis, Heading, Sweep, wrong_with
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, parse, parse_node
 from boulder_sweep.settings.tree import Sequence as List
 from boulder_sweep.stones.rock import ROCK_KG_M3
@@ -101,6 +102,7 @@ def load_text(text: str, path: Path, overrides: Sequence[str] = ()) -> Sweep:
     if root is None:
         raise SettingsError(problems.in_order())
     apply_overrides(root, overrides, problems)
+    units = _read_units(root, problems)
     entries = Entries(root, path, problems)
     name = _read_name(entries)
     entries.read()
@@ -109,7 +111,7 @@ def load_text(text: str, path: Path, overrides: Sequence[str] = ()) -> Sweep:
     check_usual(entries)
     check_pairs(entries)
     problems.raise_if_any()
-    return _build(name, heading, entries, tuple(overrides))
+    return _build(name, heading, units or entries.written_units, entries, tuple(overrides))
 
 
 def _read_text(path: Path) -> str:
@@ -276,7 +278,29 @@ def _read_heading(entries: Entries) -> Heading:
     return Heading(**texts)
 
 
-def _build(name: str, heading: Heading, entries: Entries, overrides: tuple[str, ...]) -> Sweep:
+def _read_units(root: Mapping, problems: ProblemList) -> str:
+    """Return the units named in a file, empty where none are; with ``us`` no number may lack its unit."""
+    node = root.get(UNITS)
+    if node is None:
+        return ""
+    units = node.text.strip() if isinstance(node, Scalar) else ""
+    if units not in SYSTEMS:
+        problems.add(node.position, UNITS, f"must be {' or '.join(SYSTEMS)}")
+    if units == "us":
+        _need_units(root)
+    return units
+
+
+def _need_units(node: Node) -> None:
+    """Ask for a unit behind every number below a node that has a dimension."""
+    if isinstance(node, Scalar):
+        node.needs_unit = True
+        return
+    for inner in node.items if isinstance(node, List) else [entry.value for entry in node]:
+        _need_units(inner)
+
+
+def _build(name: str, heading: Heading, units: str, entries: Entries, overrides: tuple[str, ...]) -> Sweep:
     """Put the checked parts together."""
     factor = entries.settings.get("partial_factor", 1.0)
     if factor != 1.0:
@@ -303,6 +327,7 @@ def _build(name: str, heading: Heading, entries: Entries, overrides: tuple[str, 
         partial_factor=factor,
         overrides=overrides,
         heading=heading,
+        units=units,
         derived=entries.derived,
         allowed=entries.allowed,
     )

@@ -247,13 +247,8 @@ class Ground:
         """Return everything as plain data."""
         return asdict(self)
 
-    @property
-    def words(self) -> str:
-        """What there is of it; empty where there is nothing."""
-        return self.words_in(("m", 1.0), ("kPa", 1.0))
-
     def words_in(self, length: tuple[str, float], pressure: tuple[str, float]) -> str:
-        """Return `words` in other units, each with its size in m or kPa."""
+        """Return what there is of it, in units with their sizes in m and kPa; empty where there is nothing."""
         cohesions = [self.cohesion_kPa, *(layer.cohesion_kPa for layer in self.layers)]
         shown = " / ".join(f"{cohesion / pressure[1]:.4g}" for cohesion in cohesions)
         water = self.water_table_m

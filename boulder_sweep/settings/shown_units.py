@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from fractions import Fraction
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from boulder_sweep.columns import BY_NAME, column_spec
 from boulder_sweep.settings.units import factor, name_suffix
@@ -24,6 +27,14 @@ _SHOWN: dict[str, tuple[str, str]] = {
     "m/s^2": ("m/s^2", "ft/s^2"),
 }
 KILONEWTONS_PER_KIP = 4.4482216152605
+
+
+_INCH_M = Fraction(254, 10_000)
+
+
+def system_of(length_m: Fraction | float) -> str:
+    """Return the system of a unit of length by its size [m]: whole inches are US customary."""
+    return SYSTEMS[Fraction(length_m) % _INCH_M == 0]
 
 
 class ShownUnit(NamedTuple):
@@ -89,6 +100,15 @@ def shown_unit(unit: str, system: str) -> ShownUnit:
     return ShownUnit(shown, float(factor(shown, unit)))
 
 
+def in_unit(values: np.ndarray, size: float) -> np.ndarray:
+    """Return values of the table in a unit of that size, to twelve digits: 9 ft, not 8.999999999999998."""
+    shown = np.asarray(values, dtype=np.float64) / size
+    with np.errstate(divide="ignore", invalid="ignore"):
+        places = 11.0 - np.floor(np.log10(np.abs(shown)))
+    scale = 10.0 ** np.clip(np.nan_to_num(places, nan=0.0, posinf=0.0, neginf=0.0), 0.0, 22.0)  # exact powers of ten
+    return np.round(shown * scale) / scale
+
+
 def number_text(value: float, units: str) -> str:
     """Return an input in five digits; below 10,000 in four in US units, in which few values are round."""
     return f"{value:.{4 if units == 'us' and abs(value) < 1e4 else 5}g}"
@@ -136,7 +156,8 @@ def shown_values(values: Mapping[str, Any], units: str) -> dict[str, Any]:
             shown_by_name[name] = value
             continue
         column = shown_column(name, units)
-        shown_by_name[column.name] = value / column.size if isinstance(value, float) else value
+        is_other = isinstance(value, float) and column.size != 1.0
+        shown_by_name[column.name] = float(in_unit(np.array(value), column.size)) if is_other else value
     return shown_by_name
 
 
@@ -169,4 +190,4 @@ def _shown_setting(value: Any, size: float, units: str) -> Any:
         return {name: one if name in plain else _shown_setting(one, size, units) for name, one in value.items()}
     if isinstance(value, list):
         return [_shown_setting(one, size, units) for one in value]
-    return value / size if isinstance(value, float) else value
+    return float(in_unit(np.array(value), size)) if isinstance(value, float) and size != 1.0 else value

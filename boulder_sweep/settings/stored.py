@@ -124,6 +124,7 @@ class _Settings:
     derived: dict[str, tuple[dict[str, Any], ...]] = field(default_factory=dict)
     allow_unusual: tuple[str, ...] = ()
     report: dict[str, str] = field(default_factory=dict)
+    units: Literal["si", "us"] = "si"
 
 
 def check_stored(settings: Any) -> None:

@@ -16,6 +16,7 @@ from boulder_sweep.settings.distributions import Distribution, SetDistributions
 from boulder_sweep.settings.fields import ALLOW_UNUSUAL, BY_NAME, HELD, INPUTS
 from boulder_sweep.settings.model import CLOSED_FORM, Criterion, Model, SolverSettings
 from boulder_sweep.settings.problems import Problem
+from boulder_sweep.settings.shown_units import SYSTEMS
 from boulder_sweep.settings.soil_readings import soil_words
 from boulder_sweep.settings.values import is_unusual
 from boulder_sweep.settings.vehicle import APPROACH, approach_words
@@ -30,6 +31,10 @@ IMPACT_HEIGHT_RULE = "Eq 9: (min(boulder_height - embedment_depth, hood_height) 
 
 SECTION = "report"
 """Block of the file that holds the heading."""
+UNITS = "units"
+"""Entry of the file that says in which units results are shown."""
+SHOWN = (SECTION, UNITS)
+"""Entries on which no row depends."""
 MOST_CHARACTERS = 200
 """Longest entry of a heading."""
 
@@ -106,11 +111,14 @@ class DesignList:
         Values by column name.
     labels : dict of str to Label
         Text columns that are carried into the result.
+    units : str
+        ``us`` where the column of the height is in feet or inches, else ``si``.
     """
 
     file: str
     columns: dict[str, np.ndarray]
     labels: dict[str, Label] = field(default_factory=dict)
+    units: str = SYSTEMS[0]
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
@@ -156,6 +164,8 @@ class Sweep:
         Project, client, author and date for the heading of a report.
     derived : dict of str to Any
         What inputs were worked out of, by the key of the file: the run-up that gives a speed.
+    units : str
+        In which results are shown, ``si`` or ``us``; rows do not depend on it.
     allowed : tuple of str
         Dotted keys whose values may be far from usual; a listed design with another such value cannot be computed. A
         sweep that no file describes may take any.
@@ -180,6 +190,7 @@ class Sweep:
     overrides: tuple[str, ...] = ()
     heading: Heading = NO_HEADING
     derived: dict[str, Any] = field(default_factory=dict)
+    units: str = SYSTEMS[0]
     allowed: tuple[str, ...] = HELD
 
     @cached_property
@@ -291,6 +302,7 @@ class Sweep:
                 "horizon_s": self.solver.horizon_s,
             },
             **({SECTION: given} if (given := self.heading.given()) else {}),
+            **({UNITS: self.units} if self.units != SYSTEMS[0] else {}),
         }
 
     def _inputs(self) -> dict[str, Any]:
@@ -304,6 +316,11 @@ class Sweep:
             for name in named
             if name in varying or name in self.constants
         }
+
+
+def units_in(settings: dict[str, Any]) -> str:
+    """Return `Sweep.units` by what `Sweep.resolved` returned."""
+    return str(settings.get(UNITS, SYSTEMS[0]))
 
 
 def allowed_in(settings: dict[str, Any]) -> tuple[str, ...]:

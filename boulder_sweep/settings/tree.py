@@ -57,11 +57,16 @@ _PLAIN_WORDS = (
 
 @dataclass(slots=True)
 class Scalar:
-    """One piece of text. `quoted` says whether it stood in quotation marks."""
+    """One piece of text.
+
+    `quoted` says whether it stood in quotation marks, `needs_unit` whether a number with a dimension must have its unit
+    here.
+    """
 
     position: Position
     text: str
     quoted: bool = False
+    needs_unit: bool = False
 
 
 @dataclass(slots=True)

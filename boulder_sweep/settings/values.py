@@ -36,6 +36,8 @@ MAX_AXIS = 1_000_000
 OUTSIDE = "{value} is outside the admitted range of {low} to {high} ({reason})"
 """Why a value is not admitted; the page of a report says the same."""
 
+WITHOUT_UNIT = ("1", "deg")
+"""Units of the table in which a bare number is meant where units are asked for."""
 RANGE_KEYS = ("from", "to", "count", "step")
 _TEXT_LIST = re.compile(r"\s*\[([^\[\]]*)\]\s*([^\[\],]*)", re.DOTALL)
 
@@ -400,6 +402,9 @@ def read_quantity(node: Node, unit: str, outer_unit: Scalar | None = None, sampl
                     "give one of them"
                 )
             unit_text = outer_unit.text
+        if node.needs_unit and not unit_text and unit not in WITHOUT_UNIT:
+            meant = f"{node.text.strip()} {shown_unit(unit, 'us').unit}"
+            raise NumberError(f"{quoted(node)} has no unit, and 'units: us' asks for one; did you mean {meant}?")
         value = number * factor(unit_text, unit) if unit_text else number
         return Quantity(value, " ".join(unit_text.split()))
     except (NumberError, UnitError) as error:

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from boulder_sweep.settings.problems import shorten
-from boulder_sweep.settings.sweep import SECTION
+from boulder_sweep.settings.sweep import SHOWN
 
 PREFIX = "boulder_sweep."
 """Prefix of this package's entries in the metadata of a file."""
@@ -60,7 +60,7 @@ def sha256_of(content: Any) -> str:
 
 def settings_sha256(settings: Mapping[str, Any]) -> str:
     """SHA-256 of resolved settings without the heading of reports, on which no row depends."""
-    return sha256_of({key: value for key, value in settings.items() if key != SECTION})
+    return sha256_of({key: value for key, value in settings.items() if key not in SHOWN})
 
 
 def identity(
@@ -106,7 +106,7 @@ def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
     """List the entries in which two identities differ, one line each; hashes only where nothing else explains them."""
     before, after = _flat(there), _flat(here)
     changed = [key for key in {**before, **after} if before.get(key, _ABSENT) != after.get(key, _ABSENT)]
-    changed = [key for key in changed if not key.startswith(f"settings.{SECTION}.")]
+    changed = [key for key in changed if key.split(".")[:2] not in [["settings", name] for name in SHOWN]]
     telling = [key for key in changed if not key.endswith("_sha256")]
     if any(key.startswith("settings.") for key in telling):
         changed = [key for key in changed if key != "settings_sha256"]

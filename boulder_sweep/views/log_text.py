@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from boulder_sweep.settings.shown_units import SYSTEMS, shown_unit
 from boulder_sweep.settings.soil_readings import log_title, shown_readings, strength
 from boulder_sweep.text import counted
 
@@ -12,7 +13,7 @@ MOST_ROWS = 18
 _BAR = 24
 
 
-def log_lines(data: dict[str, Any]) -> list[str]:
+def log_lines(data: dict[str, Any], units: str = SYSTEMS[0]) -> list[str]:
     """Return a log as lines of plain characters, none longer than 80.
 
     Parameters
@@ -20,22 +21,25 @@ def log_lines(data: dict[str, Any]) -> list[str]:
     data
         One of ``derived["soil"]`` of `boulder_sweep.settings.Sweep.derived`, made of a log. Readings below the first
         one under the deepest foot are counted only, and of many the weaker ones stand for their neighbours.
+    units
+        In which depths are shown, ``si`` or ``us``.
     """
+    length, metres = shown_unit("m", units)
     shown = shown_readings(data)
     each = -(-len(shown) // MOST_ROWS)
     rows = [min(shown[at : at + each], key=strength) for at in range(0, len(shown), each)]
     most = max(*map(strength, rows), 1e-9)
-    marks = [(one["depth_m"], 1, _row(one, most)) for one in rows]
+    marks = [(one["depth_m"], 1, f"{one['depth_m'] / metres:>9.2f} {_row(one, most)}") for one in rows]
     for at, layer in enumerate(data.get("layers", ())):
-        marks.append(
-            (layer["from_m"], 0, f"--- from {layer['from_m']:.3g} m: {layer_words(data, layer, at)} ".ljust(78, "-"))
-        )
+        words = f"--- from {layer['from_m'] / metres:.3g} {length}: {layer_words(data, layer, at)} "
+        marks.append((layer["from_m"], 0, words.ljust(78, "-")))
     if "foot_m" in data:
-        marks.append((data["foot_m"], 2, f"=== deepest foot of a boulder, {data['foot_m']:.4g} m ".ljust(78, "=")))
+        words = f"=== deepest foot of a boulder, {data['foot_m'] / metres:.4g} {length} "
+        marks.append((data["foot_m"], 2, words.ljust(78, "=")))
     left = len(data["readings"]) - len(shown)
     return [
         log_title(data),
-        f"{'depth [m]':>9} {quantity(data):>9} {'angle [deg]':>11}",
+        f"{f'depth [{length}]':>9} {quantity(data):>9} {'angle [deg]':>11}",
         *(line for *_, line in sorted(marks)),
         *([f"{counted(left, 'deeper reading')} left out"] if left else []),
     ]
@@ -51,7 +55,7 @@ def _row(reading: dict[str, Any], most: float) -> str:
     angle = f"{reading['friction_angle_deg']:.1f}" if "friction_angle_deg" in reading else "-"
     bar = "#" * max(1, round(_BAR * strength(reading) / most))
     why = f"  left out: {reading['left_out']}" if "left_out" in reading else ""
-    return f"{reading['depth_m']:>9.2f} {value:>9} {angle:>11}  {bar}{why}"
+    return f"{value:>9} {angle:>11}  {bar}{why}"
 
 
 def layer_words(data: dict[str, Any], layer: dict[str, Any], at: int) -> str:

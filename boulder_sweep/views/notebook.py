@@ -14,6 +14,6 @@ if TYPE_CHECKING:
 
 def need_html(need: Need) -> str:
     """Return the recommendation and the table of a screen as HTML."""
-    sentences = "".join(f"<p>{escape(words)}</p>" for words in advice(need))
-    table = "\n".join(screen_lines(need))
+    sentences = "".join(f"<p>{escape(words)}</p>" for words in advice(need, need.sweep.units))
+    table = "\n".join(screen_lines(need, need.sweep.units))
     return f"<div>{sentences}<pre>{escape(table)}</pre></div>"
