@@ -10,7 +10,7 @@ from pathlib import Path
 
 import click
 
-from boulder_sweep.cli.output import show
+from boulder_sweep.cli.output import show, wrap
 
 _EXTRA = re.compile(r"extra == ['\"](\w+)['\"]")
 PACKAGE = Path(__file__).parents[1]
@@ -23,8 +23,8 @@ def doctor() -> int:
     """Print versions, extras, browser, compiled kernels and folders of this installation."""
     temporary = os.environ.get("TMPDIR", "/tmp")
     rows = [*_packages(), ("PDF", _browser()), ("kernels", _kernels()), ("temporary files", f"in {temporary}")]
-    width = max(len(name) for name, _ in rows)
-    show(*(f"{name:{width}}  {text}" for name, text in rows))
+    for name, text in rows:
+        show(*wrap(f"{name}: {text}"))
     return 0
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 
 from boulder_sweep.cli.options import SYSTEMS, OutputPath, grid_argument, load_sweep, set_option
-from boulder_sweep.cli.output import say, show
+from boulder_sweep.cli.output import say, show, wrap
 
 NEW_EXAMPLES = """\b
 Examples:
@@ -77,9 +77,8 @@ def examples(folder: Path) -> int:
         shutil.copytree(source, folder)
     except FileExistsError:
         raise ExistingFileError(f"{folder} exists already; name another folder") from None
-    files = sorted(folder.glob("*.yaml"))
-    width = max(len(str(file)) for file in files)
-    show(*(f"{file!s:{width}}  {_question_of(file)}" for file in files))
+    for file in sorted(folder.glob("*.yaml")):
+        show(*wrap(f"{file}: {_question_of(file)}"))
     return 0
 
 

@@ -17,9 +17,11 @@ def test_examples_are_the_files_that_the_documentation_names(sweep, tmp_path, mo
     assert code == 0
     copied = {path.name: path.read_bytes() for path in Path("configs").iterdir()}
     assert copied == {path.name: path.read_bytes() for path in CONFIGS.iterdir()}
-    listed = [line.split("  ", 1) for line in out.splitlines()]
-    assert [name for name, _ in listed] == [f"configs/{path.name}" for path in sorted(CONFIGS.glob("*.yaml"))]
-    assert all(len(question.strip()) > 20 for _, question in listed)
+    listed = dict(line.split(": ", 1) for line in out.replace("\n  ", " ").splitlines())
+    assert [*listed] == [f"configs/{path.name}" for path in sorted(CONFIGS.glob("*.yaml"))]
+    assert listed["configs/wet_backfill.yaml"] == (
+        "A car park at the waterfront: loose sand with water three feet down, US units throughout."
+    )
 
 
 def test_examples_replace_nothing(sweep, tmp_path):
@@ -34,7 +36,7 @@ def test_examples_replace_nothing(sweep, tmp_path):
 def test_doctor_names_versions_and_folders(sweep):
     code, out, _ = sweep("doctor")
     assert code == 0
-    rows = dict(line.split("  ", 1) for line in out.splitlines())
+    rows = dict(line.split(": ", 1) for line in out.replace("\n  ", " ").splitlines())
     assert [*rows][:3] == ["boulder-sweep", "Python", "packages"]
     assert {"plot", "report", "query", "scan", "dask", "s3", "PDF", "kernels"} <= {*rows}
     assert {"all", "site", "dev"}.isdisjoint(rows)
@@ -54,6 +56,6 @@ def test_doctor_says_how_to_install_what_is_missing(sweep, monkeypatch, package,
     monkeypatch.setattr(doctor, "version", without)
     code, out, _ = sweep("doctor")
     assert code == 0
-    row = next(line for line in out.splitlines() if line.startswith(extra))
+    row = next(line for line in out.replace("\n  ", " ").splitlines() if line.startswith(extra))
     assert f"{package} missing" in row
     assert row.endswith(f"in a clone of boulder-sweep, pip install '.[{extra}]'")

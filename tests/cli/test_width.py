@@ -21,6 +21,8 @@ WORDS = {
     "uncertainty": (CONFIGS / "uncertain_site.yaml", "--half-width", "0.2", *US),
     "capacity": (SITE, *US),
     "simulate": (SITE, "--design", "11"),
+    "examples": ("configs",),
+    "doctor": (),
     "explore": (SITE, "-o", "page.html"),
     "plot": ("site.sweep",),
     "report": ("site.sweep",),
