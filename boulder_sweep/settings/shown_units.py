@@ -101,10 +101,10 @@ def shown_unit(unit: str, system: str) -> ShownUnit:
 
 
 def in_unit(values: np.ndarray, size: float) -> np.ndarray:
-    """Return values of the table in a unit of that size, to twelve digits: 9 ft, not 8.999999999999998."""
+    """Return values of the table in a unit of that size, to fourteen digits: 9 ft, not 8.999999999999998."""
     shown = np.asarray(values, dtype=np.float64) / size
     with np.errstate(divide="ignore", invalid="ignore"):
-        places = 11.0 - np.floor(np.log10(np.abs(shown)))
+        places = 13.0 - np.floor(np.log10(np.abs(shown)))
     scale = 10.0 ** np.clip(np.nan_to_num(places, nan=0.0, posinf=0.0, neginf=0.0), 0.0, 22.0)  # exact powers of ten
     return np.round(shown * scale) / scale
 
@@ -175,6 +175,9 @@ def shown_settings(settings: Mapping[str, Any], units: str) -> dict[str, Any]:
         return dict(settings)
     shown_by_name = {}
     for name, value in settings.items():
+        if name == "order" and isinstance(value, list):
+            shown_by_name[name] = [shown_column(one, units).name if one in BY_NAME else one for one in value]
+            continue
         unit = max((unit for unit in _SHOWN if name.endswith(name_suffix(unit))), key=len, default="")
         shown = shown_as(name, unit, "", units)
         shown_by_name[shown.name] = _shown_setting(value, shown.size, units)

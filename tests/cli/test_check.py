@@ -83,7 +83,7 @@ def test_uncertain_inputs_are_listed(sweep, grid):
     code, out, _ = sweep("check", grid)
     assert code == 0
     words = [" ".join(line.split()) for line in out.splitlines()]
-    assert "friction_angle_deg uncertain normal, sd 3.0 deg, mean 38" in words
+    assert "friction_angle_deg uncertain normal, sd 3 deg, mean 38" in words
     assert "subgrade_reaction_MN_m3 uncertain lognormal, cov 30 %" in words
 
 

@@ -86,8 +86,8 @@ def test_values_are_shown_in_us_units_where_asked(sweep, possible_grid):
     code, out, _ = sweep("simulate", possible_grid, "--design", 1, "--json", "-q", "--units", "us")
     us = json.loads(out)
     assert code == 0
-    assert us["max_displacement_ft"] == metric["max_displacement_m"] / 0.3048
-    assert us["peak_force_kip"] == metric["peak_force_kN"] / 4.4482216152605
+    assert us["max_displacement_ft"] == pytest.approx(metric["max_displacement_m"] / 0.3048, rel=1e-13)
+    assert us["peak_force_kip"] == pytest.approx(metric["peak_force_kN"] / 4.4482216152605, rel=1e-13)
     assert us["max_rotation_deg"] == metric["max_rotation_deg"]
     assert us["verdict"] == metric["verdict"]
     sweep("run", possible_grid, "-q")
@@ -95,7 +95,7 @@ def test_values_are_shown_in_us_units_where_asked(sweep, possible_grid):
     metric = json.loads(sweep("simulate", "small-grid.sweep", "--json")[1])
     us = json.loads(sweep("simulate", "small-grid.sweep", "--json", "--units", "us")[1])
     assert us["impact_speed_mph"] == pytest.approx(30.0)
-    assert us["max_displacement_ft"] == metric["max_displacement_m"] / 0.3048
+    assert us["max_displacement_ft"] == pytest.approx(metric["max_displacement_m"] / 0.3048, rel=1e-13)
     assert "max_displacement_m" not in us
     sweep("run", possible_grid, "-o", "again.sweep", "-q")
     code, out, err = sweep("compare", "small-grid.sweep", "again.sweep", "--json", "--units", "us")

@@ -32,10 +32,10 @@ def test_what_is_read(tmp_path) -> None:
     assert (ground.cohesion_kPa, ground.water_table_m) == (4.0, 0.8)
     assert ground.slope_deg == pytest.approx(5.7296, abs=1e-4)
     assert sweep.n_designs == 2
-    assert ground.words == (
+    words = (
         "2 layers of soil, cohesion 4 / 2 kPa, water table 0.8 m down, ground falling by 5.72958° behind the boulder"
     )
-    assert grid_lines(sweep)[-1] == f"  {ground.words}"
+    assert grid_lines(sweep)[-1] == f"  {words}"
     assert Ground.of_dict(sweep.resolved()["model"]["ground"]) == ground
 
 

@@ -30,6 +30,7 @@ IN_FILE = (
     "soil.water_table=0.8 m",
     "soil.slope=10 deg",
 )
+UNITS = (("m", 1.0), ("kPa", 1.0))
 
 
 def table_of(phi_deg: float = 42.0) -> DesignTable:
@@ -132,7 +133,7 @@ def check_layers(folder: Path, name: str, *more: str) -> None:
     boulder_sweep.run(sweep, folder / name)
     found = recompute(folder / name, 0)
     assert found.unequal == ()
-    assert "3 layers of soil, cohesion 4 / 2 / 0 kPa" in found.sweep.model.ground.words
+    assert "3 layers of soil, cohesion 4 / 2 / 0 kPa" in found.sweep.model.ground.words_in(*UNITS)
     history = boulder_sweep.simulate(sweep)
     assert history.summary()["max_rotation_deg"] >= found.stored["max_rotation_deg"]
     assert history.energy().largest_residual < 1e-6
