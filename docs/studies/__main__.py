@@ -7,7 +7,6 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from docs.studies import stamps
 from docs.studies.contents import CONTENTS, compute
 from docs.studies.documents import differences, write
 from docs.studies.example_pulse import example_pulse
@@ -37,7 +36,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if asked.blocks:
         computed = compute(root, asked.blocks)
         if asked.write:
-            stamps.write(root, CONTENTS, computed)
             print("\n".join(str(path) for path in write(root, computed, CONTENTS)) or "nothing changed")
         else:
             print("\n\n".join(computed.values()))
@@ -53,7 +51,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         (root / path).parent.mkdir(parents=True, exist_ok=True)
         (root / path).write_text(text(), encoding="utf-8")
     changed = write(root, compute(root))
-    stamps.write(root, CONTENTS, CONTENTS)
     if not asked.no_pictures:
         changed += draw_all(root)
     print("\n".join(str(path) for path in changed) or "nothing changed")
