@@ -47,5 +47,3 @@ def test_the_curve_of_api_at_thirty_degrees() -> None:
 def test_drag_grows_with_the_square_of_the_speed() -> None:
     assert drag_share(10.0) == pytest.approx(4.0 * drag_share(5.0))
     assert drag_share(13.4) == pytest.approx(0.141, abs=1e-3)
-
-
