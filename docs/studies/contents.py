@@ -128,6 +128,6 @@ CONTENTS: dict[str, Callable[[Path], str | Table]] = {
 LONG = {
     *("readings-crash-tests", "readings-grid", "readings-words", "coverage", "box-shares", "front-face"),
     *(name for name in CONTENTS if name.startswith("forms-")),
-    *("grades", "wild-families", "partial-factors", "stone-site"),
+    *("grades", "wild-families", "partial-factors", "stone-shapes", "stone-site"),
 }
 """Blocks that take more than ten seconds, or share what does: computed again every night, not with every change."""
