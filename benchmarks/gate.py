@@ -32,7 +32,6 @@ from boulder_sweep.judge.accuracy import STEPS
 
 from .designs import HORIZON, ROTATION_LIMIT, sample
 from .report import FOLDER
-from .sweep import settings_of
 from .timing import cpu_seconds, machine
 
 LIMITS = FOLDER / "gate.toml"
@@ -40,8 +39,20 @@ ROUNDS = 9
 ROWS = 4096
 COUNTED_ROWS = 64
 """Designs that are simulated with the compiler off."""
-RUN_ROWS = 1000
-"""Designs of the small run."""
+RUN = """
+name: benchmark
+boulder: {length: 1.3 m, width: {from: 0.8 m, to: 2.5 m, count: 10}, height: {from: 1.5 m, to: 4.0 m, count: 10},
+          density: 2650 kg/m^3}
+site: {embedment_ratio: {from: 0.35, to: 0.75, count: 10}}
+soil: {density: 1880 kg/m^3, friction_angle: 40 deg, subgrade_reaction: 85.125 MN/m^3, strain_rate_factor: 1.1}
+vehicle:
+  {mass: 6800 kg, speed: 13.4 m/s, spring: 3103.3 kN/m, damper: 138.91 kN*s/m,
+    bumper_height: 0.5 m, hood_height: 1.4 m, bed_offset: 2.9 m}
+criterion: {max_rotation: 20 deg, rating: P1}
+model: {readings: corrected, soil: closed_form}
+solver: {accuracy: balanced, horizon: 1 s}
+"""
+"""Settings of the small run: a grid of 1000 designs."""
 COUNTED = ("closed_form", "step", "follow")
 """Kernels whose calls are counted one by one, beside those of all."""
 PREPARING = "interruptible work"
@@ -196,7 +207,7 @@ def designs_of_run() -> int:
 
     with tempfile.TemporaryDirectory(prefix="sweep-gate-") as name:
         file = Path(name, "gate.yaml")
-        file.write_text(settings_of(RUN_ROWS))
+        file.write_text(RUN)
         run(boulder_sweep.load(file), Path(name, "table"), jobs=2, simulate=simulate)
     return sum(simulated)
 

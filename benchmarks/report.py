@@ -1,10 +1,9 @@
-"""Results as tables: printed, kept as JSON, and written into the README between its markers."""
+"""Results as tables: printed, and written into the README between its markers."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 
 FOLDER = Path(__file__).parent
@@ -49,16 +48,6 @@ class Table:
 
 def _row(cells: Sequence[str]) -> str:
     return "| " + " | ".join(cells) + " |"
-
-
-def as_json(tables: Sequence[Table]) -> str:
-    """Return tables as JSON, for another process."""
-    return json.dumps([asdict(table) for table in tables])
-
-
-def from_json(text: str) -> list[Table]:
-    """Return the tables of `as_json`."""
-    return [Table(**table) for table in json.loads(text)]
 
 
 def write_between_markers(tables: Sequence[Table], readme: Path = README) -> None:

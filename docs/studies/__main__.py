@@ -7,18 +7,15 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from docs.studies import stamps
 from docs.studies.contents import CONTENTS, compute
 from docs.studies.documents import differences, write
 from docs.studies.example_pulse import example_pulse
 from docs.studies.example_rock import example_rock
-from docs.studies.json_schema import FILE as SCHEMA
-from docs.studies.json_schema import text as schema_text
 from docs.studies.pictures import draw_all
 
 PULSE = Path("docs/examples/rigid_wall_pulse.csv")
 ROCK = Path("docs/examples/rock.ply")
-WRITTEN = {PULSE: example_pulse, ROCK: example_rock, SCHEMA: schema_text}
+WRITTEN = {PULSE: example_pulse, ROCK: example_rock}
 """Whole files, and what writes them."""
 
 
@@ -39,7 +36,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if asked.blocks:
         computed = compute(root, asked.blocks)
         if asked.write:
-            stamps.write(root, CONTENTS, computed)
             print("\n".join(str(path) for path in write(root, computed, CONTENTS)) or "nothing changed")
         else:
             print("\n\n".join(computed.values()))
@@ -55,7 +51,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         (root / path).parent.mkdir(parents=True, exist_ok=True)
         (root / path).write_text(text(), encoding="utf-8")
     changed = write(root, compute(root))
-    stamps.write(root, CONTENTS, CONTENTS)
     if not asked.no_pictures:
         changed += draw_all(root)
     print("\n".join(str(path) for path in changed) or "nothing changed")

@@ -118,6 +118,12 @@ def coverages(tables: dict[str, DesignTable]) -> Iterator[Coverage]:
                 yield _compared(designs, preset, accuracy, steps, steps_s, found, known)
 
 
+def documented(grid: Path) -> Table:
+    """Return the table of the documentation: random designs, and those of a grid."""
+    tables = {"random": random_table(16_384, 1), "M30 grid": grid_table(grid, 8192)}
+    return coverage_table([c for c in coverages(tables) if c.accuracy != "a number" or c.steps == NUMBERS[1]])
+
+
 def coverage_table(found: list[Coverage]) -> Table:
     """Return the entries as a table; a star marks steps that end where the soil yields."""
     head: tuple[str, ...] = ("designs", "readings", "accuracy", "steps [ms]", "rotation covered", "largest miss [°]")

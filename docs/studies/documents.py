@@ -101,3 +101,8 @@ def _renewed(match: re.Match[str], computed: Mapping[str, str], others: Collecti
     if name not in computed or not drift(match["text"], computed[name]):
         return match[0]  # rounding alone is no reason to change a page
     return f"<!-- {name} -->\n{computed[name].strip()}\n<!-- end -->"
+
+
+def points(*texts: str) -> str:
+    """Return texts as a list."""
+    return "\n".join(f"- {text}" for text in texts)

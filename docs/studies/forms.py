@@ -137,16 +137,6 @@ def grids_words(grid: Path, count: int = DRAWN) -> str:
     )
 
 
-def bases_table(grid: Path, count: int = DRAWN) -> Table:
-    """Return the share of a grid's passes that are robust, and that stand under vertical motion alone, by constants."""
-    evaluation, (passes, _) = grid_evaluation(grid), drawn_of_grid(grid, SPEEDS["M30"], count)
-    table = Table(("constants", "robust", "stand with vertical motion alone"))
-    for words, base in BASES.items():
-        alone = passing(passes, PAPER, evaluation, RISING, base)
-        table.add(words, f"{robust(passes, evaluation, base).mean():.0%}", f"{alone.mean():.0%}")
-    return table
-
-
 def tests_table(grid: Path) -> Table:
     """Return the crash tests with friction and vertical motion, by law and by constants."""
     table = Table(("test", "constants", *(f"`{law}`" for law in RESISTANCES)))

@@ -36,12 +36,10 @@ class Site:
         """Return its settings file in the folder of the repository."""
         return root / "configs" / f"{self.name}.yaml"
 
-
-def words_of(root: Path, name: str) -> str:
-    """Return the answer to the site of a name in two sentences."""
-    (site,) = (own for own in SITES if own.name == name)
-    with tempfile.TemporaryDirectory() as scratch:
-        return site.answer(site.settings(root), Path(scratch) / "picture.png")
+    def words(self, root: Path) -> str:
+        """Return the answer in two sentences."""
+        with tempfile.TemporaryDirectory() as scratch:
+            return self.answer(self.settings(root), Path(scratch) / "picture.png")
 
 
 def embassy_street(file: Path, picture: Path) -> str:

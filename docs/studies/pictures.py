@@ -18,12 +18,9 @@ from boulder_sweep.views.crash_curves import FIGURES, draw_convergence, draw_cra
 from boulder_sweep.views.verdict_map import draw_verdict_map
 from boulder_sweep.views.wording import terms_line
 from docs.studies.answers import SITE
-from docs.studies.contents import EVERY, GRID
+from docs.studies.contents import GRID
 from docs.studies.example_pulse import example_pulse
 from docs.studies.gallery import draw_sites
-from docs.studies.knife_edge import draw_knife_edge
-from docs.studies.readings import readings_study
-from docs.studies.readings_plot import draw_readings
 from docs.studies.shapes import draw_shapes
 from docs.studies.stones import example_stone
 
@@ -62,9 +59,7 @@ def draw_all(root: Path) -> list[Path]:
     draw_convergence(found.convergence, named("convergence.png"))
     for test, (_, name) in FIGURES.items():
         draw_crash_test(test, {p: t for (own, p), t in found.trajectories.items() if own == test}, named(name))
-    draw_readings(readings_study(root / GRID, EVERY), named("readings.png"))
     need(load(root / SITE)).plot(named("design_chart.png"))
-    draw_knife_edge(named("knife_edge.png"))
     example_stone(root).plot(named("stone.png"))
     draw_shapes(named("shapes.png"))
     with tempfile.TemporaryDirectory() as scratch:

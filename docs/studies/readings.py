@@ -18,6 +18,7 @@ from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.judged import HORIZON, PASS
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.model import PRESETS, PRINTED, SWITCHES, ReadingChoice
+from docs.studies.documents import points
 
 BLOCK = 32_768
 EQUATIONS = {
@@ -217,3 +218,52 @@ def standing(sweep: Sweep, choice: ReadingChoice, every: int = 1) -> np.ndarray:
 
 def _verdict(verdict: str, reason: str) -> str:
     return f"{verdict}, {reason}" if reason else verdict
+
+
+def readings_words(study: ReadingsStudy) -> str:
+    """What the readings study shows."""
+    printed, corrected = study.row("as_printed"), study.row("corrected")
+    deciding = study.deciding()
+    (most, changes), (second, second_changes), (least, least_changes) = deciding[0], deciding[1], deciding[-1]
+    gained, _ = study.changed(study.row("corrected", most))
+    return points(
+        f"**`{most}` decides most verdicts.** Read as printed, everything else corrected, it changes "
+        f"{changes / study.designs:.1%} of {study.designs:,} designs between standing and not, {gained / changes:.0%} "
+        f"of them to standing. `{second}` comes next with {second_changes / study.designs:.1%}; `{least}` is the least "
+        f"with {least_changes / study.designs:.1%}.",
+        _arm_words(study),
+        _preset_words(printed, corrected, study.designs),
+        _strictness_words(study),
+    )
+
+
+def _arm_words(study: ReadingsStudy) -> str:
+    """What the sign of one length does to the test that passed."""
+    before = study.row("as_printed").rwg_rotation_deg
+    after = study.row("as_printed", "impact_arm").rwg_rotation_deg
+    return (
+        f"On the crash test that passed, the sign of d₁ alone (`impact_arm: geometric` in place of printed) moves the "
+        f"largest rotation from {before:.2f}° to {after:.2f}°, {after / before:.1f} times as far."
+    )
+
+
+def _preset_words(printed: ReadingRow, corrected: ReadingRow, designs: int) -> str:
+    """How far the presets agree."""
+    unsafe = int((printed.stands & ~corrected.stands).sum())
+    lost = int((corrected.stands & ~printed.stands).sum())
+    return (
+        f"About as many designs stand by both presets, {printed.share:.1%} as printed and {corrected.share:.1%} "
+        f"corrected, because the misprints partly cancel; but they are not the same designs. {unsafe / designs:.1%} "
+        f"of all stand as printed and not corrected, {lost / designs:.1%} corrected and not as printed."
+    )
+
+
+def _strictness_words(study: ReadingsStudy) -> str:
+    """Which misprints are on the safe side."""
+    rows = {switch: study.changed(study.row("corrected", switch)) for switch in SWITCHES}
+    safe = [f"`{switch}`" for switch, (gained, _) in rows.items() if gained == 0]
+    lax = [f"`{switch}`" for switch, (gained, lost) in rows.items() if gained > lost]
+    return (
+        f"Seen from `corrected`, with the printed reading only fewer designs stand for {', '.join(safe) or 'none'}; "
+        f"more stand than fall for {', '.join(lax) or 'none'}: the unsafe side."
+    )

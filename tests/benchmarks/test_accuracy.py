@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 import boulder_kernels as bk
-from benchmarks.accuracy import reference_of
+from benchmarks.accuracy import Peaks, Point, named_control, observed_order, point_of, reference_of, wrong_verdicts
 from benchmarks.designs import sample
-from benchmarks.named import named_control, wrong_verdicts
-from benchmarks.points import Peaks, Point, observed_order, point_of
 from boulder_sweep.judge.accuracy import STEPS
 
 

@@ -4,8 +4,6 @@ import numpy as np
 
 import boulder_kernels as bk
 from benchmarks.designs import API, API_ANGLES, ROTATION_LIMIT, TERZAGHI, first, sample
-from benchmarks.sweep import settings_of
-from boulder_sweep.settings import load
 
 
 def test_rows_do_not_depend_on_the_count() -> None:
@@ -27,10 +25,3 @@ def test_truck_meets_every_boulder() -> None:
     out = bk.simulate_table(designs, bk.corrected(), bk.Control(0.008, 1.0, ROTATION_LIMIT, 0, False))
     assert set(out.status) <= set(bk.SIMULATED)
     assert 0.05 < np.mean(out.status == bk.Status.LIMIT) < 0.95
-
-
-def test_grids_of_the_sweep_have_the_rows_they_say(tmp_path) -> None:
-    path = tmp_path / "grid.yaml"
-    for rows in (10, 10_000, 10_000_000):
-        path.write_text(settings_of(rows))
-        assert load(path).n_designs == rows

@@ -1,4 +1,4 @@
-"""The independent integration of `benchmarks.late` against the oracle, and how it is counted."""
+"""Shallow boulders against an independent integration: what is drawn, and how it is counted."""
 
 from __future__ import annotations
 
@@ -6,34 +6,8 @@ import math
 
 import numpy as np
 import pandas as pd
-import pytest
 
 from benchmarks import late
-from tests.oracle.dynamics import Modes, problem, rate
-from tests.oracle.inputs import Inputs, Readings
-
-
-def compiled_inputs() -> late.Inputs:
-    return late.Inputs(1.5, 1.2, 2.4, 2600.0, 0.6, 0.9, 1900.0, 0.65, 45e6, 1.1, 5000.0, 9.0, 2.5e6, 1.6e5)
-
-
-@pytest.mark.parametrize("turning", [late.HELD, late.CLOCKWISE, late.ANTICLOCKWISE])
-@pytest.mark.parametrize("touching", [True, False])
-def test_its_rates_are_those_of_the_oracle(turning: int, touching: bool) -> None:
-    i = compiled_inputs()
-    oracle = problem(
-        Inputs(**{**i._asdict(), "beta": i.beta / 1e6}),
-        Readings(),
-    )
-    rng = np.random.default_rng(3)
-    words = {late.HELD: "held", late.CLOCKWISE: "clockwise", late.ANTICLOCKWISE: "anticlockwise"}
-    modes = Modes(words[turning], "touching" if touching else "coasting")
-    for _ in range(20):
-        y = rng.normal(size=7) * [0.02, 1.0, 0.05, 1.0, 0.3, 3.0, 30.0]
-        y[6] = -abs(y[6])
-        expected = rate(oracle, y, modes)
-        found, _ = late.rate.py_func(late.State(*y), turning, touching, i, late.body_of.py_func(i))
-        assert np.allclose(found, expected, rtol=1e-9, atol=1e-9)
 
 
 def table(*rows: tuple[str, str]) -> pd.DataFrame:

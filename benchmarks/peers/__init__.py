@@ -1,1 +1,0 @@
-"""Other solvers on the same impacts, at the same accuracy, timed in the same process as the kernels."""
