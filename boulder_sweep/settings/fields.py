@@ -1,7 +1,7 @@
 """Every entry of a settings file in one register: key, unit, admitted and usual values, default.
 
 Inputs are declared here, settings on the attributes of the dataclasses of `boulder_sweep.settings.model`. The reader,
-the checks and the tables of the documentation follow from both. Name, unit and meaning of
+the checks, the tables of the documentation and the JSON Schema for editors follow from both. Name, unit and meaning of
 an input that is a column of the result come from the register of columns. Options of commands may call an entry by its
 path, its key or its column: see `named`.
 

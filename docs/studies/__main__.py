@@ -11,11 +11,13 @@ from docs.studies.contents import CONTENTS, compute
 from docs.studies.documents import differences, write
 from docs.studies.example_pulse import example_pulse
 from docs.studies.example_rock import example_rock
+from docs.studies.json_schema import FILE as SCHEMA
+from docs.studies.json_schema import text as schema_text
 from docs.studies.pictures import draw_all
 
 PULSE = Path("docs/examples/rigid_wall_pulse.csv")
 ROCK = Path("docs/examples/rock.ply")
-WRITTEN = {PULSE: example_pulse, ROCK: example_rock}
+WRITTEN = {PULSE: example_pulse, ROCK: example_rock, SCHEMA: schema_text}
 """Whole files, and what writes them."""
 
 
