@@ -30,6 +30,7 @@ from boulder_sweep.settings.model import (
     SECOND_OPINIONS,
     SWITCHES,
 )
+from boulder_sweep.settings.shown_units import SYSTEMS
 from boulder_sweep.settings.soil_readings import (
     BLOW_KEYS,
     ENERGY,
@@ -42,7 +43,7 @@ from boulder_sweep.settings.soil_readings import (
     SOIL_KEYS,
     TOPSOIL,
 )
-from boulder_sweep.settings.sweep import SECTION, Heading
+from boulder_sweep.settings.sweep import SECTION, UNITS, Heading
 from boulder_sweep.settings.units import EXPECTED
 from boulder_sweep.settings.values import MAX_AXIS
 from boulder_sweep.settings.vehicle import APPROACH, APPROACH_FIELDS, SPEED
@@ -75,6 +76,7 @@ def schema() -> Schema:
                 "additionalProperties": False,
                 "properties": {key: {"type": ["string", "number"]} for key in Heading._fields},
             },
+            UNITS: {"description": "units in which results are shown", **_words(*SYSTEMS)},
             ALLOW_UNUSUAL: {
                 "description": "entries whose values may be far from usual",
                 "anyOf": [_words(EVERYTHING, *HELD), _list(_words(*HELD))],
