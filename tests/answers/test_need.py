@@ -233,10 +233,7 @@ def test_questions_that_make_no_sense_are_refused(question: dict, message: str) 
             r"12\.001 to 12\.009 m/s, holds no multiple of its",
         ),
         ({"most": "speed", "between": ("12.001 m/s", "12.015 m/s")}, r"holds only one multiple of its step, 0\.01 m/s"),
-        (
-            {"between": ("1.9491 m", "1.9499 m")},
-            r"1\.9491 to 1\.9499 m, holds no multiple of its step, 0\.001 m; give",
-        ),
+        ({"between": ("1.9491 m", "1.9499 m")}, r"1\.9491 to 1\.9499 m, holds no multiple of its step, 0\.001 m; give"),
         ({"least": "embedment_ratio", "between": (0.6101, 0.6109)}, r"0\.6101 to 0\.6109, holds no multiple"),
     ],
 )

@@ -102,9 +102,7 @@ def test_a_file_of_a_result_in_place_of_its_folder(sweep, result):
 
 
 @pytest.mark.parametrize(
-    "words",
-    [["report"], ["plot"], ["export", "-o", "x.xlsx"], ["compare", RESULT]],
-    ids=lambda words: words[0],
+    "words", [["report"], ["plot"], ["export", "-o", "x.xlsx"], ["compare", RESULT]], ids=lambda words: words[0]
 )
 def test_a_settings_file_in_place_of_a_result(sweep, grid, words):
     name = grid.rename("my grid.yaml").name

@@ -25,11 +25,7 @@ def test_json_and_files(sweep, tmp_path):
     code, out, _ = sweep(*words)
     assert code == 0
     assert 0.0 < json.loads(out)["rows"][0]["p_pass"] < 1.0
-    assert {file.name for file in tmp_path.iterdir()} >= {
-        "c.parquet",
-        "c.samples.parquet",
-        "c.png",
-    }
+    assert {file.name for file in tmp_path.iterdir()} >= {"c.parquet", "c.samples.parquet", "c.png"}
 
 
 def test_need_with_a_probability(sweep):

@@ -55,11 +55,7 @@ def test_response_is_that_of_the_oracle(damper: float) -> None:
 
 
 @settings(max_examples=25, deadline=None)
-@given(
-    ratio=st.floats(0.01, 50.0),
-    rate=st.floats(1.0, 100.0),
-    speed=st.floats(0.1, 100.0),
-)
+@given(ratio=st.floats(0.01, 50.0), rate=st.floats(1.0, 100.0), speed=st.floats(0.1, 100.0))
 def test_response_solves_its_equation(ratio: float, rate: float, speed: float) -> None:
     """m v' = -F, and the spring between the wall and the damper, integrated; both branches and what lies between."""
     wall = RigidWall(MASS, speed, MASS * rate**2, ratio * rate * MASS)

@@ -91,10 +91,7 @@ def stand_in(ends: dict[int, tuple[Status, float]], asked: list[float], ways: di
 
 
 def judged_by(
-    folder: Path,
-    ends: dict[int, tuple[Status, float]],
-    asked: list[float],
-    ways: dict[int, float] | None = None,
+    folder: Path, ends: dict[int, tuple[Status, float]], asked: list[float], ways: dict[int, float] | None = None
 ):
     sweep = sweep_of(folder)
     evaluation = replace(evaluation_of(sweep, accuracy_of(sweep)), simulate=stand_in(ends, asked, ways))

@@ -11,13 +11,7 @@ from boulder_kernels import Control, OutcomeTable, Status, corrected
 from boulder_kernels.rules import AGREEING, FIRST_FACTOR
 from boulder_sweep.columns import OUTCOME_COLUMNS, VERDICTS
 from boulder_sweep.crash_tests.cases import crash_test
-from boulder_sweep.judge.accuracy import (
-    FACTOR,
-    LAST_RESORT_STEPS,
-    MOST_STEPS,
-    finer_controls,
-    reported_step_s,
-)
+from boulder_sweep.judge.accuracy import FACTOR, LAST_RESORT_STEPS, MOST_STEPS, finer_controls, reported_step_s
 from boulder_sweep.judge.evaluation import Evaluation, by_kernels
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.verdict import Limits

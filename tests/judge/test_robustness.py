@@ -206,14 +206,7 @@ def test_other_outcomes_do_not_change() -> None:
             assert np.array_equal(values, asked[name], equal_nan=values.dtype.kind == "f"), name
 
 
-@pytest.mark.parametrize(
-    "override",
-    [
-        "model.readings=as_printed",
-        "soil.water_table=0.5 m",
-        "soil.cohesion=5 kPa",
-    ],
-)
+@pytest.mark.parametrize("override", ["model.readings=as_printed", "soil.water_table=0.5 m", "soil.cohesion=5 kPa"])
 def test_where_second_opinions_know_nothing_a_pass_is_open(override: str) -> None:
     sweep = load("configs/rwg.yaml", ["model.second_opinion=[broms, width_capped]", override])
     assert not robustness.can_be_asked(sweep)

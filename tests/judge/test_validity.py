@@ -78,8 +78,7 @@ def test_each_flag_is_raised_alone(flag: str, changes: dict[str, float], outcome
 
 
 @pytest.mark.parametrize(
-    ("below", "flag"),
-    [({"friction_angle_deg": 55.0}, "soil"), ({"density_kg_m3": 2300.0}, "soil"), ({}, "")],
+    ("below", "flag"), [({"friction_angle_deg": 55.0}, "soil"), ({"density_kg_m3": 2300.0}, "soil"), ({}, "")]
 )
 def test_deeper_layers_count_as_soil(below: dict[str, float], flag: str) -> None:
     usual = {"from_m": 1.0, "density_kg_m3": 2000.0, "friction_angle_deg": 38.0, "subgrade_reaction_MN_m3": 60.0}

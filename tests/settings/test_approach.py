@@ -41,8 +41,7 @@ def test_a_curve_limits_the_start_only():
 
 
 @pytest.mark.parametrize(
-    "larger",
-    [{"length_m": 90.0}, {"acceleration_m_s2": 1.6}, {"from_m_s": 6.0}, {"grade": -0.02}, {"friction": 0.9}],
+    "larger", [{"length_m": 90.0}, {"acceleration_m_s2": 1.6}, {"from_m_s": 6.0}, {"grade": -0.02}, {"friction": 0.9}]
 )
 def test_every_choice_goes_to_the_safe_side(larger):
     """More of anything but a rise is never slower."""

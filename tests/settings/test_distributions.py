@@ -97,10 +97,7 @@ def test_what_is_doubtful_decides_the_results_and_is_in_the_record(load_with):
         ("{normal: {mean: 38, sd: 3}}", "{distribution: normal, mean: ..., sd: ...}"),
         ("{distribution: nromal, mean: 38, sd: 3}", "did you mean normal?"),
         ("{distribution: uniform, low: 36}", "a uniform distribution needs high"),
-        (
-            "{distribution: triangular, low: 36, high: 40, mode: 45}",
-            "the mode must be between low and high",
-        ),
+        ("{distribution: triangular, low: 36, high: 40, mode: 45}", "the mode must be between low and high"),
         ("{distribution: beta, low: 36, high: 40, mean: 37, sd: 2}", "must be less than 1.732 deg"),
         ("{distribution: lognormal, characteristic: 36, sd: 3}", "needs cov"),
         ("{characteristic: 36, cov: 70 %}", "use lognormal"),

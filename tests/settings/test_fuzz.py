@@ -84,12 +84,7 @@ def mutated(draw: st.DrawFn) -> str:
         start = draw(st.integers(0, len(text)))
         stop = min(len(text), start + draw(st.sampled_from([0, 0, 1, 1, 2, 5, 20, 100])))
         filling = draw(
-            st.one_of(
-                st.sampled_from(SCRAPS),
-                st.text(max_size=5),
-                st.just(text[start:stop] * 2),
-                st.just(""),
-            )
+            st.one_of(st.sampled_from(SCRAPS), st.text(max_size=5), st.just(text[start:stop] * 2), st.just(""))
         )
         text = text[:start] + filling + text[stop:]
     return text

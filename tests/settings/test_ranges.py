@@ -50,11 +50,7 @@ def test_steps_do_not_drift(load_with):
     assert values == [float(Decimal("0.40") + i * Decimal("0.02")) for i in range(16)]
 
 
-@given(
-    first=st.decimals("0.01", "20", places=3),
-    step=st.decimals("0.001", "0.5", places=3),
-    count=st.integers(1, 40),
-)
+@given(first=st.decimals("0.01", "20", places=3), step=st.decimals("0.001", "0.5", places=3), count=st.integers(1, 40))
 def test_every_value_of_a_step_range_is_the_float_nearest_to_its_decimal(first, step, count):
     last = first + (count - 1) * step
     values = spread(Fraction(first), Fraction(last), count)

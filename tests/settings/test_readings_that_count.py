@@ -92,9 +92,7 @@ def words_of(sweep):
         (
             "spt: [{n1_60: 20, depth: 1.5 m}, {n1_60: 8, depth: 3 m}, {n1_60: 6, depth: 4 m}, {n1_60: 30}]",
             29.465,
-            [
-                "(N1)60 8 at 3 m, the weakest of 3 readings",
-            ],
+            ["(N1)60 8 at 3 m, the weakest of 3 readings"],
         ),
         (
             "cpt: [{q_c: 40, depth: 1 m}, {q_c: 12, depth: 2 m}, {q_c: 9, depth: 3 m}, {q_c: 0, depth: 35 m}]",

@@ -189,17 +189,9 @@ def test_blows_at_an_energy_ratio_of_60_percent(load_it, minimal):
 @pytest.mark.parametrize(
     ("entry", "position", "words"),
     [
-        (
-            "spt: {n: 3, energy_ratio: 60 %, depth: 1.5 m}",
-            "9:8",
-            "holds from 4.55 to 39; give soil.friction_angle",
-        ),
+        ("spt: {n: 3, energy_ratio: 60 %, depth: 1.5 m}", "9:8", "holds from 4.55 to 39; give soil.friction_angle"),
         ("spt: [{n1_60: 30}, {n1_60: 4}]", "9:22", "(N1)60 is 4"),
-        (
-            "spt: {n: 20, depth: 1.5 m}",
-            "9:8",
-            "or n1_60, which is corrected for the stress, too",
-        ),
+        ("spt: {n: 20, depth: 1.5 m}", "9:8", "or n1_60, which is corrected for the stress, too"),
         ("spt: {n: 20, n1_60: 30}", "9:8", "not both"),
         ("spt: {n: 20, energy: 60 %, depth: 1 m}", "9:16", "'energy' is not a key of a reading"),
         ("spt: 20", "9:8", "a reading must be a block of keys: n, energy_ratio, n60, depth, n1_60"),

@@ -157,12 +157,7 @@ def dome(jagged, below=0.0):
 
 @pytest.mark.parametrize(
     ("surface", "is_base"),
-    [
-        (dome(0.0), True),
-        (dome(0.018), True),
-        (dome(0.022), False),
-        (dome(0.0, below=0.25), False),
-    ],
+    [(dome(0.0), True), (dome(0.018), True), (dome(0.022), False), (dome(0.0, below=0.25), False)],
     ids=["plane", "nearly plane", "jagged", "with a part of the stone below its rim"],
 )
 def test_which_hole_is_a_base(surface, is_base):
