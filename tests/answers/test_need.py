@@ -12,16 +12,13 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-import boulder_sweep
-from boulder_sweep.answers.keys import key_of
-from boulder_sweep.answers.need import Need, need
+from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.printing import need_lines
 from boulder_sweep.answers.trials import Remembered, judges_of
 from boulder_sweep.designs import DesignBlock, some
 from boulder_sweep.errors import PictureError, QuestionError
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.judged import PASS, Judged
-from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.settings import Sweep, load_text
 from boulder_sweep.settings.sweep import DesignList
 from tests.answers.designs import DEPTH, bare_need, passes, random_designs, site
@@ -294,15 +291,6 @@ def test_a_partial_factor_on_the_angle_that_is_asked_for_is_refused() -> None:
         bare_need(factored, "friction_angle")
 
 
-def test_distributions_are_taken_at_their_unfavourable_quantiles() -> None:
-    uncertain = site(friction="{mean: 38 deg, sd: 3 deg}")
-    assert bare_need(uncertain).arrow.equals(bare_need(at_values(uncertain)).arrow)
-
-
-def test_values_of_the_lattice_are_those_that_a_file_would_give() -> None:
-    assert key_of("embedment_depth").values(np.array([1234]))[0] == 1.234
-
-
 def test_table_has_units_and_settings(tmp_path: Path) -> None:
     found = bare_need(site())
     path = found.write(tmp_path / "depths.parquet")
@@ -327,11 +315,6 @@ def test_chart_is_drawn(tmp_path: Path) -> None:
         bare_need(site(height="3 m", friction="40 deg")).plot(tmp_path / "one.png")
     with pytest.raises(PictureError, match="nothing passes"):
         bare_need(site(), margin="99 %").plot(tmp_path / "none.png")
-
-
-def test_public_name() -> None:
-    assert boulder_sweep.need is need
-    assert boulder_sweep.Need is Need
 
 
 def test_a_design_is_judged_once_with_the_accuracy_of_the_sweep(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from boulder_sweep.answers.printing import need_lines, reserve_lines, uncertainty_lines
-from boulder_sweep.answers.reserves import reserves
+from boulder_sweep.answers.printing import need_lines, uncertainty_lines
 from boulder_sweep.answers.uncertainty import uncertainty
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.accuracy import accuracy_of
@@ -60,13 +59,6 @@ def test_what_second_opinions_do_not_know_is_refused_in_words() -> None:
     uncertain = site(friction="{mean: 38 deg, sd: 2 deg}")
     with pytest.raises(QuestionError, match="cannot be used together"):
         bare_need(uncertain, robust=True, probability=0.95)
-
-
-def test_capacity_shows_the_grade_of_every_pass() -> None:
-    found = reserves(site(site="embedment_ratio: 0.7", height="3.4 m"))
-    grades = found.arrow["robustness"].to_pylist()
-    assert "robust" in grades
-    assert any("robust" in line.split() for line in reserve_lines(found))
 
 
 def test_no_grade_stands_beside_a_probability() -> None:

@@ -16,7 +16,7 @@ from boulder_sweep.answers.trials import uncertain_rows
 from boulder_sweep.designs import block_of
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.quantiles import values_of
-from boulder_sweep.settings import SettingsError, Sweep, load_text
+from boulder_sweep.settings import Sweep, load_text
 from boulder_sweep.settings.distributions import Distribution
 from tests.answers.designs import site
 
@@ -111,11 +111,6 @@ def test_a_probability_is_asked_for_in_every_named_soil() -> None:
     frame = boulder_sweep.need(sweep, probability=0.9).frame
     depth = frame.least_embedment_depth_m.to_numpy().reshape(2, 3)
     assert (np.diff(depth[1]) > 0.0).all(), "the less is known, the deeper"
-
-
-def test_a_list_inside_a_named_soil_is_refused() -> None:
-    with pytest.raises(SettingsError, match="must have one mean in a named set"):
-        load_text(NAMED.replace("mean: 40 deg, sd", "mean: [38, 40] deg, sd"), Path("named.yaml"))
 
 
 AT = np.linspace(-3.0, 3.0, 13)

@@ -5,10 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from scipy.special import ndtr
 
 import boulder_sweep
-from boulder_sweep.answers.uncertainty import uncertainty
 from boulder_sweep.settings.shape import tapered
 from tests.answers.designs import DEPTH, bare_need, passes, site
 
@@ -43,11 +41,3 @@ def test_the_fastest_truck_that_a_tapered_boulder_withstands() -> None:
     assert passes(found, found.frame, found.frame.passes_at, SPEED).all()
     assert not passes(found, found.frame, found.frame.fails_at, SPEED).any()
     assert (found.frame.fails_at - found.frame.passes_at).between(0.0, 0.01).all()
-
-
-def test_the_chances_of_a_tapered_boulder_are_those_of_its_least_angle() -> None:
-    least = bare_need(site(**TAPERED), "friction_angle").frame.passes_at[0]
-    exact = ndtr(1.0 / 1.5)
-    found = uncertainty(site(**TAPERED | {"friction": f"{{mean: {least + 1.0} deg, sd: 1.5 deg}}"})).frame.iloc[0]
-    assert found.p_pass_low - 5e-4 <= exact <= found.p_pass_high + 5e-4
-    assert found.p_pass_driver == "soil.friction_angle"

@@ -11,7 +11,6 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.special import ndtr
 
-import boulder_sweep
 from boulder_sweep.answers.chance import FIRST, Points
 from boulder_sweep.answers.printing import uncertainty_lines
 from boulder_sweep.answers.uncertainty import drivers, uncertainty
@@ -114,7 +113,3 @@ def test_picture(tmp_path: Path) -> None:
 def test_wrong_numbers_are_refused(question: dict[str, str | int], message: str) -> None:
     with pytest.raises(QuestionError, match=message):
         uncertainty(site(**UNCERTAIN), **question)
-
-
-def test_public_names() -> None:
-    assert boulder_sweep.uncertainty is uncertainty

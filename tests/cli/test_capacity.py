@@ -29,9 +29,3 @@ def test_rows_that_cannot_be_computed_give_exit_code_3(sweep, grid):
     code, out, _ = sweep("capacity", grid, "--json")
     assert code == 3
     assert [row["verdict"] for row in json.loads(out)["rows"]].count("error") == 6
-
-
-def test_an_object_in_us_units_is_refused(sweep, grid):
-    code, out, err = sweep("capacity", grid, "--json", "--units", "us")
-    assert (code, out) == (2, "")
-    assert "leave out --units us or --json" in err

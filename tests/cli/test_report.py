@@ -31,13 +31,6 @@ def test_a_result_becomes_one_file_beside_it(sweep, possible_grid):
     assert '"units":"us"' in page
 
 
-def test_a_design_that_does_not_exist_is_refused(sweep, grid):
-    sweep("run", grid, "-q")
-    code, _, err = sweep("report", "small-grid.sweep", "--design", 18)
-    assert (code, err) == (2, "error: small-grid.sweep has 18 designs, numbered from 0; there is no 18\n")
-    assert not Path("small-grid.html").exists()
-
-
 def test_a_page_under_any_other_ending_is_refused(sweep, possible_grid, opened, monkeypatch):
     sweep("run", possible_grid, "-q")
     text = possible_grid.read_bytes()
@@ -69,12 +62,6 @@ def test_a_page_that_has_no_place_is_refused(sweep, possible_grid):
         assert sweep("report", "small-grid.sweep", "-o", name) == (2, "", f"error: {why}\n")
         assert sweep("explore", "grid.yaml", "--design", 3, "-o", name) == (2, "", f"error: {why}\n")
     assert "there is no none/gone.sweep" in sweep("report", "none/gone.sweep")[2]
-
-
-def test_what_is_no_result_is_refused(sweep, grid):
-    code, _, err = sweep("report", ".")
-    assert code == 2
-    assert "is not the result of a sweep" in err
 
 
 def test_one_design_is_written_and_opened(sweep, possible_grid, opened):

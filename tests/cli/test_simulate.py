@@ -93,11 +93,6 @@ def test_the_sentence_of_a_pass_is_in_the_units_asked_for(sweep):
     assert not re.search(r"\d m\b", out)
 
 
-def test_a_long_sentence_is_wrapped(sweep):
-    out = sweep("simulate", CONFIGS / "rwg.yaml", "--set", "model.readings=as_printed")[1]
-    assert out.startswith("rwg: UNDECIDED, nothing proved at the end of the simulated time, 7.7° of 20°\n  allowed\n")
-
-
 def test_a_design_of_a_list(sweep):
     code, out, err = sweep("simulate", CONFIGS / "crash_tests.yaml", "--design", "1")
     assert (code, err) == (0, "")
@@ -134,48 +129,9 @@ def test_numbers_are_shown_also_where_there_is_no_motion_to_draw(sweep, grid):
     assert err == "error: there is no motion to draw: the truck passes over the boulder\n"
 
 
-def test_places_that_cannot_be_written(sweep, grid):
-    for option, name in (("--plot", "no/such/folder.png"), ("--trajectory", "no/such/folder.parquet")):
-        code, _, err = sweep("simulate", grid, "-q", option, name)
-        assert code == 2
-        assert "no/such" in err
-        assert "internal" not in err
-        assert "Errno" not in err
-
-
-def test_a_folder_in_the_place_of_a_time_history(sweep, grid):
-    (grid.parent / "history.parquet").mkdir()
-    code, _, err = sweep("simulate", grid, "-q", "--trajectory", "history.parquet")
-    assert (code, err) == (2, "error: history.parquet cannot be written: Is a directory\n")
-
-
-def test_a_time_history_is_not_written_under_the_name_of_another_format(sweep, grid):
-    code, _, err = sweep("simulate", grid, "-q", "--trajectory", "history.csv")
-    assert code == 2
-    assert err == "error: history.csv: a time history is a Parquet file; its name must end in .parquet\n"
-    assert not (grid.parent / "history.csv").exists()
-
-
 @pytest.fixture
 def nothing_simulated(monkeypatch):
     monkeypatch.setattr("boulder_sweep.impact.simulation.simulate", lambda *_, **__: pytest.fail("simulated"))
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("history.csv",), "history.csv: a time history is a Parquet file; its name must end in .parquet"),
-        (("no/history.parquet",), "no/history.parquet: the folder {here}/no does not exist"),
-        (("folder.parquet",), "folder.parquet cannot be written: Is a directory"),
-        (("./history.parquet", "--plot", "history.parquet"), "./history.parquet is named twice; give each output a"),
-    ],
-)
-def test_a_wrong_name_of_a_time_history_is_refused_before_simulating(sweep, grid, nothing_simulated, words, message):
-    Path("folder.parquet").mkdir()
-    code, out, err = sweep("simulate", grid, "-q", "--trajectory", *words)
-    assert (code, out) == (2, "")
-    assert message.format(here=Path.cwd()) in err
-    assert sorted(path.name for path in Path().iterdir()) == ["folder.parquet", "grid.yaml"]
 
 
 @pytest.mark.parametrize("there", [False, True])
@@ -275,18 +231,3 @@ def test_what_a_result_does_not_take(sweep, finished, words, message):
     code, out, err = sweep("simulate", finished, *words)
     assert (code, out) == (2, "")
     assert message in err
-
-
-@pytest.mark.parametrize(
-    ("place", "words"),
-    [
-        ("no.sweep", "there is no no.sweep; the result of a run is a folder"),
-        (".", ". is not the result of a sweep: no rows of it are finished"),
-        ("depths.parquet", "there is no depths.parquet; the result of a run is a folder"),
-        ("no.yaml", "no.yaml: there is no such file"),
-    ],
-)
-def test_what_is_neither_a_file_nor_a_result(sweep, grid, place, words):
-    code, out, err = sweep("simulate", place)
-    assert (code, out) == (2, "")
-    assert words in err

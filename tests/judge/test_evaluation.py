@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import pickle
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from boulder_kernels import simulate_table
 from boulder_sweep.columns import VERDICTS
 from boulder_sweep.judge.accuracy import accuracy_of, control_of, readings_of
 from boulder_sweep.judge.evaluation import by_kernels, evaluation_of
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.judged import ERROR
-from boulder_sweep.settings import load_text
 from tests.runner.grids import grid, partly_impossible, plausible
 
 
@@ -80,33 +77,3 @@ def test_an_evaluation_is_sent_by_name_not_as_source():
     sent = pickle.dumps(evaluation)
     assert len(sent) < 2_000
     assert pickle.loads(sent) == evaluation
-
-
-def test_the_plain_function_is_the_kernel():
-    sweep = grid()
-    evaluation = evaluation_of(sweep, accuracy_of(sweep))
-    table = designs_of(sweep.block(0, 9)).table
-    direct = simulate_table(table, evaluation.readings, evaluation.control)
-    for one, other in zip(direct, by_kernels(table, evaluation.readings, evaluation.control), strict=True):
-        assert np.array_equal(one, other, equal_nan=True)
-
-
-HEAVY_TRUCK = """
-boulder: {length: 2 m, width: 2.5 m, height: 4 m, density: 2600 kg/m^3}
-site: {embedment_ratio: [0.7, 0.75]}
-soil: {density: 1859.9 kg/m^3, friction_angle: 43.2 deg, subgrade_reaction: 95 MN/m^3}
-vehicle: {mass: 65000 lb, speed: 40 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
-"""
-
-
-def test_a_truck_inside_the_boulder_is_never_a_pass():
-    """Crushed by more than the cab is long: neither rotation nor penetration would keep it from a pass."""
-    sweep = load_text(HEAVY_TRUCK, Path("heavy.yaml"))
-    rows = evaluation_of(sweep, accuracy_of(sweep))(sweep.block(0, 2))
-    for row in (rows.row(0), rows.row(1)):
-        assert (row["verdict"], row["reason"]) == ("undecided", "crush")
-        assert row["vehicle_crush_m"] > 2.9
-        assert row["max_rotation_deg"] < 20.0
-        assert row["penetration_m"] < 1.0
-        assert row["margin"] is row["rating"] is None
-        assert "crush" in row["validity"].split(";")

@@ -5,10 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import boulder_sweep
 from boulder_sweep.designs import block_of
 from boulder_sweep.errors import QuestionError
-from boulder_sweep.impact.recomputing import recompute
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
@@ -124,9 +122,3 @@ def test_a_list_of_designs_is_refused_row_by_row():
     block = block_of(given | {"boulder_mass_kg": np.array([24000.0, 30000.0])})
     assert [bool(block.reasons[k]) for k in range(2)] == [False, True]
     assert designs_of(block).table.rho_b[0] == 24000.0 / (1.65 * 1.68 * 3.44)
-
-
-def test_explaining_a_row_gives_its_bits(tmp_path):
-    boulder_sweep.run(sweep_of("mass: [18 t, 24 t]"), tmp_path / "mass.sweep", jobs=1)
-    for number in range(2):
-        assert not recompute(tmp_path / "mass.sweep", number).unequal

@@ -74,12 +74,6 @@ def test_every_range_of_the_study_counts(name: str) -> None:
     assert bool(is_free(plain_designs(**{name: 0.99 * low}).table)[0]) is False
 
 
-def test_what_does_not_pass_has_no_grade() -> None:
-    row = judge(outcome(Status.LIMIT, theta_max=LIMITS.rotation, t_limit=0.1), plain_designs(), LIMITS).row(0)
-    assert row["robustness"] is None
-    assert row["stands_under"] is None
-
-
 def test_second_opinions_are_those_of_the_kernels() -> None:
     """Row by row, whatever else is in the block."""
     sweep = grid()

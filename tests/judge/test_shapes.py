@@ -15,7 +15,7 @@ from boulder_sweep.impact.recomputing import recompute
 from boulder_sweep.judge.accuracy import OUTLINES_IN_LANES, accuracy_of, control_of
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.model import Ground
-from boulder_sweep.settings.shape import Shape, tapered
+from boulder_sweep.settings.shape import tapered
 from boulder_sweep.soils import SLICES, coefficients, with_soil
 from tests.answers.designs import bare_need
 from tests.judge.plain import plain_designs
@@ -160,8 +160,3 @@ def test_side_views_show_the_shape(tmp_path):
     for x, y in initial.points:
         widths.setdefault(round(y + 2.03, 6), []).append(x)
     assert [max(xs) - min(xs) for _, xs in sorted(widths.items())] == pytest.approx([1.5, 1.7, 1.3])
-
-
-def test_words_of_shapes():
-    assert Shape().words == ""
-    assert tapered(0.8).words == "boulder tapered, its top 0.8 times as wide as its foot"

@@ -65,14 +65,6 @@ def test_a_pass_of_a_sample_stops_every_slower_truck_of_the_steps() -> None:
         assert np.all(BALANCED.judged(slower).verdict == PASS)
 
 
-def test_a_row_does_not_depend_on_the_rows_beside_it() -> None:
-    designs = shallow(60, 4)
-    together = BALANCED.judged(designs)
-    for row in range(0, 60, 7):
-        alone = BALANCED.judged(designs.rows(slice(row, row + 1)))
-        assert alone.row(0) == together.row(row)
-
-
 def test_hardly_buried_boulders_that_slide_far_never_pass() -> None:
     designs = shallow(400, 5)
     judged = BALANCED.judged(designs)

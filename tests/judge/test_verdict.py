@@ -60,17 +60,6 @@ def only(row: Judged) -> tuple[str, str]:
     return VERDICTS[row.verdict[0]], row.reasons[row.reason[0]]
 
 
-def test_outcome_columns_are_those_of_the_register():
-    assert tuple(judged(outcome(Status.SETTLED)).columns) == OUTCOME_COLUMNS
-    assert tuple(PENETRATION_LIMITS_M) == RATINGS
-
-
-def test_what_cannot_be_proved_is_undecided():
-    row = judged(outcome(Status.UNPROVABLE))
-    assert only(row) == ("undecided", "horizon")
-    assert np.isnan(row["margin"][0])
-
-
 @pytest.mark.parametrize("status", [Status.SETTLED, Status.BELOW_LIMIT])
 def test_pass(status):
     row = judged(outcome(status))

@@ -131,13 +131,6 @@ def test_the_whole_example(load_it, example):
     _check(sweep, 0, sweep.n_designs)
 
 
-def test_blocks_join_without_gap(load_it, example):
-    sweep = load_it(example)
-    whole = sweep.block(0, 1000).columns["impact_height_m"].to_numpy()
-    parts = [sweep.block(start, min(start + 37, 1000)) for start in range(0, 1000, 37)]
-    assert np.concatenate([part.columns["impact_height_m"].to_numpy() for part in parts]).tolist() == whole.tolist()
-
-
 @pytest.mark.parametrize(("start", "stop"), [(-1, 3), (3, 2), (0, 2737), (2737, 2737)])
 def test_rows_outside_of_the_grid(load_it, example, start, stop):
     with pytest.raises(IndexError, match="2736 designs"):
@@ -155,13 +148,6 @@ def test_chosen_designs_are_those_of_the_grid(load_it, example, numbers):
     assert chosen.reasons.codes.tolist() == np.asarray(whole.reasons.codes)[numbers].tolist()
     with pytest.raises(IndexError):
         sweep.plan.selection(np.array([2736]))
-
-
-def test_an_empty_block(load_it, example):
-    block = load_it(example).block(7, 7)
-    assert len(block) == 0
-    assert len(block.reasons) == 0
-    assert not block.reasons.any
 
 
 HUGE = (
@@ -265,11 +251,6 @@ def test_sweeps_travel_to_other_processes(load_it, example):
     assert again.resolved() == sweep.resolved()
     for one, other in zip(sweep.block(5, 9).columns.values(), again.block(5, 9).columns.values(), strict=True):
         assert one.to_numpy().tolist() == other.to_numpy().tolist()
-
-
-def test_a_plan_without_axes_has_one_row():
-    given = {name: Source(np.array([1.0])) for name in INPUT_COLUMNS}
-    assert DesignPlan([], given).n_designs == 1
 
 
 def test_impact_height() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import random
 from itertools import pairwise
 
 import numpy as np
@@ -13,7 +12,7 @@ from hypothesis import strategies as st
 from boulder_sweep import investigation as sand
 from boulder_sweep import need
 from boulder_sweep.errors import QuestionError
-from boulder_sweep.settings import SettingsError, load, load_text
+from boulder_sweep.settings import SettingsError, load_text
 from boulder_sweep.settings.log_layers import FEWEST, WINDOW_M, layers_of
 from boulder_sweep.settings.logs import count_of
 from boulder_sweep.settings.soil_readings import BELOW_FOOT, IN_TOPSOIL, covered_depth
@@ -274,17 +273,6 @@ def test_a_cone_in_uniform_soil_gives_what_its_readings_give(site):
     assert log.distributions[ANGLE] == cpt.distributions[ANGLE]
 
 
-def test_the_order_of_rows_has_no_part(site):
-    rows = list(CONE)
-    random.Random(1).shuffle(rows)
-    one, other = (
-        site(f"log: {name}", name, table("Depth (m),qc (MPa)", pairs))
-        for name, pairs in (("one.csv", CONE), ("two.csv", rows))
-    )
-    for name in (ANGLE, REACTION):
-        assert one.constants[name] == pytest.approx(other.constants[name], rel=1e-12)
-
-
 def reading(depth, angle):
     return {"depth_m": depth, "friction_angle_deg": angle, "friction_angles_deg": {"a": angle, "b": angle + 2.0}}
 
@@ -507,12 +495,6 @@ def test_files_that_cannot_be_read_say_why(refusal, name, text, words, line):
     assert line in (None, problem.line)
 
 
-def test_a_truncated_gef_names_its_last_line(refusal):
-    text = gef(CONE)
-    problem = refusal("log.gef", text[: text.rindex("0.02")])
-    assert (problem.message, problem.line) == ("has 2 cells; the header names more", text.count("\n"))
-
-
 @pytest.mark.parametrize(
     ("soil", "words"),
     [
@@ -585,9 +567,3 @@ def test_the_weaker_of_neighbours_are_drawn_of_a_long_log(site):
     rows = [line for line in deep if line[:1] == " " and "#" in line]
     assert 10 <= len(rows) <= MOST_ROWS
     assert {line.split()[1] for line in rows} == {"9"}
-
-
-def test_the_example_of_the_guide(site):
-    sweep = load("configs/borehole_log.yaml")
-    assert log_of(sweep)["log"]["hole"] == "BH-2"
-    assert len(sweep.model.ground.layers) == 1

@@ -4,21 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
-
 from boulder_sweep import run
 from boulder_sweep.settings import load
 from boulder_sweep.store.reading import read_row
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-PLAIN = ("abg", "crash_tests", "m30_sizing", "rwg", "site", "uncertain_site")
-
-
-@pytest.mark.parametrize("name", PLAIN)
-def test_files_without_it_have_nothing_more_in_their_settings(name):
-    sweep = load(CONFIGS / f"{name}.yaml")
-    assert sweep.derived == {}
-    assert "derived" not in sweep.resolved()
 
 
 def test_it_stands_for_plain_entries(tmp_path):

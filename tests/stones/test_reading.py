@@ -261,27 +261,6 @@ def test_units(tmp_path):
         read_scan(path)
 
 
-def test_a_pebble(tmp_path):
-    path = written(sphere(0.01), tmp_path / "pebble.ply")
-    with pytest.raises(ScanError, match=r"its largest side is 0.02 m; stones of 0.1 to 20 m are taken$"):
-        read_scan(path)
-
-
-def test_parts_of_a_scene_are_placed(tmp_path):
-    """A GLB file whose node scales and moves the mesh."""
-    import trimesh
-
-    points, faces = sphere(1.0, 3)
-    scene = trimesh.Scene()
-    placing = np.diag([2.0, 2.0, 2.0, 1.0])
-    placing[:3, 3] = (5.0, 0.0, 0.0)
-    scene.add_geometry(trimesh.Trimesh(points, faces, process=False), transform=placing)
-    scene.export(tmp_path / "rock.glb")
-    own = solid_of(read_scan(tmp_path / "rock.glb"))
-    assert own.volume == pytest.approx(8.0 * solid_of(reading.ScannedSurface("", "", points, faces)).volume, rel=1e-5)
-    np.testing.assert_allclose(own.centre, (5.0, 0.0, 0.0), atol=1e-5)
-
-
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [

@@ -299,11 +299,6 @@ def test_command_takes_every_name_of_an_input(out: Path, capsys: pytest.CaptureF
     assert execute(["plot", str(out), "--columns", name, "--rows", "friction_angle"]) == 0
 
 
-def test_command_says_where_there_is_no_result(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert execute(["plot", str(tmp_path / "nothing.sweep")]) == 2
-    assert "nothing.sweep" in capsys.readouterr().err
-
-
 def test_command_says_which_value_it_took(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert execute(["plot", str(out), "--at", "subgrade_reaction_MN_m3=120"]) == 0
     assert "subgrade_reaction_MN_m3 is 95 in this map, the value nearest to 120" in capsys.readouterr().err
@@ -383,13 +378,6 @@ def test_every_named_soil_has_its_map(named_soils: str, capsys: pytest.CaptureFi
     assert "soil:" in Path("one.svg").read_text()
     assert execute(["plot", named_soils, "-o", "one.svg", "--at", "soil=mud"]) == 2
     assert "there are loose, dense, gravel" in capsys.readouterr().err
-
-
-def test_a_map_in_us_units(named_soils: str) -> None:
-    assert execute(["plot", named_soils, "-o", "us.svg", "--units", "us"]) == 0
-    drawn = Path("us.svg").read_text()
-    assert "<!-- boulder height [ft] -->" in drawn
-    assert "speed\N{NO-BREAK SPACE}30\N{NO-BREAK SPACE}mph" in drawn, "values stay on one line, as they are"
 
 
 def test_a_design_chart_has_a_curve_for_every_named_soil(tmp_path: Path) -> None:
