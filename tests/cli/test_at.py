@@ -63,18 +63,3 @@ def test_the_report_says_what_was_taken(sweep, tmp_path):
     sweep("run", SITE, "-o", tmp_path / "table", "-q")
     assert sweep("report", tmp_path / "table", "-o", tmp_path / "page.html")[0] == 0
     assert "p5 low" in (tmp_path / "page.html").read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("simulate", SITE.with_name("rwg.yaml"), "--at", "p5"), "no input has a distribution"),
-        (("simulate", SITE, "--at", "p80"), "'p80' is not mean, p5 or another quantile"),
-        (("need", SITE, "--at", "p5", "--probability", "0.9"), "--at and --probability cannot be used together"),
-        (("explore", "--at", "p5", "--no-open"), "--at is for a file with uncertain inputs"),
-    ],
-)
-def test_mistakes(sweep, words, message):
-    code, _, err = sweep(*words)
-    assert code == 2
-    assert message in " ".join(err.split())

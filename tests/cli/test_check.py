@@ -72,11 +72,6 @@ def test_mistakes(sweep, grid):
     assert lines[2].startswith("--set: vehicle.speed: ")
 
 
-def test_a_missing_file(sweep, grid):
-    assert sweep("check", "no.yaml") == (2, "", "no.yaml: there is no such file\n")
-    assert sweep("check", ".") == (2, "", ".: is a directory; a file is needed\n")
-
-
 def test_uncertain_inputs_are_listed(sweep, grid):
     text = grid.read_text().replace("43.2 deg", "{mean: 38 deg, sd: 3 deg}")
     grid.write_text(text.replace("[60, 95] MN/m^3", "{distribution: lognormal, mean: [60, 95] MN/m^3, cov: 30 %}"))

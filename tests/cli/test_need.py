@@ -162,24 +162,3 @@ def test_rows_that_are_blocked_give_exit_code_0(sweep, words, reason):
     assert (row["found"], row["verdict"]) == ("blocked_by_overlap", "error")
     assert row["reason"].startswith(reason)
     assert code == 0
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--least", "depth"], "did you mean embedment_depth?"),
-        (["-o", "depths.csv"], "must end in .parquet"),
-        (["--plot", "chart.bmp"], "must end in"),
-        (["--json", "--units", "us"], "--json is in SI units for this command"),
-        (["--margin", "1"], "--margin 1: must be 0 or more and less than 100 %"),
-        (["--probability", "120%"], "must be more than 0 and less than 100 %"),
-        (["--prefer", "height"], "'height' is not one of 'mass', 'depth', 'excavation'"),
-    ],
-)
-def test_mistakes_are_said_before_anything_is_computed_and_before_any_note(sweep, words, message):
-    noted = ("--set", "site.embedment_ratio=[0.3, 0.7]")
-    assert "note: " in sweep("need", CONFIG, *noted)[2]
-    code, out, err = sweep("need", CONFIG, *noted, *words)
-    assert (code, out) == (2, "")
-    assert message in err
-    assert "note: " not in err

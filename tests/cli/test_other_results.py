@@ -58,24 +58,6 @@ def test_settings_that_no_file_gives(sweep, result, part):
     assert f"was damaged ({part}" in err
 
 
-@pytest.mark.parametrize("command", ["plot", "export"])
-@pytest.mark.parametrize(
-    ("place", "words"),
-    [
-        ("nowhere.sweep", "there is no nowhere.sweep; the result of a run is a folder"),
-        ("nowhere/at/all", "there is no nowhere/at/all"),
-        ("grid.yaml", "grid.yaml is a settings file; run it first: sweep run grid.yaml\n"),
-        ("grid.yaml/x", "there is no grid.yaml/x"),
-        (".", "is not the result of a sweep"),
-    ],
-)
-def test_what_is_no_result(sweep, grid, command, place, words):
-    code, out, err = sweep(command, place, *(["-o", "t.csv"] if command == "export" else []))
-    assert (code, out) == (2, "")
-    assert words in err
-    assert not err.startswith("internal")
-
-
 @pytest.mark.parametrize(
     "words",
     [
@@ -99,17 +81,6 @@ def test_a_file_of_a_result_in_place_of_its_folder(sweep, result):
         code, out, err = sweep(*words)
         assert (code, out) == (2, "")
         assert f"is a file; the result of a run is a folder: name the folder it lies in, {result}" in err
-
-
-@pytest.mark.parametrize(
-    "words", [["report"], ["plot"], ["export", "-o", "x.xlsx"], ["compare", RESULT]], ids=lambda words: words[0]
-)
-def test_a_settings_file_in_place_of_a_result(sweep, grid, words):
-    name = grid.rename("my grid.yaml").name
-    given = {"export": [name, *words[1:]], "compare": [name, "x"]}
-    code, out, err = sweep(words[0], *given.get(words[0], [name]))
-    assert (code, out) == (2, "")
-    assert err == "error: my grid.yaml is a settings file; run it first: sweep run 'my grid.yaml'\n"
 
 
 def test_a_file_of_answers_in_place_of_a_result(sweep, possible_grid):

@@ -164,36 +164,6 @@ def test_a_dry_run_of_a_grid_of_ten_to_the_twelve(sweep, grid):
     assert found["objection"]
 
 
-@pytest.mark.parametrize(
-    ("words", "words_of_error"),
-    [
-        ([], "Missing argument 'GRID'"),
-        (["grid.yaml", "--jobs", "0"], "--jobs"),
-        (["grid.yaml", "--jobs", "many"], "--jobs"),
-        (["grid.yaml", "--jobs", "1000000", "--overwrite"], "1000000 is not in the range 1<=x<=4096"),
-        (["grid.yaml", "--backend", "spark"], "--backend"),
-        (["grid.yaml", "--scheduler", "tcp://x:1"], "--scheduler needs --backend dask"),
-        (["grid.yaml", "--resume", "--overwrite"], "cannot be used together"),
-        (["grid.yaml", "-q", "-v"], "cannot be used together"),
-        (["grid.yaml", "--frobnicate"], "--frobnicate"),
-        (["grid.yaml", "--accuracy", "superb"], "--accuracy: solver.accuracy: 'superb' is not fast, balanced, fine"),
-        (["grid.yaml", "--accuracy", "1e-12 deg"], "--accuracy: solver.accuracy: 1e-12 deg is outside"),
-        (["grid.yaml", "--accuracy", ""], "--accuracy: solver.accuracy: '' is not"),
-        (["grid.yaml", "--set", "speed"], "KEY=VALUE"),
-        (["grid.yaml", "extra"], "extra"),
-        (["no.yaml"], "there is no such file"),
-        (["grid.yaml", "-o", "grid.yaml"], "grid.yaml"),
-    ],
-)
-def test_wrong_use(sweep, grid, words, words_of_error):
-    code, out, err = sweep("run", *words)
-    assert code in (2, 4)
-    assert code == 2 or words[-2:] == ["-o", "grid.yaml"]
-    assert out == ""
-    assert words_of_error in err
-    assert "Traceback" not in err
-
-
 def interrupted(signum):
     def run(settings, out, *, jobs, backend, scheduler, **_):
         raise Interrupted(signum, 5, 18, resuming(settings, out, jobs, backend, scheduler))

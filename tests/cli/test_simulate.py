@@ -217,17 +217,3 @@ def test_a_row_that_came_out_otherwise(sweep, finished, monkeypatch):
     assert "\nchanged since: kernels_sha256: " in out
     assert "\nas stored, the row was judged by the rules of version " in out
     assert "the same to the last bit" not in out
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("--design", "18"), "small-grid.sweep has 18 designs, numbered from 0; there is no 18"),
-        (("--set", "vehicle.speed=30 mph"), "--set and --at change the settings of a file; small-grid.sweep is the"),
-        (("--at", "mean"), "--set and --at change the settings of a file; small-grid.sweep is the result of a run"),
-    ],
-)
-def test_what_a_result_does_not_take(sweep, finished, words, message):
-    code, out, err = sweep("simulate", finished, *words)
-    assert (code, out) == (2, "")
-    assert message in err

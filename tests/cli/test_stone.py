@@ -120,28 +120,6 @@ def test_a_picture(sweep, block):
     assert Path("rock.png").read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["none.ply"], "error: none.ply: there is no such file"),
-        (["block.ply", "--up", "a"], "--up and --facing belong together"),
-        (["block.ply", "--up", "a", "--facing", "-a"], "error: up: a and facing: -a do not go together"),
-        (["block.ply", "--up", "top", "--facing", "a"], "error: up: 'top' is no end of a stone"),
-        (["block.ply", "--mass", "18.2"], "--mass 18.2: write the unit too"),
-        (["block.ply", "--mass", "18.2 m"], "--mass"),
-        (["block.ply", "--mass", "-1 t"], "must be positive"),
-        (["block.ply", "--unit", "kg"], "--unit"),
-        (["block.ply", "--plot", "rock.doc"], "the name of a picture must end in"),
-        (["block.txt"], "is not a scan that can be read"),
-    ],
-)
-def test_what_is_refused(sweep, block, words, message):
-    code, out, err = sweep("stone", *words)
-    assert (code, out) == (2, "")
-    assert message in err
-    assert "Traceback" not in err
-
-
 @pytest.fixture(scope="module")
 def placed_at_a_site():
     """Place the example at the site of the configs, in one soil, with three of its ends up."""
@@ -231,12 +209,3 @@ def test_what_is_recommended_in_uncertain_soil_passes_when_it_is_pasted(sweep, t
     (tmp_path / "site.yaml").write_text(pasted, encoding="utf-8")
     code, out, err = sweep("simulate", tmp_path / "site.yaml", "--json")
     assert (code, json.loads(out)["verdict"]) == (0, "pass"), err
-
-
-def test_a_site_needs_a_mass(sweep, block):
-    code, _, err = sweep("stone", block, str(SITE_FILE))
-    assert code == 2
-    assert "at a site the stone must be weighed: give --mass" in err
-    code, _, err = sweep("stone", block, "--margin", "10%")
-    assert code == 2
-    assert "--set, --at and --margin belong to a SITE" in err

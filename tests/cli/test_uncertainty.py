@@ -75,28 +75,3 @@ def test_a_need_that_nothing_decides_names_the_reason(sweep, weighed, words):
     assert "undecided (shape): the boulder fills less than 95 %" in out
     assert "blocked" not in out
     assert "another boulder" not in out
-
-
-def test_an_object_in_us_units_is_refused(sweep):
-    code, out, err = sweep("uncertainty", CONFIG, "--json", "--units", "us")
-    assert (code, out) == (2, "")
-    assert "leave out --units us or --json" in err
-
-
-@pytest.mark.parametrize("command", ["need", "uncertainty"])
-@pytest.mark.parametrize("margin", ["250", "200%", "-0.5", "1"])
-def test_a_margin_that_no_design_has_is_refused(sweep, command, margin):
-    chance = ("--probability", "0.9") if command == "need" else ()
-    code, out, err = sweep(command, CONFIG, f"--margin={margin}", *chance)
-    assert (code, out) == (2, "")
-    assert f"--margin {margin}: must be 0 or more and less than 100 %" in err
-
-
-@pytest.mark.parametrize(
-    ("design", "words"), [("1", "holds 1 design, numbered from 0; there is no 1"), ("-1", "is not in the range x>=0")]
-)
-def test_a_design_that_the_file_does_not_hold_is_refused_at_once(sweep, monkeypatch, design, words):
-    monkeypatch.setattr("boulder_sweep.answers.uncertainty.uncertainty", lambda *_, **__: pytest.fail("sampled"))
-    code, out, err = sweep("uncertainty", CONFIG, "--design", design)
-    assert (code, out) == (2, "")
-    assert words in err

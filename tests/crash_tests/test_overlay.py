@@ -163,27 +163,6 @@ def test_command_notices_a_mirrored_film(sweep: Command, tmp_path: Path) -> None
     assert "It counts as positive while the boulder's top moves away from the truck" in " ".join(out.split())
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--measured", "x.csv"], "go together"),
-        (["--case", "rwg"], "go together"),
-        (["--measured", "missing.csv", "--case", "rwg"], "there is no such file"),
-        (["--measured", "film.csv", "--case", "missing.yaml"], "missing.yaml"),
-        (["--measured", "film.csv", "--case", "m30"], "holds 107,008 designs"),
-    ],
-)
-def test_command_refuses_wrong_use(
-    sweep: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], message: str
-) -> None:
-    grid = CONFIGS / "m30_sizing.yaml"
-    monkeypatch.chdir(tmp_path)
-    Path("film.csv").write_text("time [ms],rotation [deg]\n0,0\n100,4.4\n")
-    code, out, err = sweep("validate", *(str(grid) if word == "m30" else word for word in words))
-    assert (code, out) == (2, "")
-    assert message in err
-
-
 def test_the_pull_of_the_page_gives_the_subgrade_reaction() -> None:
     """docs/measuring.md: beta = F d / (1e6 W tan(phi) (u d^2 / 2 - theta d^3 / 3)), held against the kernels."""
     design = design_of(oracle.RWG)

@@ -269,29 +269,6 @@ def test_command_draws_a_map(out: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert out.with_suffix(".png").stat().st_size > 10_000
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--at", "subgrade_reaction_MN_m3"], "missing ="),
-        (["--at", "subgrade_reaction_MN_m3=stiff"], "'stiff' is not a number"),
-        (["--at", "subgrade_reaction_MN_m3=nan"], "'nan' is not a finite number"),
-        (["--at", "subgrade_reaction_MN_m3=1e400"], "too large an exponent"),
-        (["--at", "subgrade_reaction=95 m"], "'m' is a length"),
-        (["--at", "soil=dense"], "this result has no named sets of soil"),
-        (["--at", "subgrade_reaction_MN_m3=60", "--at", "subgrade_reaction_MN_m3 = 95"], "is given twice"),
-        (["--across", "weight"], "--across 'weight' is not an input; did you mean boulder.mass or vehicle.mass?"),
-        (["--at", "subgrade=95"], "--at 'subgrade' is not an input; did you mean subgrade_reaction?"),
-        (["--up", "boulder.mass"], "boulder_mass_kg is not an input column"),
-        (["-o", "map.jpeg"], "must end in .png"),
-    ],
-)
-def test_command_refuses_wrong_use(
-    out: Path, capsys: pytest.CaptureFixture[str], words: list[str], message: str
-) -> None:
-    assert execute(["plot", str(out), *words]) == 2
-    assert message in capsys.readouterr().err
-
-
 @pytest.mark.parametrize("name", ["soil.subgrade_reaction", "subgrade_reaction", "subgrade_reaction_MN_m3"])
 def test_command_takes_every_name_of_an_input(out: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
     assert execute(["plot", str(out), "--at", f"{name}=95 MN/m^3"]) == 0
