@@ -131,14 +131,7 @@ def test_without_proof_at_the_horizon_a_row_is_undecided_unless_something_worse_
 
 def test_more_crush_than_the_front_is_long_is_never_a_pass():
     assert only(judged(outcome(Status.SETTLED, crush_max=BED))) == ("pass", "")
-    row = judged(outcome(Status.SETTLED, crush_max=1.001 * BED))
-    assert only(row) == ("undecided", "crush")
-    assert np.isnan(row["margin"][0])
-    assert row["rating"][0] == -1
-    assert only(judged(outcome(Status.SETTLED, crush_max=4.0, x_v_max=x_v(1.5)))) == ("fail", "penetration")
-    assert only(judged(outcome(Status.LIMIT, crush_max=4.0))) == ("fail", "overturns")
-    near = outcome(Status.SETTLED, crush_max=BED - 1e-4, x_error=2e-4)
-    assert only(judged(near)) == ("undecided", "error")
+    assert only(judged(outcome(Status.SETTLED, crush_max=1.001 * BED))) == ("undecided", "crush")
 
 
 @pytest.mark.parametrize(("overlap", "found"), [(0.26, ("pass", "")), (0.24, ("undecided", "override"))])
@@ -165,28 +158,6 @@ def test_limits_are_those_of_the_settings():
     assert limits.criterion.min_overlap_m == pytest.approx(0.254)
     assert limits.calibrated_crush == 0.8
     assert math.degrees(limits.tested_rotation) == pytest.approx(TESTED_ROTATION_DEG["as_printed"])
-
-
-def test_a_peak_nearer_to_its_limit_than_its_error_is_undecided():
-    near = LIMIT - 1e-4
-    assert only(judged(outcome(Status.SETTLED, theta_max=near, theta_error=2e-4))) == ("undecided", "error")
-    assert only(judged(outcome(Status.SETTLED, theta_max=near, theta_error=0.5e-4))) == ("pass", "")
-    close = x_v(0.999)
-    assert only(judged(outcome(Status.SETTLED, x_v_max=close, x_error=2e-3))) == ("undecided", "error")
-    assert only(judged(outcome(Status.SETTLED, x_v_max=close, x_error=0.5e-3))) == ("pass", "")
-
-
-def test_a_crossing_is_decided_whatever_its_error():
-    crossed = outcome(Status.LIMIT, theta_max=LIMIT, t_limit=0.1, theta_error=1.0, x_error=10.0)
-    assert only(judged(crossed)) == ("fail", "overturns")
-    too_deep = outcome(Status.SETTLED, x_v_max=x_v(1.001), x_error=1.0)
-    assert only(judged(too_deep)) == ("fail", "penetration")
-
-
-def test_without_an_error_estimate_the_verdict_is_unguarded():
-    row = judged(outcome(Status.SETTLED, theta_max=np.nextafter(LIMIT, 0.0)))
-    assert only(row) == ("pass", "")
-    assert np.isnan(row["rotation_error_deg"][0])
 
 
 @pytest.mark.parametrize("status", list(STATUS_REASONS))
