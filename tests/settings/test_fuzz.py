@@ -130,41 +130,15 @@ def test_any_override(key: str, value: str) -> None:
     loads_or_says_why(FLOW, f"{key}={value}")
 
 
+UNIT_SIGNS = [
+    *("m", "kN", "s", "lb", "/", "*", "^", "**", "-", "(", ")", "3", "-2", " ", "per", "ft", "°", "%", "ton", "99"),
+    "1/",
+]
+
+
 @QUICK
 @given(
-    text=st.one_of(
-        st.text(max_size=20),
-        st.lists(
-            st.sampled_from(
-                [
-                    " ",
-                    *[
-                        "m",
-                        "kN",
-                        "s",
-                        "lb",
-                        "/",
-                        "*",
-                        "^",
-                        "**",
-                        "-",
-                        "(",
-                        ")",
-                        "3",
-                        "-2",
-                        "per",
-                        "ft",
-                        "°",
-                        "%",
-                        "ton",
-                        "99",
-                        "1/",
-                    ],
-                ]
-            ),
-            max_size=12,
-        ).map("".join),
-    ),
+    text=st.one_of(st.text(max_size=20), st.lists(st.sampled_from(UNIT_SIGNS), max_size=12).map("".join)),
     target=st.sampled_from(sorted(EXPECTED)),
 )
 def test_any_unit(text: str, target: str) -> None:

@@ -136,7 +136,7 @@ def test_no_key_of_another_meaning_is_suggested(problems_of, minimal, override):
             "solver: fast\nboulder:\n",
             "solver",
             (1, 9),
-            "must be a block of keys: accuracy, step, horizon",
+            "a block of keys: accuracy, step, horizon",
         ),
     ],
 )
