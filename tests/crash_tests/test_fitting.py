@@ -13,7 +13,7 @@ from scipy.signal import butter, filtfilt
 
 from boulder_sweep.crash_tests.cases import rigid_wall_test
 from boulder_sweep.crash_tests.fitting import VehicleFit, fit_pulse
-from boulder_sweep.crash_tests.measured import Pulse, TimeHistory, pulse_of, read_pulse
+from boulder_sweep.crash_tests.measured import Pulse, TimeHistory, pulse_of
 from boulder_sweep.crash_tests.rigid_wall import RigidWall
 from boulder_sweep.errors import FitError
 from docs.studies.example_pulse import example_pulse
@@ -309,17 +309,6 @@ def test_signs_are_read_from_the_impact_alone() -> None:
             against = {name: -pulse.signals[name]}
             with pytest.raises(FitError, match=f"the {name} is (negative at first|positive, as if)"):
                 pulse_of(TimeHistory(Path("pulse.csv"), pulse.time_s, against))
-
-
-def test_the_example_of_the_documentation(tmp_path: Path) -> None:
-    """It says what a fit has to find; the fit finds it within its errors."""
-    (tmp_path / "pulse.csv").write_text(example_pulse(), encoding="utf-8")
-    fit = fit_pulse(read_pulse(tmp_path / "pulse.csv"), 6800.0)
-    assert max(abs(miss) for miss in misses(fit, PAPER)) < 1.0
-    assert fit.warnings == ()
-    # Noise of 5 mm and 0.8 g, as its comment says.
-    assert fit.misfits["displacement"].rms == pytest.approx(0.005, rel=0.25)
-    assert fit.misfits["acceleration"].rms == pytest.approx(0.8 * GRAVITY, rel=0.25)
 
 
 def test_command_prints_the_result_and_a_line_for_a_settings_file(sweep: Command, tmp_path: Path) -> None:

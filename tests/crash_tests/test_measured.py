@@ -140,23 +140,6 @@ def test_mistakes_with_their_place(tmp_path: Path, text: str, messages: list[str
     assert str(caught.value).startswith(str(file))
 
 
-@pytest.mark.parametrize(
-    ("text", "place"),
-    [
-        ("time [ms],velocity [m/s],x [m]\n0,13,0\n1,two,0.01\n", "3:3: velocity: 'two' is not a number"),
-        ("# a comment\ntime [ms],weight [kg]\n0,13\n1,12\n", "2:11: weight [kg]: is not known"),
-        ("x [m];time [ms]\n\n0,1;0\n0,2;0\n", "4:5: time: 0 s comes after 0 s"),
-    ],
-)
-def test_mistakes_in_a_pulse_are_told_with_file_line_and_column(
-    tmp_path: Path, text: str, place: str, sweep: Command
-) -> None:
-    file = write(tmp_path, text)
-    code, out, err = sweep("fit-vehicle", file, "--mass", "6800 kg")
-    assert (code, out) == (2, "")
-    assert f"{file}:{place}" in err
-
-
 def test_all_mistakes_at_once(tmp_path: Path) -> None:
     file = write(tmp_path, "time [ms],x [m]\n0,a\n1,b\n2,c\n")
     with pytest.raises(SettingsError) as caught:

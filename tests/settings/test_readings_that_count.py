@@ -151,11 +151,6 @@ def test_readings_that_cannot_be_read(refusal, reading, position, words):
     assert f"{problem.line}:{problem.column}" == position
 
 
-@pytest.mark.parametrize("value", [">50", "> 50", ">=50"])
-def test_a_sign_that_begins_a_text_in_yaml_belongs_in_quotation_marks(refusal, value):
-    assert "quotation marks" in refusal(f"spt:\n    - n: {value}\n      depth: 2 m").message
-
-
 GIVEN = {"friction_angle": "36 deg", "density": "1860 kg/m^3", "subgrade_reaction": "60 MN/m^3"}
 
 

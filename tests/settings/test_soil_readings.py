@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import pytest
 
@@ -72,11 +71,6 @@ def test_the_lowest_correlation_is_the_mean_and_the_highest_lies_within(soil, n1
     assert sd == 3.0 or low + 1.6449 * (sd - 0.01) <= high
 
 
-def test_another_correlation_is_taken_by_giving_its_angle(soil):
-    sweep = soil(f"{RAW}\n  friction_angle: {{mean: 41.7 deg, sd: 3 deg}}")
-    assert (sweep.constants[ANGLE], sweep.distributions[ANGLE].sd) == (41.7, 3.0)
-
-
 def test_cones_and_relative_density(soil):
     cone = soil("cpt: {q_c: 9 MPa, depth: 1.5 m}")
     assert cone.constants[ANGLE] == sand.kulhawy_mayne(9.0, sand.vertical_stress(1.5, None))
@@ -92,16 +86,6 @@ def test_us_units(soil):
     metric, us = soil("cpt: {q_c: 9 MPa, depth: 1.5 m}"), soil("cpt: {q_c: 93.984 tsf, depth: 4.9212598 ft}")
     assert "q_c 93.98 tsf at 4.921 ft, C_N" in derived_words(us.derived, "us")[0]
     assert us.constants[ANGLE] == pytest.approx(metric.constants[ANGLE], abs=1e-4)
-
-
-def test_the_weakest_of_several_readings_counts(soil):
-    three = "spt: [{n: 30, energy_ratio: 0.6, depth: 0.7}, {n: 17, energy_ratio: 0.6, depth: 1.5}, {n1_60: 30}]"
-    sweep = soil(three)
-    assert sweep.constants[ANGLE] == angle_of(17)[0]
-    (data,) = sweep.resolved()["derived"]["soil"]
-    assert len(data["readings"]) == 3
-    assert data["readings"][1]["n1_60"] == pytest.approx(17 * 0.75 * 1.7)
-    assert "the weakest of 3 readings" in derived_words(sweep.derived)[0]
 
 
 def test_corrected_counts_are_taken_as_they_are(soil):
@@ -213,10 +197,3 @@ def test_mistakes(problems_of, minimal, entry, position, words):
     assert problem.key == "soil"
     assert words in problem.message
     assert f"{problem.line}:{problem.column}" == position
-
-
-def test_the_example_leads_from_a_borehole_to_an_answer():
-    sweep = load(Path(__file__).parents[2] / "configs" / "borehole.yaml")
-    assert set(sweep.derived) == {"soil", "approach"}
-    assert set(sweep.distributions) == {ANGLE, DENSITY, REACTION}
-    assert sweep.constants["impact_speed_m_s"] == pytest.approx(math.sqrt(2 * 1.1 * 80))

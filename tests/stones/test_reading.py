@@ -238,19 +238,6 @@ def test_a_wide_hole_may_be_a_misread_file(polygons, said, file):
     assert all(map(re.match, said, cautions))
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_every_format_holds_the_same_stone(kind, tmp_path):
-    surface = rock(1)
-    found = read_scan(written(surface, tmp_path / f"rock.{kind}"))
-    assert found.file == f"rock.{kind}"
-    assert len(found.sha256) == 64
-    own = solid_of(found)
-    assert len(own.faces) == len(surface[1])
-    whole = solid_of(reading.ScannedSurface("", "", *surface))
-    assert own.volume == pytest.approx(whole.volume, rel=1e-6)
-    np.testing.assert_allclose(own.centre, whole.centre, atol=1e-5)
-
-
 def test_units(tmp_path):
     points, faces = rock(1)
     path = written((points * 1000.0, faces), tmp_path / "rock.ply")
