@@ -446,6 +446,8 @@ def test_what_a_log_does_not_reach_is_said(site):
 
 # --- Refusals ---
 
+CUT = gef(CONE)[: gef(CONE).rindex("0.02")]
+
 
 @pytest.mark.parametrize(
     ("name", "text", "words", "line"),
@@ -482,6 +484,7 @@ def test_what_a_log_does_not_reach_is_said(site):
         ("log.gef", gef(CONE).replace(", 2\r", ", 5\r"), "has no columns", 5),
         ("log.gef", gef([(0.5, "abc")]), "q_c: 'abc' is not a number", 13),
         ("log.gef", gef([(0.5, "nan")]), "q_c: 'nan' is not a number", 13),
+        ("log.gef", CUT, "has 2 cells; the header names more", 1 + CUT.count("\n")),
         ("log.xml", "<a", "cannot be read as XML", 5),
         ("log.xml", "<a/>", "is no cone log of the BRO", 5),
         ("log.xml", '<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>', "has definitions of its own", 5),
