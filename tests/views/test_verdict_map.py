@@ -1,7 +1,8 @@
-"""Pass/fail maps: which plane of a table is shown, and that every design of it is."""
+"""Pass/fail maps: which plane of a table is shown, that every design of it is, and names of any length."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from boulder_sweep.cli.main import execute
 from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.errors import PictureError
 from boulder_sweep.settings import load_text
+from boulder_sweep.views import pictures
 from boulder_sweep.views.slices import PictureRows, Pieces, Slice, pieces_of, plane
 from boulder_sweep.views.verdict_map import CLASSES, _caption, classes_of, draw_verdict_map
 from boulder_sweep.views.wording import label, value_text
@@ -381,3 +383,42 @@ def test_the_caption_says_in_what_respect_passes_lie_outside_what_was_tested(tab
     assert f"Of the passes {share} lie outside what the model was tested on: width {share}, soil pair " in caption
     assert "No pass lies outside what the model was tested on" in _caption(plane(table), "terms", 400, "si")
     assert "tested on" not in _caption(plane(table.drop(columns="validity")), "terms", 400, "si")
+
+
+LONG = ("compacted limestone gravel 2A modified", "砂礫 of the river", "W" * 80)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("soils", "title", "kind"),
+    [
+        (LONG, "gate", "svg"),
+        (LONG, "gate", "pdf"),
+        (LONG[:2], "gate", "png"),
+        (LONG, "north gate of the depot, phase 2 revision C", "png"),
+    ],
+)
+def test_long_names_leave_the_maps_their_room(table, tmp_path, monkeypatch, soils, title, kind):
+    trucks = ("medium-duty truck 15000 lb at 30 mph", "car")
+    rows = table.query("friction_angle_deg == 36 and subgrade_reaction_MN_m3 == 40 and boulder_width_m == 1.5")
+    frames = [rows.assign(soil=soil, vehicle=truck) for soil in soils for truck in trucks]
+    finished = []
+    plain = pictures.save
+    monkeypatch.setattr(pictures, "save", lambda fig, target: finished.append(fig) or plain(fig, target))
+    words = {"title": title, "sets": {"soil": soils, "vehicle": trucks}, "columns": "soil", "rows": "vehicle"}
+    draw_verdict_map(pd.concat(frames, ignore_index=True), tmp_path / f"map.{kind}", **words)
+    (fig,) = finished
+    if kind != "png":
+        return
+    names = {axes: axes._left_title for axes in fig.axes}
+    legend, headline = fig.legends[0].get_window_extent(), fig._suptitle.get_window_extent()
+    extents = [name.get_window_extent() for name in names.values()]
+    for one, other in itertools.combinations([*extents, headline, legend], 2):
+        assert not one.overlaps(other)
+    for axes, name in names.items():
+        assert axes.get_window_extent().width > 2.2 * fig.dpi
+        assert name.get_window_extent().width <= axes.get_window_extent().width + 1.0
+        assert not any(name.get_window_extent().overlaps(other.get_window_extent()) for other in fig.axes)
+    together = "".join(name.get_text().replace("\n", "").replace(" ", "") for name in names.values())
+    assert all(name.replace(" ", "") in together for name in (*soils, *trucks))
+    assert headline.x1 <= fig.bbox.x1
