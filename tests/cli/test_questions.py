@@ -43,15 +43,6 @@ def test_the_answer_is_at_most_a_screen_and_the_boulder_stands_first(sweep):
     assert sum(line.startswith("→") for line in out.splitlines()) == 1
 
 
-def test_columns_of_the_table(sweep):
-    _, out, _ = sweep("need", CONFIG, "-q")
-    assert table_of(out)[0].split() == ["H", "mass", "all", "φ′", "36", "φ′", "40"]
-    _, out, _ = sweep("need", CONFIG, "-q", "--table")
-    head = ["H", "φ′", "depth", "ratio", "above", "mass", "margin", "second", "dig", "fill"]
-    assert table_of(out)[0].split() == head
-    assert len(table_of(out)) >= 3 + 12
-
-
 def test_notes_say_what_words_mean_and_only_notes_do(sweep):
     plain, noted = (sweep("need", CONFIG, "-q", *BARE, *words)[1] for words in ((), ("--notes",)))
     said = (
@@ -168,15 +159,6 @@ def test_rows_that_are_blocked_give_exit_code_0(sweep, words, reason):
 
 
 UNCERTAIN = Path(__file__).parents[2] / "configs" / "uncertain_site.yaml"
-
-
-def test_lines_fit_the_terminal_as_well(sweep):
-    code, out, err = sweep("uncertainty", UNCERTAIN)
-    assert code == 0
-    assert all(len(line) <= 80 for line in out.splitlines())
-    assert "P(pass)" in out
-    assert "soil.friction_angle" in out
-    assert "seed 0" in err
 
 
 def test_json_and_files(sweep, tmp_path):

@@ -294,15 +294,6 @@ def test_the_time_of_a_compilation_is_remembered_for_the_next_kernels(sweep, mon
     assert f"{COMPILING}20 s" in sweep("simulate", SITE, *ONE)[2]
 
 
-def test_a_run_ends_with_how_to_read_its_table(sweep, possible_grid):
-    code, out, _ = sweep("run", possible_grid)
-    assert code == 0
-    assert max(map(len, out.splitlines())) <= 80
-    assert "FROM read_parquet('small-grid.sweep/*.parquet')" in out
-    code, _, err = sweep("simulate", possible_grid, "--design", 1, "--trajectory", "one.parquet")
-    assert err.splitlines()[-1] == "written  one.parquet"
-
-
 def test_values_are_shown_in_us_units_where_asked(sweep, possible_grid):
     metric = json.loads(sweep("simulate", possible_grid, "--design", 1, "--json", "-q")[1])
     code, out, _ = sweep("simulate", possible_grid, "--design", 1, "--json", "-q", "--units", "us")

@@ -214,15 +214,6 @@ def test_combinations_too_many_for_a_dictionary_are_worked_out_per_row(load_with
     _check(sweep, count**2 - 50, count**2)
 
 
-def test_few_values_stay_a_dictionary(load_it, example):
-    block = load_it(example).block(0, 2736)
-    assert {name: len(column.values) for name, column in block.columns.items() if column.codes is not None}[
-        "embedment_depth_m"
-    ] <= 19 * 16
-    assert all(column.codes is not None for column in block.columns.values())
-    assert len(block.columns["boulder_width_m"].values) == 1
-
-
 def test_a_long_list_of_ever_different_values_is_no_dictionary():
     source = Source(np.random.default_rng(1).random(3 * MAX_DICTIONARY), (0,))
     source.find_dictionary()

@@ -17,7 +17,7 @@ from boulder_sweep.settings.log_layers import FEWEST, WINDOW_M, layers_of
 from boulder_sweep.settings.logs import count_of
 from boulder_sweep.settings.soil_readings import BELOW_FOOT, IN_TOPSOIL, covered_depth
 from boulder_sweep.settings.sweep import derived_words
-from boulder_sweep.views.log_text import MOST_ROWS, log_lines
+from boulder_sweep.views.log_text import log_lines
 from tests.settings.log_files import ags_cone, ags_counts, bro, gef, table, written
 
 SITE = """\
@@ -561,12 +561,3 @@ def test_a_log_is_drawn_in_few_lines_of_plain_characters(site):
     assert depths == sorted(depths)
     assert float(lines[foot - 1].split()[0]) < 2.0 < float(lines[foot + 1].split()[0])
     assert lines[-1] == "23 deeper readings left out"
-
-
-def test_the_weaker_of_neighbours_are_drawn_of_a_long_log(site):
-    pairs = [(0.25 * at + 0.1, 12.0 if at % 2 else 9.0) for at in range(60)]
-    sweep = site("log: log.gef", "log.gef", gef(pairs), "site.embedment_depth=3.3 m")
-    deep = log_lines(log_of(sweep) | {"readings": [one | {"left_out": ""} for one in log_of(sweep)["readings"]]})
-    rows = [line for line in deep if line[:1] == " " and "#" in line]
-    assert 10 <= len(rows) <= MOST_ROWS
-    assert {line.split()[1] for line in rows} == {"9"}

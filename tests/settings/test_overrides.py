@@ -133,20 +133,3 @@ def test_every_input_has_three_names(field):
     else:
         with pytest.raises(UnknownNameError, match=rf"'{field.key}' is ambiguous; use .*{field.path}"):
             named(field.key)
-
-
-@pytest.mark.parametrize(
-    ("word", "message"),
-    [
-        ("boulder.widht", "'boulder.widht' is not an input; did you mean boulder.width?"),
-        ("widht", "'widht' is not an input; did you mean width?"),
-        ("boulder_widht_m", "'boulder_widht_m' is not an input; did you mean boulder_width_m?"),
-        ("Width", "'Width' is not an input; did you mean width?"),
-        ("phi", "'phi' is not an input; did you mean friction_angle?"),
-        ("max_rotation", "'max_rotation' is not an input (length, width, height, boulder.density, "),
-    ],
-)
-def test_what_is_no_input_gets_the_nearest_one(word, message):
-    with pytest.raises(UnknownNameError) as refused:
-        named(word)
-    assert str(refused.value).startswith(message)

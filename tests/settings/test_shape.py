@@ -112,41 +112,24 @@ def test_a_leaning_boulder_may_end_before_the_middle_of_its_foot(load_it, minima
     assert Shape((ProfilePoint(0.0, 1.0, 0.5, 0.5), ProfilePoint(1.0, 0.5, 0.9, -0.4))).stands_up
 
 
+FOOT, TOP = (f"{{height: {height}, width: 1, length: 1}}" for height in (0, 2))
+
+
 @pytest.mark.parametrize(
     ("points", "where", "words"),
     [
         ("wide", "2:12", "must be a list of 2 to 100 points from the foot up"),
-        ("[{height: 0, width: 1, length: 1}]", "2:12", "must be a list of 2 to 100 points"),
-        (
-            "[1, {height: 2, width: 1, length: 1}]",
-            "2:13",
-            "a point must be a block of keys: height, width, length, near, far",
-        ),
-        (
-            "[{height: 0.1, width: 1, length: 1}, {height: 2, width: 1, length: 1}]",
-            "2:13",
-            "the first point is the foot",
-        ),
-        (
-            "[{height: 0, width: 1, length: 1}, {height: 2, width: 1, length: 1}, {height: 2, width: 1, length: 1}]",
-            "2:81",
-            "not above the point before it",
-        ),
-        ("[{height: 0, width: 1, length: 1}, {height: 2, width: 1}]", "2:47", "the point lacks length"),
-        ("[{height: 0, width: 1, length: 1}, {height: 2, width: 1, near: 1}]", "2:47", "the point lacks far"),
-        (
-            "[{height: 0, width: 1, length: 1, far: 1}, {height: 2, width: 1, length: 1}]",
-            "2:13",
-            "length, or near and far",
-        ),
-        ("[{height: 0, width: 1, length: 1}, {height: 2, width: 1, near: 1, far: -2}]", "2:47", "cannot be negative"),
-        ("[{height: 0, widht: 1, length: 1}, {height: 2, width: 1, length: 1}]", "2:25", "did you mean width?"),
-        ("[{height: 0, width: 1 kg, length: 1}, {height: 2, width: 1, length: 1}]", "2:32", "a length is needed"),
-        (
-            "[{height: 0, width: 0, length: 1}, {height: 2, width: 0, length: 1}]",
-            "2:12",
-            "has neither width nor length",
-        ),
+        (f"[{FOOT}]", "2:12", "must be a list of 2 to 100 points"),
+        (f"[1, {TOP}]", "2:13", "a point must be a block of keys: height, width, length, near, far"),
+        (f"[{FOOT.replace('0', '0.1')}, {TOP}]", "2:13", "the first point is the foot"),
+        (f"[{FOOT}, {TOP}, {TOP}]", "2:81", "not above the point before it"),
+        (f"[{FOOT}, {TOP.replace(', length: 1', '')}]", "2:47", "the point lacks length"),
+        (f"[{FOOT}, {TOP.replace('length', 'near')}]", "2:47", "the point lacks far"),
+        (f"[{FOOT.replace('}', ', far: 1}')}, {TOP}]", "2:13", "length, or near and far"),
+        (f"[{FOOT}, {TOP.replace('length: 1', 'near: 1, far: -2')}]", "2:47", "cannot be negative"),
+        (f"[{FOOT.replace('width', 'widht')}, {TOP}]", "2:25", "did you mean width?"),
+        (f"[{FOOT.replace('width: 1', 'width: 1 kg')}, {TOP}]", "2:32", "a length is needed"),
+        (f"[{FOOT}, {TOP}]".replace("width: 1", "width: 0"), "2:12", "has neither width nor length"),
         (
             "[{height: 0, width: 1, near: 1, far: 0}, {height: 2, width: 1, near: -1, far: 3}]",
             "2:12",

@@ -20,7 +20,6 @@ from boulder_sweep.settings import load_text
 from boulder_sweep.views import pictures
 from boulder_sweep.views.slices import PictureRows, Pieces, Slice, pieces_of, plane
 from boulder_sweep.views.verdict_map import CLASSES, _caption, classes_of, draw_verdict_map
-from boulder_sweep.views.wording import label, value_text
 from tests.answers.designs import bare_need
 
 GRID = """\
@@ -138,14 +137,6 @@ def test_classes_of_all_verdicts() -> None:
     assert names == expected
 
 
-def test_map_is_drawn_as_cells_or_as_points(table: pd.DataFrame, tmp_path: Path) -> None:
-    draw_verdict_map(table, tmp_path / "cells.png", title="made up")
-    scattered = table.sample(60, random_state=1).assign(boulder_height_m=lambda t: t.boulder_height_m + t.index * 1e-4)
-    draw_verdict_map(scattered, tmp_path / "points.png")
-    for name in ("cells.png", "points.png"):
-        assert (tmp_path / name).stat().st_size > 10_000
-
-
 def drawn(table, monkeypatch: pytest.MonkeyPatch, path: Path, **options: Any) -> tuple[Slice, list[Any]]:
     """Draw a map; what it is of, and the numbers that are drawn in each of its panels."""
     numbers: list[Any] = []
@@ -244,18 +235,6 @@ def test_the_command_never_holds_more_than_a_few_parts(out, monkeypatch, capsys)
     assert sum(held) == 18
 
 
-def test_words() -> None:
-    assert label("boulder_height_m") == "boulder height [m]"
-    assert label("subgrade_reaction_MN_m3") == "subgrade reaction β [MN/m³]"
-    assert label("vehicle_damper_N_s_m") == "vehicle damper [kN·s/m]"
-    assert label("vehicle_damper_N_s_m", "us") == "vehicle damper [lb·s/in]"
-    assert value_text("subgrade_reaction_MN_m3", 95.0, "us") == "β = 350 pci"
-    assert value_text("impact_speed_m_s", 13.4112, "us") == "speed 30 mph"
-    assert label("strain_rate_factor") == "strain rate factor"
-    assert value_text("friction_angle_deg", 36.0) == "φ′ = 36°"
-    assert value_text("bed_offset_m", 2.9) == "bed offset 2.9 m"
-
-
 @pytest.fixture
 def out(tmp_path: Path) -> Path:
     (tmp_path / "grid.yaml").write_text(GRID)
@@ -269,13 +248,6 @@ def test_command_draws_a_map(out: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert printed.startswith(str(out.with_suffix(".png")))
     assert "18 of 36 designs" in printed
     assert out.with_suffix(".png").stat().st_size > 10_000
-
-
-@pytest.mark.parametrize("name", ["soil.subgrade_reaction", "subgrade_reaction", "subgrade_reaction_MN_m3"])
-def test_command_takes_every_name_of_an_input(out: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
-    assert execute(["plot", str(out), "--at", f"{name}=95 MN/m^3"]) == 0
-    assert "18 of 36 designs" in capsys.readouterr().out
-    assert execute(["plot", str(out), "--columns", name, "--rows", "friction_angle"]) == 0
 
 
 def test_command_says_which_value_it_took(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -294,20 +266,6 @@ def test_a_list_of_designs_without_a_common_plane_is_refused(table: pd.DataFrame
     with pytest.raises(PictureError, match=r"none of the 6 designs lies at .*a list of designs rather than a grid"):
         draw_verdict_map(one_by_one, tmp_path / "map.png")
     assert not (tmp_path / "map.png").exists()
-
-
-def test_a_long_caption_is_broken_into_lines_that_fit(
-    table: pd.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    import matplotlib.figure
-
-    captions = []
-    monkeypatch.setattr(matplotlib.figure.Figure, "supxlabel", lambda self, text, **_: captions.append((self, text)))
-    found = draw_verdict_map(table, tmp_path / "map.png", columns="friction_angle_deg", rows="boulder_width_m")
-    assert found.column_values == [36.0, 42.0]
-    (fig, text) = captions[0]
-    assert max(map(len, text.splitlines())) <= 15 * fig.get_figwidth()
-    assert "of them pass" in text
 
 
 def test_the_caption_tells_truck_speed_and_constants(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
