@@ -30,14 +30,6 @@ from boulder_sweep.settings.shape import tapered
 from boulder_sweep.settings.sweep import DesignList
 from tests.answers.designs import DEPTH, bare_need, passes, random_designs, site
 
-ONE_UNCERTAIN = """
-name: one
-boulder: {length: 1.65 m, width: 1.68 m, height: 3.2 m, density: 2596 kg/m^3}
-site: {embedment_depth: 2.2 m}
-soil: {density: 1859.9 kg/m^3, friction_angle: {mean: 40 deg, sd: 2 deg}, subgrade_reaction: 60 MN/m^3}
-vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
-"""
-
 
 def certify(found: Need) -> int:
     """Judge both ends of all brackets again; return how many brackets there were."""
@@ -194,7 +186,8 @@ def test_rows_do_not_depend_on_their_neighbours() -> None:
 def test_progress_counts_rows_or_the_values_tried_for_a_probability() -> None:
     """One row of many samples takes long: its progress moves, up to the end."""
     seen: list[tuple[int, int]] = []
-    bare_need(load_text(ONE_UNCERTAIN, Path("one.yaml")), probability=0.9, progress=lambda *now: seen.append(now))
+    one = {"height": "3.2 m", "site": "embedment_depth: 2.2 m", "friction": "{mean: 40 deg, sd: 2 deg}"}
+    bare_need(site(**one), probability=0.9, progress=lambda *now: seen.append(now))
     done, totals = zip(*seen, strict=True)
     assert len(set(totals)) == 1
     assert totals[0] > 10

@@ -298,23 +298,15 @@ def test_every_named_soil_may_have_its_own_distribution() -> None:
     assert drawn == pytest.approx([40.0, 41.0, 44.0] * 2, abs=1e-3)
     block_of(spread.filled(rows, z))
     found = boulder_sweep.uncertainty(sweep, half_width=0.05).frame
+    usual = {"height": "[3.0, 3.4] m", "site": "embedment_depth: 2.1 m"}
     alone = [
-        boulder_sweep.uncertainty(load_text(one, Path("one.yaml")), half_width=0.05).frame.p_pass.to_numpy()
-        for one in (ALONE.format("{mean: 40 deg, sd: 1 deg}"), ALONE.format("{mean: 40 deg, cov: 10 %}"))
+        boulder_sweep.uncertainty(site(**usual, friction=one), half_width=0.05).frame.p_pass.to_numpy()
+        for one in ("{mean: 40 deg, sd: 1 deg}", "{mean: 40 deg, cov: 10 %}")
     ]
     chances = found.p_pass.to_numpy().reshape(2, 3)
     assert set(chances[:, 0]) <= {0.0, 1.0}
     assert np.array_equal(chances[:, 1:].T, np.stack(alone))
     assert sweep.resolved()["distributions"]["friction_angle_deg"]["sets"][0] is None
-
-
-ALONE = """
-name: one
-boulder: {{length: 1.65 m, width: 1.68 m, height: [3.0, 3.4] m, density: 2600 kg/m^3}}
-site: {{embedment_depth: 2.1 m}}
-soil: {{density: 1860 kg/m^3, friction_angle: {}, subgrade_reaction: 60 MN/m^3}}
-vehicle: {{mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}}
-"""
 
 
 def test_a_probability_is_asked_for_in_every_named_soil() -> None:

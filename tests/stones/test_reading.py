@@ -110,13 +110,7 @@ TURN = [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]
         (glb(*gltf(1e3 * BOX[0], BOX[1], real="i2")), 4.8e9),
     ],
     ids=[
-        "scaled and turned",
-        "mirrored",
-        "matrix",
-        "under a camera",
-        "a chain",
-        "not in the scene",
-        "strips",
+        *("scaled and turned", "mirrored", "matrix", "under a camera", "a chain", "not in the scene", "strips"),
         "whole numbers",
     ],
 )

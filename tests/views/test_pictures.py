@@ -59,13 +59,6 @@ def test_picture_is_drawn_and_is_the_same_again(held: Trajectory, tmp_path: Path
     assert has_colour(image, "#D55E00")
 
 
-def test_time_after_the_limit_is_shaded(held: Trajectory, overturned: Trajectory, tmp_path: Path) -> None:
-    held.plot(tmp_path / "held.png")
-    overturned.plot(tmp_path / "overturned.png")
-    assert not has_colour(picture(tmp_path / "held.png"), "#F3E7DF")
-    assert has_colour(picture(tmp_path / "overturned.png"), "#F3E7DF", least=20_000)
-
-
 def test_the_rebound_is_shaded(held: Trajectory, overturned: Trajectory, tmp_path: Path) -> None:
     """The springs of the soil have no memory: what they do after the peak is not to be relied on."""
     start, words = unreliable_from(held)
@@ -73,6 +66,9 @@ def test_the_rebound_is_shaded(held: Trajectory, overturned: Trajectory, tmp_pat
     assert "rebound" in words
     held.plot(tmp_path / "held.png")
     assert has_colour(picture(tmp_path / "held.png"), AFTER_PEAK, least=20_000)
+    overturned.plot(tmp_path / "overturned.png")
+    assert not has_colour(picture(tmp_path / "held.png"), "#F3E7DF")
+    assert has_colour(picture(tmp_path / "overturned.png"), "#F3E7DF", least=20_000)
     assert unreliable_from(overturned)[0] == overturned.row["time_to_limit_s"]
     assert "20°" in unreliable_from(overturned)[1]
 
