@@ -18,6 +18,7 @@ from boulder_sweep.crash_tests.rigid_wall import RigidWall
 from boulder_sweep.errors import FitError
 from docs.studies.example_pulse import example_pulse
 from tests.conftest import Command
+from tests.oracle.vehicle import WallImpact
 
 PAPER = rigid_wall_test()
 OVER_DAMPED = replace(PAPER, damper_N_s_m=55e3)
@@ -27,21 +28,12 @@ SEEDS = 10
 
 
 def known(wall: RigidWall, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Displacement, velocity and acceleration by Eqs 49 to 51, its misprint put right; before first touch and after."""
-    m, v_0, k, c = wall.mass_kg, wall.speed_m_s, wall.spring_N_m, wall.damper_N_s_m
-    a = -k / (2.0 * c)
-    b = np.sqrt(complex(k / m - a * a))  # imaginary where over-damped
-    size = a * a + b * b
-    P, Q = (v_0 - 2.0 * a * a * v_0 / size) / b, 2.0 * a * v_0 / size
-    end = np.pi / b.real if b.real > 0.0 else np.inf
+    """Displacement, velocity and acceleration by the oracle; before first touch and after separation, too."""
+    impact = WallImpact(wall.mass_kg, wall.speed_m_s, wall.spring_N_m, wall.damper_N_s_m)
+    end = impact.separation()[0]
     s = np.clip(t, 0.0, end)
-    sin, cos, decay = np.sin(b * s), np.cos(b * s), np.exp(a * s)
-    x = -Q + decay * (P * sin + Q * cos)
-    v = decay * ((a * P - b * Q) * sin + (a * Q + b * P) * cos)
-    slope = decay * (
-        (a * (a * P - b * Q) - b * (a * Q + b * P)) * sin + (a * (a * Q + b * P) + b * (a * P - b * Q)) * cos
-    )
-    return x.real + v.real * (t - s), v.real, np.where((t > 0.0) & (t < end), slope.real, 0.0)
+    x, v, slope = impact.response(s)
+    return x + v * (t - s), v, np.where((t > 0.0) & (t < end), slope, 0.0)
 
 
 def made(
