@@ -16,25 +16,6 @@ from tests.store.folders import OTHER_VERSIONS, rewrite
 CONFIGS = Path(__file__).parents[2] / "configs"
 
 
-@pytest.mark.parametrize(
-    ("case", "preset", "verdict", "rotation", "displacement"),
-    [
-        ("rwg", "corrected", "pass", 13.7612, 0.2820),
-        ("rwg", "as_printed", "undecided", 7.6940, 0.1505),
-        ("abg", "corrected", "fail", 20.0, 0.1924),
-        ("abg", "as_printed", "fail", 20.0, 0.2206),
-    ],
-)
-def test_the_crash_tests(sweep, case, preset, verdict, rotation, displacement):
-    code, out, err = sweep("simulate", CONFIGS / f"{case}.yaml", "--set", f"model.readings={preset}", "--json")
-    assert (code, err) == (0, "")
-    found = json.loads(out)
-    assert found["verdict"] == verdict
-    assert found["preset"] == preset
-    assert found["max_rotation_deg"] == pytest.approx(rotation, abs=0.02)
-    assert found["max_displacement_m"] == pytest.approx(displacement, abs=5e-4)
-
-
 def test_sentence_and_json_state_the_row_that_run_writes(sweep, tmp_path):
     """A boulder that the horizon of one second finds at 11 deg; it comes to rest in the second after."""
     late = Path(__file__).parents[1] / "judge" / "settles_late.csv"

@@ -183,14 +183,6 @@ def test_the_end_of_the_search_is_not_called_the_least_depth():
     assert "least depth" not in text.replace("least depth tried", "")
 
 
-def test_how_far_it_slides_and_its_flags_stand_beside_a_depth(placed_at_a_site):
-    text = "\n".join(placing_lines(placed_at_a_site, str(ROCK), "m", str(SITE_FILE)))
-    assert " turns  slides " in text
-    for way in placed_at_a_site.passing:
-        assert f"{way.row['max_rotation_deg']:.1f}    {way.row['max_displacement_m']:.2f}" in text
-    assert "flags: 0 of 2 answers inside what the model was tested on; rotation 2" in text
-
-
 def test_a_stone_that_the_truck_goes_over_says_so():
     placing, text = placed_way("a", "b", "criterion.min_overlap=1.5 m")
     assert placing.passing == []

@@ -276,12 +276,6 @@ def test_a_test_without_anything_to_compare_is_refused(tmp_path: Path, film: str
         overlay(tmp_path / "film.csv", str(case))
 
 
-def test_an_accelerometer_is_read_in_g(tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text("time [ms],truck_acceleration [g]\n0,0\n50,-14\n")
-    measured = read_history(tmp_path / "a.csv", TEST_SIGNALS)
-    assert measured.signals["vehicle_acceleration"].tolist() == [0.0, -14 * 9.80665]
-
-
 @pytest.mark.usefixtures("known_study")
 def test_command_overlays_measured_data(sweep: Command, tmp_path: Path) -> None:
     film = tmp_path / "film.csv"

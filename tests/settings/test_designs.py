@@ -25,12 +25,6 @@ KEYS = {
 }
 
 
-def _reasons(sweep, stop):
-    """Return why each of the first rows cannot be computed."""
-    found = sweep.block(0, stop).reasons
-    return [found[row] for row in range(stop)]
-
-
 def _reason(row):
     """Say plainly, for one row, why it cannot be computed."""
     exposed = row["boulder_height_m"] - row["embedment_depth_m"]
@@ -221,19 +215,6 @@ def test_a_long_list_of_ever_different_values_is_no_dictionary():
     assert lookup is None
     assert dictionary is not None
     assert len(dictionary) == len(source.values)
-
-
-def test_parts_of_a_grid_without_possible_rows(load_with):
-    sweep = load_with("boulder.height=[1.5, 2.5]", "site.embedment_depth=[1, 1.5, 2]")
-    deep = "embedment depth is not less than the boulder's height"
-    assert _reasons(sweep, 6) == ["", deep, deep, "", "", ""]
-
-
-def test_a_truck_that_passes_over_the_boulder_is_no_mistake(load_with):
-    sweep = load_with("site.embedment_depth=[2.03, 3.0]", "site.impact_height=0.9")
-    assert _reasons(sweep, 2) == ["", ""]
-    sweep = load_with("boulder.height=[2.6, 2.7, 3.44]", "site.impact_height=0.9")
-    assert _reasons(sweep, 3) == ["impact height is above the top of the boulder"] * 2 + [""]
 
 
 def test_sweeps_travel_to_other_processes(load_it, example):

@@ -330,19 +330,6 @@ def test_beside_a_table_its_columns_win(load_it, minimal, tmp_path):
     assert list(sweep.distributions) == [DENSITY]
 
 
-def test_blows_at_an_energy_ratio_of_60_percent(load_it, minimal):
-    """N60 is N corrected for the energy alone, so it is not (N1)60, which is that at 100 kPa."""
-    readings = ("n60: 13", "n: 13, energy_ratio: 60 %", "n: 10, energy_ratio: 78 %")
-    by_n60, by_n, by_ratio = (
-        load_it(minimal.replace(CONSTANTS, f"  spt: {{{one}, depth: 1.5 m}}\n")) for one in readings
-    )
-    assert by_n60.derived == by_n.derived
-    angles = [sweep.constants[ANGLE] for sweep in (by_n60, by_ratio)]
-    assert angles[0] == pytest.approx(angles[1], rel=1e-12)
-    corrected = load_it(minimal.replace(CONSTANTS, "  spt: {n1_60: 13}\n"))
-    assert corrected.constants[ANGLE] != pytest.approx(angles[0], abs=1.0)
-
-
 @pytest.mark.parametrize(
     ("entry", "position", "words"),
     [

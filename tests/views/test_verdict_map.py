@@ -268,22 +268,6 @@ def test_a_list_of_designs_without_a_common_plane_is_refused(table: pd.DataFrame
     assert not (tmp_path / "map.png").exists()
 
 
-def test_the_caption_tells_truck_speed_and_constants(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import matplotlib.figure
-
-    captions: list[str] = []
-    monkeypatch.setattr(matplotlib.figure.Figure, "supxlabel", lambda self, text, **_: captions.append(text))
-    assert execute(["plot", str(out)]) == 0
-    caption = " ".join(captions[0].replace("\N{NO-BREAK SPACE}", " ").split())
-    for words in ("length 1.65 m", "width 1.68 m", "boulder 2596 kg/m³", "soil 1859.9 kg/m³", "vehicle 6803.9 kg",
-                  "speed 13.411 m/s", "spring 3103.3 kN/m", "damper 138.91 kN·s/m", "bumper height 0.5 m"):  # fmt: skip
-        assert words in caption
-    assert "strain rate" not in caption
-    assert caption.endswith(
-        "Pass: rotation up to 20° and rating P1 · readings corrected. Simulation, not a rating by test."
-    )
-
-
 NAMED = """\
 name: three soils
 boulder: {length: 1.65 m, width: 1.68 m, height: [2.6, 3.0, 3.4] m, density: 2596 kg/m^3}
