@@ -1,4 +1,4 @@
-"""The documentation says what the commands give: every block, every picture, every link."""
+"""The documentation says what the commands give: every computed number, every picture, every link."""
 
 from __future__ import annotations
 
@@ -9,11 +9,9 @@ from pathlib import Path
 import pytest
 
 from boulder_sweep import load
-from docs.studies import stamps
 from docs.studies.__main__ import PULSE, ROCK, main
-from docs.studies.contents import CONTENTS, EVERY, GRID, LONG, compute, readings_of_grid
+from docs.studies.contents import CONTENTS, EVERY, GRID, readings_of_grid
 from docs.studies.documents import blocks, pages
-from docs.studies.drift import drift
 from docs.studies.energy import AUDIT_DESIGNS
 from docs.studies.example_pulse import NOISE_G, NOISE_MM, example_pulse
 from docs.studies.example_rock import example_rock
@@ -148,22 +146,3 @@ def test_pictures_are_drawn_by_the_command(tmp_path: Path) -> None:
     drawn = draw_all(tmp_path)
     assert all(path.stat().st_size < MOST_BYTES for path in drawn)
     assert {path.name for path in drawn} == {path.name for path in (DOCS / "images").iterdir()}
-
-
-def drift_of(name: str) -> list[str]:
-    """Compute a block; write it anew with ``python -m docs.studies --write NAME``."""
-    (written,) = [block.text for block in blocks(ROOT) if block.name == name]
-    return drift(written, compute(ROOT, [name])[name])
-
-
-@pytest.mark.parametrize("name", [name for name in CONTENTS if name not in LONG])
-def test_a_number_has_not_drifted_where_its_sources_changed(name: str) -> None:
-    """A block whose sources are those that it was last checked with is not computed again."""
-    if stamps.read(ROOT).get(name) != stamps.stamp(ROOT, CONTENTS[name]):
-        assert drift_of(name) == []
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("name", CONTENTS)
-def test_no_number_has_drifted(name: str) -> None:
-    assert drift_of(name) == []
