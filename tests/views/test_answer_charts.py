@@ -12,6 +12,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from boulder_sweep.answers.need import need
 from boulder_sweep.answers.uncertainty import Uncertainty, uncertainty
 from boulder_sweep.text import chance_text
 from tests.answers.designs import site
@@ -94,3 +95,17 @@ def test_the_picture_says_of_which_design_it_is(found, tmp_path, monkeypatch):
 )
 def test_digits_of_a_probability(chance: float, text: str) -> None:
     assert chance_text(chance) == text
+
+
+@pytest.mark.parametrize(
+    ("probability", "words"), [("95 %", "passes with a probability of at least 95 %"), (None, "depth that passes")]
+)
+def test_the_title_says_for_which_probability(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, probability: str | None, words: str
+) -> None:
+    drawn: list[Figure] = []
+    monkeypatch.setattr("boulder_sweep.views.pictures.save", lambda fig, target: drawn.append(fig))
+    friction = "{mean: 40 deg, sd: 1 deg}" if probability else "40 deg"
+    sweep = site(height="[3.2, 3.4] m", site="embedment_depth: [1.9, 2.3] m", friction=friction)
+    need(sweep, probability=probability).plot(tmp_path / "chart.png")
+    assert " ".join(drawn[0].texts[0].get_text().split()).endswith(words)
