@@ -1,10 +1,11 @@
-"""The least that passes: every bracket is judged again as a run judges it."""
+"""The least that passes: every bracket is judged again as a run judges it, under second opinions, too."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,26 +14,21 @@ import pyarrow.parquet as pq
 import pytest
 
 import boulder_sweep
-from boulder_sweep.answers.keys import key_of
-from boulder_sweep.answers.need import Need, need
-from boulder_sweep.answers.printing import need_lines
+from boulder_sweep.answers.need import Need
+from boulder_sweep.answers.printing import need_lines, uncertainty_lines
 from boulder_sweep.answers.trials import Remembered, judges_of
+from boulder_sweep.answers.uncertainty import uncertainty
 from boulder_sweep.designs import DesignBlock, some
 from boulder_sweep.errors import PictureError, QuestionError
-from boulder_sweep.judge.evaluation import Evaluation
+from boulder_sweep.judge.accuracy import accuracy_of
+from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 from boulder_sweep.judge.judged import PASS, Judged
-from boulder_sweep.judge.quantiles import at_values
+from boulder_sweep.judge.robustness import ROBUST
 from boulder_sweep.settings import Sweep, load_text
+from boulder_sweep.settings.model import SECOND_OPINIONS
+from boulder_sweep.settings.shape import tapered
 from boulder_sweep.settings.sweep import DesignList
 from tests.answers.designs import DEPTH, bare_need, passes, random_designs, site
-
-ONE_UNCERTAIN = """
-name: one
-boulder: {length: 1.65 m, width: 1.68 m, height: 3.2 m, density: 2596 kg/m^3}
-site: {embedment_depth: 2.2 m}
-soil: {density: 1859.9 kg/m^3, friction_angle: {mean: 40 deg, sd: 2 deg}, subgrade_reaction: 60 MN/m^3}
-vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
-"""
 
 
 def certify(found: Need) -> int:
@@ -190,7 +186,8 @@ def test_rows_do_not_depend_on_their_neighbours() -> None:
 def test_progress_counts_rows_or_the_values_tried_for_a_probability() -> None:
     """One row of many samples takes long: its progress moves, up to the end."""
     seen: list[tuple[int, int]] = []
-    bare_need(load_text(ONE_UNCERTAIN, Path("one.yaml")), probability=0.9, progress=lambda *now: seen.append(now))
+    one = {"height": "3.2 m", "site": "embedment_depth: 2.2 m", "friction": "{mean: 40 deg, sd: 2 deg}"}
+    bare_need(site(**one), probability=0.9, progress=lambda *now: seen.append(now))
     done, totals = zip(*seen, strict=True)
     assert len(set(totals)) == 1
     assert totals[0] > 10
@@ -218,30 +215,17 @@ def test_progress_counts_rows_or_the_values_tried_for_a_probability() -> None:
         ({"margin": "-1"}, "less than 100 %"),
         ({"most": "mass"}, "use --least mass"),
         ({"least": "mass", "between": ("1 kg", "2 kg")}, "--least mass takes no --between"),
-    ],
-)
-def test_questions_that_make_no_sense_are_refused(question: dict, message: str) -> None:
-    with pytest.raises(QuestionError, match=message):
-        bare_need(site(), **question)
-
-
-@pytest.mark.parametrize(
-    ("question", "message"),
-    [
         (
             {"most": "speed", "between": ("12.001 m/s", "12.009 m/s")},
-            r"12\.001 to 12\.009 m/s, holds no multiple of its",
+            r"12\.001 to 12\.009 m/s, holds no multiple of",
         ),
         ({"most": "speed", "between": ("12.001 m/s", "12.015 m/s")}, r"holds only one multiple of its step, 0\.01 m/s"),
-        (
-            {"between": ("1.9491 m", "1.9499 m")},
-            r"1\.9491 to 1\.9499 m, holds no multiple of its step, 0\.001 m; give",
-        ),
+        ({"between": ("1.9491 m", "1.9499 m")}, r"1\.9491 to 1\.9499 m, holds no multiple of its step, 0\.001 m; give"),
         ({"least": "embedment_ratio", "between": (0.6101, 0.6109)}, r"0\.6101 to 0\.6109, holds no multiple"),
     ],
 )
 @pytest.mark.filterwarnings("error")
-def test_a_range_that_is_too_narrow_is_refused(question: dict, message: str) -> None:
+def test_questions_that_make_no_sense_are_refused(question: dict, message: str) -> None:
     with pytest.raises(QuestionError, match=message):
         bare_need(site(height="2.6 m"), **question)
 
@@ -297,15 +281,6 @@ def test_a_partial_factor_on_the_angle_that_is_asked_for_is_refused() -> None:
         bare_need(factored, "friction_angle")
 
 
-def test_distributions_are_taken_at_their_unfavourable_quantiles() -> None:
-    uncertain = site(friction="{mean: 38 deg, sd: 3 deg}")
-    assert bare_need(uncertain).arrow.equals(bare_need(at_values(uncertain)).arrow)
-
-
-def test_values_of_the_lattice_are_those_that_a_file_would_give() -> None:
-    assert key_of("embedment_depth").values(np.array([1234]))[0] == 1.234
-
-
 def test_table_has_units_and_settings(tmp_path: Path) -> None:
     found = bare_need(site())
     path = found.write(tmp_path / "depths.parquet")
@@ -330,11 +305,6 @@ def test_chart_is_drawn(tmp_path: Path) -> None:
         bare_need(site(height="3 m", friction="40 deg")).plot(tmp_path / "one.png")
     with pytest.raises(PictureError, match="nothing passes"):
         bare_need(site(), margin="99 %").plot(tmp_path / "none.png")
-
-
-def test_public_name() -> None:
-    assert boulder_sweep.need is need
-    assert boulder_sweep.Need is Need
 
 
 def test_a_design_is_judged_once_with_the_accuracy_of_the_sweep(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -367,3 +337,91 @@ def test_judging_again_gives_the_same_rows() -> None:
         assert mine.words == theirs.words
         for name, values in theirs.columns.items():
             np.testing.assert_array_equal(mine[name], values)
+
+
+def test_the_least_robust_depth_is_robust_and_the_next_one_is_not() -> None:
+    sweep = site(height="[2.8, 3] m", width="2.4 m")
+    found = bare_need(sweep, robust=True)
+    evaluation = evaluation_of(sweep, accuracy_of(sweep)).asked()
+    rows = [row for row in found.arrow.to_pylist() if row["passes_at"] is not None]
+    assert len(rows) >= 3
+    for row in rows:
+        assert row["robustness"] == "robust"
+        assert row["stands_under"] in ("paper;width_capped", None)  # none is asked in the free region
+        at = [row["passes_at"], row["fails_at"]]
+        given = sweep.constants | {name: row[name] for name in ("boulder_height_m", "friction_angle_deg")}
+        given.pop("embedment_ratio", None)
+        grades = []
+        for depth in at:
+            one = replace(sweep, axes=(), constants=given | {"embedment_depth_m": depth}, table=None)
+            judged = evaluation(one.block(0, 1))
+            grades.append(judged.verdict[0] == PASS and judged["robustness"][0] == ROBUST)
+        assert grades == [True, False]
+
+
+def test_robust_costs_depth_and_answers_are_graded_without_asking() -> None:
+    sweep = site(height="[3, 3.4] m")
+    least, robust = (bare_need(sweep, robust=asked) for asked in (False, True))
+    depths = [np.array(found.arrow["passes_at"].to_pylist(), dtype=float) for found in (least, robust)]
+    both = np.isfinite(depths[0]) & np.isfinite(depths[1])
+    assert (depths[1][both] > depths[0][both]).all()
+    grades = [grade for grade, depth in zip(least.arrow["robustness"].to_pylist(), depths[0], strict=True) if depth > 0]
+    assert set(grades) == {"sensitive"}
+    assert any(line.startswith("sensitive: a second opinion overturns it") for line in need_lines(least, notes=True))
+    assert any(line.startswith("robust: stands with friction") for line in need_lines(robust, notes=True))
+
+
+def test_what_second_opinions_do_not_know_is_refused_in_words() -> None:
+    wet = site()
+    wet = replace(wet, model=replace(wet.model, water_table_m=0.5))
+    with pytest.raises(QuestionError, match="dry, level, uniform soil"):
+        bare_need(wet, robust=True)
+    assert set(bare_need(wet).arrow["robustness"].to_pylist()) <= {"open", None}
+    uncertain = site(friction="{mean: 38 deg, sd: 2 deg}")
+    with pytest.raises(QuestionError, match="cannot be used together"):
+        bare_need(uncertain, robust=True, probability=0.95)
+
+
+def test_no_grade_stands_beside_a_probability() -> None:
+    """It would be that of the mean soil, and says nothing of the designs drawn."""
+    sweep = site(friction="{mean: 40 deg, sd: 1 deg}", height="3.4 m")
+    asked = replace(sweep, model=replace(sweep.model, second_opinion=SECOND_OPINIONS))
+    found, likely = uncertainty(asked, half_width=0.2), bare_need(asked, probability=0.9)
+    assert likely.counts() == {"found": 1}
+    for answers, lines in ((found, uncertainty_lines(found)), (likely, need_lines(likely, notes=True))):
+        assert answers.arrow["robustness"].to_pylist() == [None]
+        assert answers.arrow["stands_under"].to_pylist() == [None]
+        assert not any(word in "\n".join(lines) for word in ("robust", "sensitive", "opinion"))
+
+
+SPEED = "impact_speed_m_s"
+TAPERED = {"height": "3.4 m, taper: 0.8", "friction": "38 deg"}
+
+
+@pytest.mark.nightly
+def test_the_lightest_tapered_boulder_is_lighter_than_any_of_the_grid(tmp_path: Path) -> None:
+    sweep = site(
+        height="{from: 2.6 m, to: 3.4 m, step: 0.1 m}, taper: 0.8",
+        site="embedment_ratio: {from: 0.55, to: 0.75, step: 0.02}",
+        friction="40 deg",
+    )
+    boulder_sweep.run(sweep, tmp_path / "grid")
+    table = boulder_sweep.read(tmp_path / "grid")
+    filled = tapered(0.8).filled
+    volume = table.boulder_length_m.astype(float) * table.boulder_width_m.astype(float) * filled
+    mass = (volume * table.boulder_height_m.astype(float) * table.boulder_density_kg_m3.astype(float))[
+        table.verdict == "pass"
+    ]
+    found = bare_need(sweep, "mass")
+    row = found.frame.iloc[0]
+    assert 0.9 * mass.min() < row.boulder_mass_kg <= mass.min()
+    volume = row.boulder_length_m * row.boulder_width_m * row.boulder_height_m * filled
+    assert row.boulder_mass_kg == pytest.approx(volume * row.boulder_density_kg_m3)
+    assert passes(found, found.frame, found.frame[DEPTH], DEPTH).all()
+
+
+def test_the_fastest_truck_that_a_tapered_boulder_withstands() -> None:
+    found = bare_need(site(**TAPERED), most="speed")
+    assert passes(found, found.frame, found.frame.passes_at, SPEED).all()
+    assert not passes(found, found.frame, found.frame.fails_at, SPEED).any()
+    assert (found.frame.fails_at - found.frame.passes_at).between(0.0, 0.01).all()

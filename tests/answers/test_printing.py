@@ -7,11 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boulder_sweep import uncertainty
-from boulder_sweep.answers.printing import HEADS, need_lines, reserve_lines, uncertainty_lines
-from boulder_sweep.answers.reserves import reserves
+from boulder_sweep.answers.printing import need_lines
 from boulder_sweep.settings import load_text
-from boulder_sweep.settings.fields import INPUTS
 from tests.answers.designs import bare_need, site
 
 RATIOS = "embedment_ratio: [0.6, 0.65]"
@@ -21,10 +18,6 @@ UNCERTAIN = {"friction": "{mean: 38 deg, sd: 2 deg}", "site": RATIOS}
 def table_of(lines: list[str]) -> list[str]:
     """Return lines from the head of the table on."""
     return lines[lines.index("") + 1 :]
-
-
-def test_every_input_has_a_head() -> None:
-    assert set(HEADS) == {field.name for field in INPUTS}
 
 
 @pytest.mark.parametrize("key", ["speed", "height", "friction_angle"])
@@ -37,25 +30,6 @@ def test_ratios_tell_answers_apart(key: str) -> None:
     rows = [line.split() for line in lines[3 : 3 + len(found)]]
     inputs = heads.index("mass") - 1  # the answer stands before the mass
     assert len({tuple(row[:inputs]) for row in rows}) == len(rows) == 2 * 2 * 2 / {"speed": 1}.get(key, 2)
-
-
-def test_ratios_tell_designs_apart_whose_reserves_or_chances_are_shown() -> None:
-    lines = reserve_lines(reserves(site(site=RATIOS, height="3 m")))
-    assert lines[0].split()[:3] == ["ratio", "φ′", "verdict"]
-    assert [line.split()[0] for line in lines[3:7]] == ["0.6", "0.6", "0.65", "0.65"]
-    found = uncertainty(site(**UNCERTAIN, height="3 m"), half_width=0.2)
-    lines = uncertainty_lines(found)
-    assert lines[0].split()[0] == "ratio"
-    assert [line.split()[0] for line in lines[3:5]] == ["0.6", "0.65"]
-
-
-@pytest.mark.parametrize("given", ["embedment_depth: [1.8, 2.0] m", RATIOS])
-@pytest.mark.parametrize("key", ["embedment_ratio", "embedment_depth", "mass"])
-def test_the_other_measure_of_what_is_asked_for_is_no_input(key: str, given: str) -> None:
-    heads = table_of(need_lines(bare_need(site(site=given), key), table=True))[0].split()
-    assert heads[: 2 if key != "mass" else 1] == (["H", "φ′"] if key != "mass" else ["φ′"])
-    assert heads.count("depth") == (0 if key == "embedment_ratio" else 1)
-    assert heads.count("ratio") == (0 if key == "mass" else 1)
 
 
 GRID = """\
@@ -106,39 +80,3 @@ def test_the_boulder_that_is_recommended_is_marked(many) -> None:
     sizes = many.recommendation.design.sizes
     (marked,) = (line.split()[1:3] for line in lines if "→" in line)
     assert [float(cell) for cell in marked] == [sizes["boulder_width_m"], sizes["boulder_height_m"]]
-
-
-def test_of_too_many_boulders_the_best_are_shown(many, monkeypatch) -> None:
-    monkeypatch.setattr("boulder_sweep.answers.printing.MOST_SHOWN", 5)
-    lines = table_of(need_lines(many))
-    assert [line.split()[-1] for line in lines[3:8]] == ["8"] * 5
-    masses = [float(line.replace("→", " ").split()[2]) for line in lines[3:8]]
-    assert masses == sorted(masses)
-    assert lines[8] == "(5 of 12, the best first; --table has all answers)"
-    assert "→" in lines[3]
-
-
-def test_the_table_of_all_answers_ends_somewhere(many, monkeypatch) -> None:
-    monkeypatch.setattr("boulder_sweep.answers.printing.MOST_IN_ALL", 20)
-    lines = table_of(need_lines(many, table=True))
-    assert lines[0].split()[:7] == ["W", "H", "φ′", "β", "depth", "ratio", "above"]
-    assert lines[23] == "(the first 20 of 96 answers; -o writes them all)"
-
-
-def test_answers_without_a_soil_that_varies_are_one_table() -> None:
-    text = GRID.replace("[36, 38, 40, 42] deg", "40 deg").replace("[50, 80]", "50")
-    lines = table_of(need_lines(bare_need(load_text(text, Path("grid.yaml")))))
-    assert lines[0].split() == ["W", "H", "depth", "ratio", "above", "mass", "margin", "second", "dig", "fill"]
-    assert [line.replace("→", " ").split()[1] for line in lines[3:15]].count("3.6") == 2
-
-
-def test_named_soils_are_columns() -> None:
-    soils = [
-        f"{{name: s{place}, density: 1860 kg/m^3, friction_angle: {36 + place} deg, subgrade_reaction: 60 MN/m^3}}"
-        for place in range(4)
-    ]
-    text = "".join(
-        f"soil: [{', '.join(soils)}]\n" if line.startswith("soil") else line for line in GRID.splitlines(keepends=True)
-    )
-    lines = table_of(need_lines(bare_need(load_text(text, Path("grid.yaml")))))
-    assert lines[0].split() == ["W", "H", "mass", "all", "s0", "s1", "s2", "s3"]

@@ -15,7 +15,6 @@ from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.judged import PASS
-from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.settings import Sweep, load, load_text
 from boulder_sweep.settings.sweep import DesignList
 from tests.answers.designs import bare_need, random_designs, site
@@ -193,8 +192,3 @@ def test_only_the_end_of_what_is_tried_is_marked() -> None:
 def test_threads_do_not_matter() -> None:
     one, two = (reserves(site(), jobs=jobs) for jobs in (1, 2))
     assert one.arrow.equals(two.arrow)
-
-
-def test_distributions_are_taken_at_their_unfavourable_quantiles() -> None:
-    uncertain = site(friction="{mean: 38 deg, sd: 3 deg}")
-    assert reserves(uncertain).arrow.equals(reserves(at_values(uncertain)).arrow)

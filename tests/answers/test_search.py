@@ -47,12 +47,6 @@ def test_the_first_place_is_found_exactly(begins: int, cells: int) -> None:
     assert (found.kind[0], found.fails[0], found.holds[0], found.shown[0]) == (FOUND, begins - 1, begins, begins)
 
 
-@pytest.mark.parametrize("ends", [0, 1, 437, 998])
-def test_downwards_the_largest_is_found(ends: int) -> None:
-    found = one((0, ends, HOLDS), first=1000, last=0)
-    assert (found.kind[0], found.fails[0], found.holds[0]) == (FOUND, ends + 1, ends)
-
-
 def test_random_rows_together_as_alone() -> None:
     rng = np.random.default_rng(5)
     first = rng.integers(-500, 500, 200)
@@ -72,31 +66,33 @@ def test_random_rows_together_as_alone() -> None:
         assert found.has_holds[row] == (kind != NEVER)
 
 
-def test_always_and_never() -> None:
-    assert one((0, 1000, HOLDS)).kind[0] == ALWAYS
-    never = one()
-    assert (never.kind[0], never.shown[0], never.fails[0]) == (NEVER, 1000, 1000)
+@pytest.mark.parametrize(
+    ("stretch", "ends", "kind", "fails", "holds"),
+    [
+        *(([(0, end, HOLDS)], (1000, 0), FOUND, end + 1, end) for end in (0, 1, 437, 998)),  # downwards
+        ([(0, 1000, HOLDS)], (0, 1000), ALWAYS, None, 0),
+        ([], (0, 1000), NEVER, 1000, None),
+        ([(5, 5, HOLDS)], (5, 5), ALWAYS, None, 5),
+        ([], (5, 5), NEVER, 5, None),
+        ([(777, 1000, BEYOND)], (0, 1000), BLOCKED, 776, None),
+        ([(0, 1000, BEYOND)], (0, 1000), BLOCKED, None, None),
+        ([(770, 776, HOLDS), (777, 1000, BEYOND)], (0, 1000), FOUND, 769, 770),
+        ([(0, 300, BEYOND), (350, 1000, HOLDS)], (0, 1000), FOUND, 349, 350),
+        ([(0, 300, BEYOND), (301, 1000, HOLDS)], (0, 1000), FOUND, 300, 301),
+    ],
+)
+def test_one_change_or_none(stretch, ends, kind, fails, holds) -> None:
+    found = one(*stretch, first=ends[0], last=ends[1])
+    assert (found.kind[0], found.has_holds[0]) == (kind, holds is not None)
+    assert fails is None or found.fails[0] == fails
+    assert holds is None or found.holds[0] == holds
+    assert kind not in (NEVER, BLOCKED) or fails is None or found.shown[0] == fails
+    assert kind != ALWAYS or not found.has_fails[0]
 
 
-def test_blocked_ends_at_the_last_place_that_can_be_tried() -> None:
-    found = one((777, 1000, BEYOND))
-    assert (found.kind[0], found.shown[0], found.has_holds[0]) == (BLOCKED, 776, False)
-
-
-def test_what_holds_in_a_narrow_stretch_before_the_end_is_found() -> None:
-    found = one((770, 776, HOLDS), (777, 1000, BEYOND))
-    assert (found.kind[0], found.fails[0], found.holds[0]) == (FOUND, 769, 770)
-
-
-def test_nothing_to_try_below_is_no_failure() -> None:
-    found = one((0, 300, BEYOND), (350, 1000, HOLDS))
-    assert (found.kind[0], found.fails[0], found.holds[0]) == (FOUND, 349, 350)
-    assert one((0, 300, BEYOND), (301, 1000, HOLDS)).holds[0] == 301
-
-
-def test_nothing_to_try_at_all() -> None:
-    found = one((0, 1000, BEYOND))
-    assert (found.kind[0], found.has_holds[0]) == (BLOCKED, False)
+def test_no_rows() -> None:
+    nothing = np.zeros(0, dtype=np.int64)
+    assert len(search(stretches(), nothing, nothing).kind) == 0
 
 
 def test_rows_that_are_not_monotone_tell_every_change() -> None:
@@ -133,16 +129,6 @@ def test_an_answer_that_is_monotone_is_steady() -> None:
             assert np.array_equal(getattr(found, name), getattr(again, name))
 
 
-def test_a_range_of_one_place() -> None:
-    assert one((5, 5, HOLDS), first=5, last=5).kind[0] == ALWAYS
-    assert one(first=5, last=5).kind[0] == NEVER
-
-
-def test_no_rows() -> None:
-    nothing = np.zeros(0, dtype=np.int64)
-    assert len(search(stretches(), nothing, nothing).kind) == 0
-
-
 def test_the_last_before_is_that_of_a_loop() -> None:
     """Random rows, some of which hold from their first place on."""
     rng = np.random.default_rng(8)
@@ -169,13 +155,7 @@ def test_before_a_gap_that_is_stepped_over_the_last_is_of_the_next_one() -> None
     narrow = stretches([(69, 86, HOLDS), (89, 100, HOLDS)], [(0, 60, HOLDS), (90, 100, HOLDS)])
     fails, holds, has_fails = last_before(narrow, np.array([100, 100]), np.array([0, 0]))
     assert (fails.tolist(), holds.tolist(), has_fails.all()) == ([68, 89], [69, 90], True)
-
-
-def test_at_the_first_place_there_is_none_before() -> None:
     _, holds, has_fails = last_before(stretches([(5, 9, HOLDS)]), np.array([5]), np.array([5]))
-    assert (holds[0], has_fails[0]) == (5, False)
-
-
-def test_what_cannot_be_tried_does_not_hold() -> None:
+    assert (holds[0], has_fails[0]) == (5, False), "at the first place there is none before"
     fails, holds, _ = last_before(stretches([(0, 40, BEYOND), (41, 99, HOLDS)]), np.array([99]), np.array([0]))
-    assert (fails[0], holds[0]) == (40, 41)
+    assert (fails[0], holds[0]) == (40, 41), "what cannot be tried does not hold"

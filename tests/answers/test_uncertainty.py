@@ -1,4 +1,4 @@
-"""The chance of passing, and what decides it."""
+"""The chance of passing: against cases of which it is known, and what decides it."""
 
 from __future__ import annotations
 
@@ -9,14 +9,26 @@ import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
-from scipy.special import ndtr
+from scipy import stats
+from scipy.special import ndtr, ndtri
 
 import boulder_sweep
-from boulder_sweep.answers.chance import FIRST, Points
+from boulder_sweep.answers.chance import FIRST, SCRAMBLINGS, Points, chance, interval
+from boulder_sweep.answers.draws import WORST, Draws, _distance_of
+from boulder_sweep.answers.need import need
 from boulder_sweep.answers.printing import uncertainty_lines
+from boulder_sweep.answers.spread import Moving, Spread
+from boulder_sweep.answers.trials import judges_of, uncertain_rows
 from boulder_sweep.answers.uncertainty import drivers, uncertainty
+from boulder_sweep.designs import block_of
 from boulder_sweep.errors import PictureError, QuestionError
+from boulder_sweep.judge.judged import ERROR, FAIL, OVERRIDE, PASS, UNDECIDED, not_computed
+from boulder_sweep.judge.quantiles import values_of
+from boulder_sweep.runner.pool import Pool
+from boulder_sweep.settings import Sweep, load_text
+from boulder_sweep.settings.distributions import Distribution
 from tests.answers.designs import bare_need, site
+from tests.runner.grids import grid
 
 UNCERTAIN = {"height": "3.2 m", "site": "embedment_depth: 2.2 m", "friction": "{mean: 38 deg, sd: 3 deg}"}
 
@@ -116,5 +128,320 @@ def test_wrong_numbers_are_refused(question: dict[str, str | int], message: str)
         uncertainty(site(**UNCERTAIN), **question)
 
 
-def test_public_names() -> None:
-    assert boulder_sweep.uncertainty is uncertainty
+def linear(z: np.ndarray) -> np.ndarray:
+    return z.sum(axis=1) / np.sqrt(z.shape[1])
+
+
+@pytest.mark.parametrize("beta", [-3.0, -0.5, 0.0, 1.0, 2.5])
+def test_chance_of_a_linear_limit_state(beta: float) -> None:
+    found = chance(lambda _, z: linear(z) <= beta, 1, Points(3, 1), half_width=2e-3, confidence=0.999, most=1 << 18)
+    assert found.low[0] <= ndtr(beta) <= found.high[0]
+    assert found.high[0] - found.low[0] <= 4e-3
+    assert abs(found.estimate[0] - ndtr(beta)) < 2e-3
+
+
+def test_rows_stop_when_they_are_sure_enough() -> None:
+    edges = np.array([-9.0, 0.3, 9.0])
+    found = chance(lambda index, z: linear(z) <= edges[index], 3, Points(2, 1), half_width=5e-3)
+    assert found.points.tolist()[::2] == [FIRST * SCRAMBLINGS] * 2
+    assert found.points[1] > FIRST * SCRAMBLINGS
+    assert (found.estimate[0], found.low[0], found.estimate[2], found.high[2]) == (0.0, 0.0, 1.0, 1.0)
+    assert 0.0 < found.high[0] < 0.01
+    assert 0.99 < found.low[2] < 1.0
+
+
+def test_no_more_points_than_allowed() -> None:
+    found = chance(lambda _, z: linear(z) <= 0.3, 1, Points(2, 1), half_width=1e-6, most=2048)
+    assert found.points[0] == 2048
+    assert found.high[0] - found.low[0] > 2e-6
+
+
+def test_what_is_not_known_widens_the_interval_and_has_its_commonest_cause() -> None:
+    """Of one row half passes and a sixth is not known for two causes; of the other nothing is known."""
+
+    def event(row: np.ndarray, z: np.ndarray) -> np.ndarray:
+        share = ndtr(linear(z))
+        some = np.where(share < 0.5, 1, np.where(share < 0.6, -3, np.where(share < 2.0 / 3.0, -5, 0)))
+        return np.where(row == 0, some, -9)
+
+    found = chance(event, 2, Points(2, 1), half_width=0.01)
+    assert found.estimate == pytest.approx([0.5, 0.0], abs=5e-3)
+    assert found.unknown == pytest.approx([1.0 / 6.0, 1.0], abs=5e-3)
+    assert found.cause.tolist() == [3, 9]
+    assert found.low == pytest.approx([0.5, 0.0], abs=0.011)
+    assert found.high == pytest.approx([2.0 / 3.0, 1.0], abs=0.011)
+    assert found.low[0] < 0.5 < 2.0 / 3.0 < found.high[0]
+    assert chance(lambda _, z: linear(z) < 0.3, 1, Points(2, 1), half_width=0.01).unknown[0] == 0.0
+
+
+def test_the_same_seed_gives_the_same() -> None:
+    one, two, other = (chance(lambda _, z: linear(z) <= 0.3, 1, Points(2, seed), half_width=0.01) for seed in (1, 1, 2))
+    assert one.estimate[0] == two.estimate[0] != other.estimate[0]
+
+
+@pytest.mark.parametrize("edge", [0.4, 2.0])
+def test_stated_intervals_hold_at_their_rate(edge: float) -> None:
+    held = 0
+    for seed in range(200):
+        found = chance(lambda _, z: linear(z) <= edge, 1, Points(3, seed), half_width=0.01)
+        held += int(found.low[0] <= ndtr(edge) <= found.high[0])
+    assert held >= 182, "95 % of 200 are 190, less three standard deviations"
+
+
+@pytest.mark.parametrize("weights", [(1.0,), (0.95, 0.3122), (1.0, 1.0, 1.0)])
+def test_stated_intervals_hold_for_whatever_number_of_inputs_decides(weights: tuple[float, ...]) -> None:
+    """If one input decides, all scramblings often count the same; their spread alone held 85 % of the time."""
+    direction = np.array(weights) / np.linalg.norm(weights)
+    exact = np.random.default_rng(0).uniform(0.02, 0.98, 200)
+    edges, held, widths = ndtri(exact), [], []
+    for seed in range(10):
+        points = Points(len(weights), seed)
+        found = chance(lambda row, z: z @ direction <= edges[row], len(exact), points, half_width=0.01)
+        held.append((found.low <= exact) & (exact <= found.high))
+        widths.append(found.high - found.low)
+    assert np.mean(held) >= 0.95
+    assert np.min(widths) > 0.0
+    assert np.max(widths) <= 0.02 + 1e-12
+
+
+def test_scramblings_that_agree_are_not_certain() -> None:
+    low, high = interval(np.full((1, SCRAMBLINGS), 16.0), 32, 0.95)
+    assert (high - low)[0] == pytest.approx(2.0 * (1.0 - 0.05 ** (1 / 16)) / 32)
+
+
+def test_an_undecided_design_without_a_margin_is_as_good_as_at_its_limit():
+    rows = not_computed(("why",), np.zeros(4, dtype=int))
+    rows.columns["verdict"] = np.array([PASS, FAIL, UNDECIDED, ERROR], dtype=np.int32)
+    rows.columns["margin"] = np.array([0.25, -0.5, np.nan, np.nan])
+    found = _distance_of(rows, judges_of(grid()))
+    assert found[0] == 0.25
+    assert found[1] == -0.5
+    assert -1e-300 < found[2] < 0.0
+    assert found[3] == WORST
+
+
+def test_what_is_known_of_a_design_is_its_verdict_and_the_reason_of_an_undecided_one():
+    uncertain = {"site": "embedment_depth: {mean: 2.5 m, sd: 0.5 m}", "height": "3.2 m", "friction": "44 deg"}
+    sweep = site(**uncertain)
+    draws = Draws(sweep.plan.given_rows(0, 1), Spread(sweep), judges_of(sweep), Pool(1))
+    depths = np.array([1.5, 2.3, 2.6, 3.1])  # overturns, passes, hardly reaches the bumper, is passed over
+    distance, known = draws.drawn(np.zeros(4, dtype=int), ((depths - 2.5) / 0.5)[:, None])
+    assert known.tolist() == [0, 1, -OVERRIDE, 0]
+    assert (distance > 0.0).tolist() == [False, True, False, False]
+    assert distance[3] == WORST
+
+
+Z = np.concatenate([np.linspace(-8.0, 8.0, 65), [-1e-9, 0.0, 1e-9]])
+LOGNORMAL = stats.lognorm(s=np.sqrt(np.log1p(0.16)), scale=60.0 / np.sqrt(1.16))
+
+
+@pytest.mark.parametrize(
+    ("spread", "mean", "reference"),
+    [
+        (Distribution("normal", -1e9, 1e9, sd=3.0), 38.0, stats.norm(38.0, 3.0)),
+        (Distribution("normal", 30.0, 41.0, sd=3.0), 38.0, stats.truncnorm(-8 / 3, 1.0, 38.0, 3.0)),
+        (Distribution("lognormal", 0.0, 1e30, cov=0.4), 60.0, LOGNORMAL),
+        (Distribution("uniform", 12.0, 14.0), 13.0, stats.uniform(12.0, 2.0)),
+        (Distribution("triangular", 12.0, 15.0, mode=13.0), 13.0, stats.triang(1 / 3, 12.0, 3.0)),
+        (Distribution("beta", 30.0, 50.0, sd=3.0), 38.0, None),
+    ],
+)
+def test_fractiles(spread: Distribution, mean: float, reference) -> None:
+    if reference is None:
+        at, var = 0.4, (3.0 / 20.0) ** 2
+        total = at * (1.0 - at) / var - 1.0
+        reference = stats.beta(at * total, (1.0 - at) * total, 30.0, 20.0)
+    found = values_of(spread, np.full(len(Z), mean), Z)
+    assert np.allclose(found[Z < 0.5], reference.ppf(ndtr(Z[Z < 0.5])), rtol=1e-9)
+    assert np.allclose(found[Z > -0.5], reference.isf(ndtr(-Z[Z > -0.5])), rtol=1e-9)
+    assert (np.diff(np.sort(found[:65])) >= 0.0).all()
+
+
+def test_correlation_of_friction_and_stiffness() -> None:
+    sweep = site(
+        friction="{mean: 38 deg, sd: 3 deg}",
+        subgrade="{distribution: lognormal, mean: 60 MN/m^3, cov: 40 %}, correlation: 0.6",
+    )
+    spread = Spread(sweep)
+    assert spread.names == ["friction_angle_deg", "subgrade_reaction_MN_m3"]
+    z = np.random.default_rng(1).standard_normal((200_000, 2))
+    given = {name: np.broadcast_to(values[:1], len(z)) for name, values in sweep.plan.given_rows(0, 1).items()}
+    drawn = spread.filled(given, z)
+    logs = np.log(drawn["subgrade_reaction_MN_m3"])
+    assert np.corrcoef(drawn["friction_angle_deg"], logs)[0, 1] == pytest.approx(0.6, abs=0.01)
+    assert drawn["subgrade_reaction_MN_m3"].mean() == pytest.approx(60.0, rel=0.01)
+
+
+def test_certain_inputs_have_no_spread() -> None:
+    with pytest.raises(QuestionError, match="no input has a distribution"):
+        Spread(site())
+
+
+NAMED = """
+name: named
+boulder: {length: 1.65 m, width: 1.68 m, height: [3.0, 3.4] m, density: 2600 kg/m^3}
+site: {embedment_depth: 2.1 m}
+soil:
+  - {name: certain, density: 1860 kg/m^3, friction_angle: 40 deg, subgrade_reaction: 60 MN/m^3}
+  - {name: known,   density: 1860 kg/m^3, friction_angle: {mean: 40 deg, sd: 1 deg}, subgrade_reaction: 60 MN/m^3}
+  - {name: unknown, density: 1860 kg/m^3, friction_angle: {mean: 40 deg, cov: 10 %}, subgrade_reaction: 60 MN/m^3}
+vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
+"""
+
+
+def test_every_named_soil_may_have_its_own_distribution() -> None:
+    sweep = load_text(NAMED, Path("named.yaml"))
+    spread = Spread(sweep)
+    rows = uncertain_rows(sweep, sweep.plan.given_rows(0, 6), 0, 6)
+    z = np.full((6, 1), 1.0)
+    drawn = spread.filled(rows, z)["friction_angle_deg"]
+    assert drawn == pytest.approx([40.0, 41.0, 44.0] * 2, abs=1e-3)
+    block_of(spread.filled(rows, z))
+    found = boulder_sweep.uncertainty(sweep, half_width=0.05).frame
+    usual = {"height": "[3.0, 3.4] m", "site": "embedment_depth: 2.1 m"}
+    alone = [
+        boulder_sweep.uncertainty(site(**usual, friction=one), half_width=0.05).frame.p_pass.to_numpy()
+        for one in ("{mean: 40 deg, sd: 1 deg}", "{mean: 40 deg, cov: 10 %}")
+    ]
+    chances = found.p_pass.to_numpy().reshape(2, 3)
+    assert set(chances[:, 0]) <= {0.0, 1.0}
+    assert np.array_equal(chances[:, 1:].T, np.stack(alone))
+    assert sweep.resolved()["distributions"]["friction_angle_deg"]["sets"][0] is None
+
+
+def test_a_probability_is_asked_for_in_every_named_soil() -> None:
+    sweep = load_text(NAMED, Path("named.yaml"))
+    frame = boulder_sweep.need(sweep, probability=0.9).frame
+    depth = frame.least_embedment_depth_m.to_numpy().reshape(2, 3)
+    assert (np.diff(depth[1]) > 0.0).all(), "the less is known, the deeper"
+
+
+AT = np.linspace(-3.0, 3.0, 13)
+ONE = {"height": "3.2 m", "site": "embedment_depth: 2.2 m", "friction": "40 deg"}
+ENDS = "low: 2.15 m, high: 2.25 m"
+
+
+def one(**changes: str) -> Sweep:
+    """Return a sweep of one design."""
+    return site(**ONE | changes)
+
+
+def drawn(sweep: Sweep, name: str, mean: float) -> np.ndarray:
+    """Return the values of an input at `AT` if its mean is another than that of the file."""
+    rows = {own: np.repeat(values, len(AT)) for own, values in sweep.plan.given_rows(0, 1).items()}
+    rows[name] = np.full(len(AT), mean)
+    return Spread(sweep, name).filled(rows, AT[:, None])[name]
+
+
+@pytest.mark.parametrize(
+    ("spread", "proportional"),
+    [
+        ("{distribution: uniform, low: 2.15 m, high: 2.25 m}", False),
+        ("{distribution: triangular, low: 2.1 m, mode: 2.2 m, high: 2.3 m}", False),
+        (f"{{distribution: beta, mean: 2.2 m, sd: 0.02 m, {ENDS}}}", False),
+        (f"{{distribution: beta, mean: 2.2 m, cov: 1 %, {ENDS}}}", True),
+        (f"{{mean: 2.2 m, sd: 0.03 m, {ENDS}}}", False),
+        (f"{{mean: 2.2 m, cov: 2 %, {ENDS}}}", True),
+        ("{mean: 2.2 m, sd: 0.03 m, low: 2.15 m}", False),
+        (f"{{distribution: lognormal, mean: 2.2 m, cov: 2 %, {ENDS}}}", True),
+    ],
+)
+def test_a_distribution_keeps_its_shape_as_its_mean_moves(spread: str, proportional: bool) -> None:
+    sweep = one(site=f"embedment_depth: {spread}")
+    own = drawn(sweep, "embedment_depth_m", 2.2)
+    for mean in (1.3, 2.6):
+        moved = own * mean / 2.2 if proportional else own + mean - 2.2
+        assert drawn(sweep, "embedment_depth_m", mean) == pytest.approx(moved, rel=1e-9)
+
+
+def test_the_ends_of_a_lognormal_distribution_with_a_standard_deviation_move_by_as_much_as_its_mean() -> None:
+    sweep = one(site=f"embedment_depth: {{distribution: lognormal, mean: 2.2 m, sd: 0.03 m, {ENDS}}}")
+    found = drawn(sweep, "embedment_depth_m", 1.3)
+    assert found[0] == pytest.approx(1.25, abs=2e-3)
+    assert found[-1] == pytest.approx(1.35, abs=2e-3)
+
+
+def test_the_mean_of_a_characteristic_value_is_searched() -> None:
+    sweep = one(friction="{characteristic: 36 deg, sd: 2 deg, low: 34 deg, high: 44 deg}")
+    moving = Moving(sweep, "friction_angle_deg")
+    low, high = moving.ends(sweep.distributions["friction_angle_deg"], np.array([36.0 + 1.644854 * 2.0 + 1.0]))
+    assert (low[0], high[0]) == pytest.approx((35.0, 45.0))
+
+
+def test_named_ends_stop_at_the_admitted_range_and_others_stay() -> None:
+    sweep = one(friction="{mean: 40 deg, sd: 3 deg, high: 46 deg}")
+    spread = sweep.distributions["friction_angle_deg"]
+    low, high = Moving(sweep, "friction_angle_deg").ends(spread, np.array([30.0, 58.0]))
+    assert low.tolist() == [1.0, 1.0]
+    assert high.tolist() == [36.0, 60.0]
+
+
+def test_every_named_soil_moves_from_its_own_mean() -> None:
+    spread = "{distribution: uniform, low: 38 deg, high: 41 deg}"
+    sweep = load_text(NAMED.replace("{mean: 40 deg, cov: 10 %}", spread), Path("named.yaml"))
+    moving = Moving(sweep, "friction_angle_deg")
+    uniform = sweep.distributions["friction_angle_deg"].each[2]
+    assert np.ravel(moving.ends(uniform, np.array([30.0]))) == pytest.approx([28.5, 31.5])
+    assert moving.means(0.01) == pytest.approx((2.5, 58.5))
+
+
+@pytest.mark.parametrize(
+    ("changes", "asked", "exact"),
+    [
+        # From 1.9225 m, 15.985 m/s and 35.175 deg on, one design passes, by the searches without a distribution.
+        ({"site": "embedment_depth: {distribution: uniform, low: 2.15 m, high: 2.25 m}"}, {}, 1.9225 + 0.045),
+        ({"site": f"embedment_depth: {{mean: 2.2 m, sd: 0.03 m, {ENDS}}}"}, {}, 1.9625),
+        ({"friction": "{distribution: uniform, low: 38 deg, high: 42 deg}"}, {"least": "friction_angle"}, 36.975),
+    ],
+)
+def test_the_answer_moves_with_what_is_searched(changes: dict[str, str], asked: dict[str, str], exact: float) -> None:
+    row = need(one(**changes), probability=0.95, **asked).frame.iloc[0]
+    assert row.found == "found"
+    assert row.passes_at == pytest.approx(exact, abs=0.011 if asked else 0.0021)
+    assert row.p_pass == pytest.approx(0.95, abs=0.01)
+
+
+def test_the_largest_mean_speed_for_a_probability() -> None:
+    text = "{distribution: triangular, low: 12 m/s, mode: 13 m/s, high: 14 m/s}"
+    sweep = load_text(FILE.format(speed=text), Path("speed.yaml"))
+    row = need(sweep, most="speed", probability=0.95).frame.iloc[0]
+    assert row.found == "found"
+    assert row.passes_at == pytest.approx(15.985 - (1.0 - np.sqrt(0.1)), abs=0.02)
+
+
+FILE = """
+name: speed
+boulder: {{length: 1.65 m, width: 1.68 m, height: 3.2 m, density: 2600 kg/m^3}}
+site: {{embedment_depth: 2.2 m}}
+soil: {{density: 1860 kg/m^3, friction_angle: 40 deg, subgrade_reaction: 60 MN/m^3}}
+vehicle: {{mass: 15000 lb, speed: {speed}, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("changes", "asked", "message"),
+    [
+        ({"friction": "{mean: [38, 40] deg, sd: 1 deg, low: 30 deg}"}, {"least": "friction_angle"}, "several means"),
+        (
+            {"site": "embedment_depth: {mean: 2.2 m, sd: 0.1 m}"},
+            {"least": "embedment_ratio"},
+            "ask for embedment_depth",
+        ),
+        ({"site": "embedment_ratio: {mean: 0.6, sd: 0.1}"}, {"least": "embedment_depth"}, "ask for embedment_ratio"),
+        (
+            {"friction": "{distribution: uniform, low: 38 deg, high: 42 deg}"},
+            {"least": "friction_angle", "between": ("30 deg", "59 deg")},
+            "only for means from 3 to 58 deg",
+        ),
+    ],
+)
+def test_what_cannot_move_is_refused(changes: dict[str, str], asked: dict, message: str) -> None:
+    with pytest.raises(QuestionError, match=message):
+        need(one(**changes), probability=0.95, **asked)
+
+
+def test_the_usual_range_is_narrowed_to_the_means_that_are_admitted() -> None:
+    sweep = one(friction="{distribution: uniform, low: 10 deg, high: 60 deg}")
+    likely, likelier = (need(sweep, "friction_angle", probability=wanted).frame.iloc[0] for wanted in (0.45, 0.5))
+    assert likely.passes_at == pytest.approx(35.175 - 25.0 + 0.45 * 50.0, abs=0.05)
+    assert (likelier.found, likelier.fails_at) == ("never", 35.0)

@@ -25,16 +25,3 @@ def possible_grid(grid):
     """Work with 18 designs that are all possible; over some of them the truck passes without a touch."""
     grid.write_text(GRID.replace("[0.9, 1.8, 2.6]", "[0.8, 1.2, 1.5]"))
     return grid
-
-
-@pytest.fixture
-def sweep(capsys):
-    """Return a function that runs a command in this process and returns exit code, stdout, stderr."""
-    from boulder_sweep.cli.main import execute
-
-    def sweep(*words):
-        code = execute([str(word) for word in words])
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return sweep

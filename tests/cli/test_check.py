@@ -22,15 +22,6 @@ def test_a_valid_file(sweep, grid):
     assert "1.6 to 3.5 m" in lines[2]
 
 
-def test_an_axis_is_shown_from_its_least_to_its_largest_value(sweep, grid):
-    grid.write_text(grid.read_text().replace("43.2 deg", "[40, 36, 43] deg").replace("[60, 95] MN/m^3", "[60] MN/m^3"))
-    code, out, _ = sweep("check", grid)
-    assert code == 0
-    lines = [line.split(maxsplit=1) for line in out.splitlines()]
-    assert ["friction_angle_deg", "3 values  36 to 43 deg"] in lines
-    assert ["subgrade_reaction_MN_m3", "1 value   60 MN/m^3"] in lines
-
-
 def test_a_file_of_which_no_design_can_run_is_refused(sweep, grid):
     code, out, err = sweep("check", grid, "--set", "site.embedment_depth=3.5 m")
     assert (code, out) == (2, "")
@@ -70,11 +61,6 @@ def test_mistakes(sweep, grid):
     assert lines[0].startswith("grid.yaml:2:19: boulder.length: ")
     assert lines[1].startswith("grid.yaml:4:48: soil.friction_angle: ")
     assert lines[2].startswith("--set: vehicle.speed: ")
-
-
-def test_a_missing_file(sweep, grid):
-    assert sweep("check", "no.yaml") == (2, "", "no.yaml: there is no such file\n")
-    assert sweep("check", ".") == (2, "", ".: is a directory; a file is needed\n")
 
 
 def test_uncertain_inputs_are_listed(sweep, grid):

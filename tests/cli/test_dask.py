@@ -29,10 +29,6 @@ def assert_is_the_table_of_threads(sweep, grid, options):
     assert same_bits(finished_table(grid.parent / "dask"), finished_table(grid.parent / "threads"))
 
 
-def test_a_run_with_a_cluster_of_its_own(sweep, possible_grid):
-    assert_is_the_table_of_threads(sweep, possible_grid, ["--jobs", "2"])
-
-
 def test_a_run_on_a_cluster_that_is_there(sweep, possible_grid, scheduler):
     assert_is_the_table_of_threads(sweep, possible_grid, ["--jobs", "1", "--scheduler", scheduler])
 

@@ -154,17 +154,6 @@ def test_options_take_the_place_of_the_questions(sweep, tmp_path, monkeypatch):
     assert load("m30.yaml").constants["impact_speed_m_s"] == pytest.approx(13.4112)
 
 
-def test_a_class_or_a_file_that_there_is_not(sweep, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    code, _, err = sweep("new", "--class", "H55")
-    assert code == 2
-    assert "--class H55 is not a class of ASTM F2656; there are M30, M40, M50, SC30" in err
-    code, _, err = sweep("new", "a.yaml", "-o", "b.yaml")
-    assert code == 2
-    assert "two files are named, a.yaml and b.yaml; name one" in err
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.parametrize("vehicle", ["M40", "H50"])
 @pytest.mark.parametrize("units", SYSTEMS)
 def test_values_are_in_the_units_asked_for(vehicle, units):

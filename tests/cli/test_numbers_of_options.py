@@ -61,24 +61,6 @@ def test_a_bare_number_is_refused(sweep, option):
     assert remedy in err
 
 
-@pytest.mark.parametrize(
-    ("words", "remedy"),
-    [
-        (
-            ["--between", "5 ft", "9"],
-            "--between 5 ft 9: write the unit too (m, cm, ft or in), as in --between '5 ft' '9 ft'",
-        ),
-        (["--between", "5", "2,5 m"], "as in --between '5 m' '2,5 m' or --between '5 ft' '2,5 m'"),
-        (["--most", "speed", "--between", "5", "9"], "--between '5 m/s' '9 m/s' or --between '5 mph' '9 mph'"),
-        (["--between", "0"], "requires 2 arguments"),
-    ],
-)
-def test_the_units_of_a_range(sweep, words, remedy):
-    code, _, err = sweep("need", SITE, *words)
-    assert code == 2
-    assert remedy in err
-
-
 def table_of(out):
     """Return what stands below the recommendation and the next questions."""
     return out.partition("\n\n")[2]

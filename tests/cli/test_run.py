@@ -73,15 +73,6 @@ def test_a_run_with_second_opinions_says_what_is_robust(sweep, possible_grid):
     assert code == 4, err
 
 
-def test_kp_squared_is_no_second_opinion(sweep, possible_grid):
-    code, _, err = sweep("run", possible_grid, "--set", "model.second_opinion=[kp_squared]")
-    assert code == 2
-    assert "kp_squared is no second opinion" in err
-    code, _, err = sweep("run", possible_grid, "--set", "model.second_opinion=broom")
-    assert code == 2
-    assert "did you mean broms" in err
-
-
 def test_json_is_one_object_on_stdout(sweep, possible_grid):
     code, out, _ = sweep("run", possible_grid, "-o", "out", "--json", "--quiet")
     assert code == 0
@@ -92,11 +83,6 @@ def test_json_is_one_object_on_stdout(sweep, possible_grid):
     assert sum(found["verdicts"].values()) == 18
     assert found["firmness"]["designs"] == 18
     assert found["out"] == "out"
-
-
-def test_quiet_says_nothing_on_stderr(sweep, possible_grid):
-    _, _, err = sweep("run", possible_grid, "-q", "--set", "vehicle.speed=30")
-    assert err == ""
 
 
 def test_verbose_shows_the_settings(sweep, possible_grid):
@@ -178,36 +164,6 @@ def test_a_dry_run_of_a_grid_of_ten_to_the_twelve(sweep, grid):
     assert found["objection"]
 
 
-@pytest.mark.parametrize(
-    ("words", "words_of_error"),
-    [
-        ([], "Missing argument 'GRID'"),
-        (["grid.yaml", "--jobs", "0"], "--jobs"),
-        (["grid.yaml", "--jobs", "many"], "--jobs"),
-        (["grid.yaml", "--jobs", "1000000", "--overwrite"], "1000000 is not in the range 1<=x<=4096"),
-        (["grid.yaml", "--backend", "spark"], "--backend"),
-        (["grid.yaml", "--scheduler", "tcp://x:1"], "--scheduler needs --backend dask"),
-        (["grid.yaml", "--resume", "--overwrite"], "cannot be used together"),
-        (["grid.yaml", "-q", "-v"], "cannot be used together"),
-        (["grid.yaml", "--frobnicate"], "--frobnicate"),
-        (["grid.yaml", "--accuracy", "superb"], "--accuracy: solver.accuracy: 'superb' is not fast, balanced, fine"),
-        (["grid.yaml", "--accuracy", "1e-12 deg"], "--accuracy: solver.accuracy: 1e-12 deg is outside"),
-        (["grid.yaml", "--accuracy", ""], "--accuracy: solver.accuracy: '' is not"),
-        (["grid.yaml", "--set", "speed"], "KEY=VALUE"),
-        (["grid.yaml", "extra"], "extra"),
-        (["no.yaml"], "there is no such file"),
-        (["grid.yaml", "-o", "grid.yaml"], "grid.yaml"),
-    ],
-)
-def test_wrong_use(sweep, grid, words, words_of_error):
-    code, out, err = sweep("run", *words)
-    assert code in (2, 4)
-    assert code == 2 or words[-2:] == ["-o", "grid.yaml"]
-    assert out == ""
-    assert words_of_error in err
-    assert "Traceback" not in err
-
-
 def interrupted(signum):
     def run(settings, out, *, jobs, backend, scheduler, **_):
         raise Interrupted(signum, 5, 18, resuming(settings, out, jobs, backend, scheduler))
@@ -224,14 +180,6 @@ def test_the_command_to_go_on_repeats_every_option(sweep, grid, monkeypatch):
     assert shlex.split(err.partition("Resume with: ")[2]) == ["sweep", "run", "grid.yaml", *words, "--resume"]
 
 
-@pytest.mark.parametrize("signum", [2, 15])
-def test_an_interrupted_run_tells_how_to_go_on(sweep, grid, monkeypatch, signum):
-    monkeypatch.setattr("boulder_sweep.runner.run.run", interrupted(signum))
-    code, out, err = sweep("run", grid)
-    assert (code, out) == (128 + signum, "")
-    assert "sweep run grid.yaml -o small-grid.sweep --resume" in err
-
-
 def test_an_internal_error_is_one_line_unless_verbose(sweep, grid, monkeypatch):
     def run(*_, **__):
         raise ZeroDivisionError("on purpose")
@@ -245,14 +193,6 @@ def test_an_internal_error_is_one_line_unless_verbose(sweep, grid, monkeypatch):
     code, _, err = sweep("run", grid, "--verbose")
     assert code == 1
     assert "Traceback" in err
-
-
-def test_one_design_is_not_called_designs(sweep, possible_grid):
-    one = ["--set", "boulder.height=3 m", "--set", "site.embedment_depth=1.5 m", "--set", "soil.subgrade_reaction=95"]
-    code, out, err = sweep("run", possible_grid, *one, "--accuracy", "0.1 deg")
-    assert code == 0
-    assert err.startswith("small grid: 1 design into small-grid.sweep\n")
-    assert "99.9 % of a pilot of 1 design\n" in out
 
 
 def test_progress_without_a_terminal_is_a_plain_line_now_and_then(capsys, monkeypatch):

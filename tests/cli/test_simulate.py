@@ -1,34 +1,19 @@
-"""``sweep simulate`` from the command line."""
+"""``sweep simulate`` from the command line, and commands pointed at results of another version or at none."""
+
+from __future__ import annotations
 
 import json
 import os
-import re
 from pathlib import Path
 
 import pytest
 
 import boulder_sweep
+from boulder_sweep.store import read
+from boulder_sweep.store.failures import OtherVersionError
+from tests.store.folders import OTHER_VERSIONS, rewrite
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-
-
-@pytest.mark.parametrize(
-    ("case", "preset", "verdict", "rotation", "displacement"),
-    [
-        ("rwg", "corrected", "pass", 13.7612, 0.2820),
-        ("rwg", "as_printed", "undecided", 7.6940, 0.1505),
-        ("abg", "corrected", "fail", 20.0, 0.1924),
-        ("abg", "as_printed", "fail", 20.0, 0.2206),
-    ],
-)
-def test_the_crash_tests(sweep, case, preset, verdict, rotation, displacement):
-    code, out, err = sweep("simulate", CONFIGS / f"{case}.yaml", "--set", f"model.readings={preset}", "--json")
-    assert (code, err) == (0, "")
-    found = json.loads(out)
-    assert found["verdict"] == verdict
-    assert found["preset"] == preset
-    assert found["max_rotation_deg"] == pytest.approx(rotation, abs=0.02)
-    assert found["max_displacement_m"] == pytest.approx(displacement, abs=5e-4)
 
 
 def test_sentence_and_json_state_the_row_that_run_writes(sweep, tmp_path):
@@ -84,20 +69,6 @@ def test_it_begins_with_the_verdict_in_a_sentence_and_raw_columns_are_asked_for(
     assert [line.split()[0] for line in every[len(lines) + 1 :] if not line.startswith("  ")] == list(found)
 
 
-def test_the_sentence_of_a_pass_is_in_the_units_asked_for(sweep):
-    out = sweep("simulate", CONFIGS / "rwg.yaml", "--units", "us")[1]
-    lines = out.splitlines()
-    assert lines[0] == "rwg: PASS, 13.8° of 20° allowed"
-    assert "  penetration: -10.58 ft, P1 allows 3.28 ft beyond the far face" in lines
-    assert "  displacement: boulder 0.925 ft, truck 4.34 ft; peak force 231 kip" in lines
-    assert not re.search(r"\d m\b", out)
-
-
-def test_a_long_sentence_is_wrapped(sweep):
-    out = sweep("simulate", CONFIGS / "rwg.yaml", "--set", "model.readings=as_printed")[1]
-    assert out.startswith("rwg: UNDECIDED, nothing proved at the end of the simulated time, 7.7° of 20°\n  allowed\n")
-
-
 def test_a_design_of_a_list(sweep):
     code, out, err = sweep("simulate", CONFIGS / "crash_tests.yaml", "--design", "1")
     assert (code, err) == (0, "")
@@ -134,48 +105,9 @@ def test_numbers_are_shown_also_where_there_is_no_motion_to_draw(sweep, grid):
     assert err == "error: there is no motion to draw: the truck passes over the boulder\n"
 
 
-def test_places_that_cannot_be_written(sweep, grid):
-    for option, name in (("--plot", "no/such/folder.png"), ("--trajectory", "no/such/folder.parquet")):
-        code, _, err = sweep("simulate", grid, "-q", option, name)
-        assert code == 2
-        assert "no/such" in err
-        assert "internal" not in err
-        assert "Errno" not in err
-
-
-def test_a_folder_in_the_place_of_a_time_history(sweep, grid):
-    (grid.parent / "history.parquet").mkdir()
-    code, _, err = sweep("simulate", grid, "-q", "--trajectory", "history.parquet")
-    assert (code, err) == (2, "error: history.parquet cannot be written: Is a directory\n")
-
-
-def test_a_time_history_is_not_written_under_the_name_of_another_format(sweep, grid):
-    code, _, err = sweep("simulate", grid, "-q", "--trajectory", "history.csv")
-    assert code == 2
-    assert err == "error: history.csv: a time history is a Parquet file; its name must end in .parquet\n"
-    assert not (grid.parent / "history.csv").exists()
-
-
 @pytest.fixture
 def nothing_simulated(monkeypatch):
     monkeypatch.setattr("boulder_sweep.impact.simulation.simulate", lambda *_, **__: pytest.fail("simulated"))
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("history.csv",), "history.csv: a time history is a Parquet file; its name must end in .parquet"),
-        (("no/history.parquet",), "no/history.parquet: the folder {here}/no does not exist"),
-        (("folder.parquet",), "folder.parquet cannot be written: Is a directory"),
-        (("./history.parquet", "--plot", "history.parquet"), "./history.parquet is named twice; give each output a"),
-    ],
-)
-def test_a_wrong_name_of_a_time_history_is_refused_before_simulating(sweep, grid, nothing_simulated, words, message):
-    Path("folder.parquet").mkdir()
-    code, out, err = sweep("simulate", grid, "-q", "--trajectory", *words)
-    assert (code, out) == (2, "")
-    assert message.format(here=Path.cwd()) in err
-    assert sorted(path.name for path in Path().iterdir()) == ["folder.parquet", "grid.yaml"]
 
 
 @pytest.mark.parametrize("there", [False, True])
@@ -263,30 +195,95 @@ def test_a_row_that_came_out_otherwise(sweep, finished, monkeypatch):
     assert "the same to the last bit" not in out
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("--design", "18"), "small-grid.sweep has 18 designs, numbered from 0; there is no 18"),
-        (("--set", "vehicle.speed=30 mph"), "--set and --at change the settings of a file; small-grid.sweep is the"),
-        (("--at", "mean"), "--set and --at change the settings of a file; small-grid.sweep is the result of a run"),
-    ],
-)
-def test_what_a_result_does_not_take(sweep, finished, words, message):
-    code, out, err = sweep("simulate", finished, *words)
-    assert (code, out) == (2, "")
-    assert message in err
+RESULT = "small-grid.sweep"
+COMMANDS = [["simulate", RESULT], ["plot", RESULT], ["export", RESULT, "-o", "t.csv"], ["compare", RESULT, RESULT]]
+
+
+@pytest.fixture
+def result(sweep, possible_grid):
+    """Work beside a finished result."""
+    assert sweep("run", possible_grid, "-q")[0] == 0
+    return possible_grid.parent.joinpath(RESULT).resolve()
+
+
+def assert_is_of_another_version(answer):
+    code, out, err = answer
+    assert (code, out) == (4, "")
+    assert f"{RESULT} was written by boulder-sweep " in err
+    assert "writes into another folder, or into this one once it is empty" in err
+    assert "internal" not in err
+
+
+@pytest.mark.parametrize("version", ["earlier", "later"])
+def test_a_result_of_another_version(sweep, result, version):
+    rewrite(result, OTHER_VERSIONS[version][0])
+    before = {path.name: path.read_bytes() for path in result.iterdir()}
+    for words in [
+        *COMMANDS,
+        ["run", "grid.yaml"],
+        ["run", "grid.yaml", "--resume"],
+        ["run", "grid.yaml", "--dry-run", "--resume"],
+    ]:
+        assert_is_of_another_version(sweep(*words, *(["-q"] if words[0] == "run" else [])))
+    with pytest.raises(OtherVersionError):
+        read(result)
+    assert {path.name: path.read_bytes() for path in result.iterdir()} == before
+    assert sweep("run", "grid.yaml", "-q", "--overwrite")[0] == 0
+    assert sweep("plot", RESULT)[0] == 0
+
+
+@pytest.mark.parametrize("part", ["control", "readings", "settings"])
+def test_settings_that_no_file_gives(sweep, result, part):
+    """The records are as they should be, what they say of the computation is not."""
+    rewrite(result, lambda said: said.update({part: {"colour": "red"}}))
+    for words in (["simulate", RESULT], ["report", RESULT], ["export", RESULT, "-o", "t.csv"]):
+        code, _, err = sweep(*words)
+        assert (code, err.count("\n")) == (2, 1)
+        assert f"holds what no sweep writes ({part}" in err
+    code, _, err = sweep("run", "grid.yaml", "-q", "--resume")
+    assert code == 0
+    assert f"was damaged ({part}" in err
 
 
 @pytest.mark.parametrize(
-    ("place", "words"),
+    "words",
     [
-        ("no.sweep", "there is no no.sweep; the result of a run is a folder"),
-        (".", ". is not the result of a sweep: no rows of it are finished"),
-        ("depths.parquet", "there is no depths.parquet; the result of a run is a folder"),
-        ("no.yaml", "no.yaml: there is no such file"),
+        ["export", RESULT, "-o", f"{RESULT}/all.parquet"],
+        ["need", "grid.yaml", "-q", "-o", f"{RESULT}/need.parquet"],
+        ["plot", RESULT, "-o", f"{RESULT}/map.png"],
+        ["simulate", "grid.yaml", "-q", "--trajectory", f"{RESULT}/history.parquet"],
     ],
 )
-def test_what_is_neither_a_file_nor_a_result(sweep, grid, place, words):
-    code, out, err = sweep("simulate", place)
+def test_no_command_writes_a_file_into_a_result(sweep, result, words):
+    before = {path.name: path.read_bytes() for path in result.iterdir()}
+    code, _, err = sweep(*words)
+    assert code == 2
+    assert err == f"error: {words[-1]}: the folder {result} holds the result of a run; name a file outside it\n"
+    assert {path.name: path.read_bytes() for path in result.iterdir()} == before
+
+
+def test_a_file_of_a_result_in_place_of_its_folder(sweep, result):
+    (part,) = result.glob("rows-*.parquet")
+    for words in (["simulate", part], ["plot", part]):
+        code, out, err = sweep(*words)
+        assert (code, out) == (2, "")
+        assert f"is a file; the result of a run is a folder: name the folder it lies in, {result}" in err
+
+
+def test_a_file_of_answers_in_place_of_a_result(sweep, possible_grid):
+    assert sweep("need", possible_grid, "-q", "-o", "depths.parquet")[0] == 0
+    code, out, err = sweep("simulate", "depths.parquet")
     assert (code, out) == (2, "")
-    assert words in err
+    assert err == (
+        "error: depths.parquet is a file; the result of a run is a folder; `sweep report`, `plot`, `export` and "
+        "`compare` take a file of answers\n"
+    )
+
+
+def test_a_time_history_is_exported_only(sweep, possible_grid):
+    assert sweep("simulate", possible_grid, "-q", "--trajectory", "history.parquet")[0] == 0
+    for words in (["report"], ["plot"], ["compare", "history.parquet"]):
+        code, out, err = sweep(words[0], "history.parquet", *words[1:])
+        assert (code, out) == (2, "")
+        assert err == "error: history.parquet is a time history; `sweep export` takes it\n"
+    assert sweep("export", "history.parquet", "-o", "history.csv")[0] == 0

@@ -1,15 +1,32 @@
-"""What a terminal shows, and what happens when the reader of the output goes away."""
+"""What a terminal shows: bars, signals and words; and when the reader of the output goes away."""
 
+from __future__ import annotations
+
+import json
 import os
 import pty
 import re
 import signal
 import subprocess
 import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, NoReturn
 
 import pytest
+from rich.progress import Progress as Bars
 
-from tests.waiting import HANG_GUARD_S
+from boulder_kernels import _jit
+from boulder_sweep import signals, simulate
+from boulder_sweep.crash_tests.cases import crash_test
+from boulder_sweep.errors import Interrupted
+from boulder_sweep.judge.accuracy import Accuracy, Steps
+from boulder_sweep.judge.evaluation import evaluation_of
+from boulder_sweep.runner.run import resuming
+from tests.conftest import Command
+from tests.waiting import HANG_GUARD_S, wait_until
 
 COMMAND = [sys.executable, "-m", "boulder_sweep"]
 
@@ -134,3 +151,148 @@ def test_signals_end_a_run_with_their_code_and_the_command_to_go_on(possible_gri
         "sweep run grid.yaml -o small-grid.sweep --set 'boulder.length={from: 1 m, to: 2 m, count: 1000000}' --resume"
         in err
     )
+
+
+LINE = "interrupted by SIGINT; 5 of 18 rows are safe. Resume with: sweep run grid.yaml -o small-grid.sweep --resume"
+
+
+@pytest.fixture
+def closing(grid: object, monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[], None]], None]:
+    """Interrupt a run that shows a bar; return a function that sets what happens while the bar closes."""
+
+    def run(settings: Any, out: Any, *, jobs: Any, backend: Any, scheduler: Any, **_: object) -> NoReturn:
+        noted = signals.install()
+        noted.defer()
+        signal.raise_signal(signal.SIGINT)
+        wait_until(lambda: noted.caught == signal.SIGINT, "the signal was noted")
+        raise Interrupted(signal.SIGINT, 5, 18, resuming(settings, out, jobs, backend, scheduler))
+
+    monkeypatch.setattr("boulder_sweep.runner.run.run", run)
+    monkeypatch.setenv("COLUMNS", "200")
+    stop = Bars.stop
+
+    def while_closing(happens: Callable[[], None]) -> None:
+        def stopped(bars: Bars) -> None:
+            try:
+                happens()
+            finally:
+                stop(bars)
+
+        monkeypatch.setattr(Bars, "stop", stopped)
+        monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+
+    return while_closing
+
+
+def test_it_is_said_before_a_second_signal_can_end_the_process(
+    sweep: Command, closing: Callable[[Callable[[], None]], None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = []
+
+    def second_signal() -> NoReturn:
+        before.append(capsys.readouterr().err)
+        raise KeyboardInterrupt
+
+    closing(second_signal)
+    code, out, _ = sweep("run", "grid.yaml")
+    assert (code, out) == (130, "")
+    assert len(before) == 1
+    assert LINE in before[0]
+
+
+def test_it_is_said_where_the_bar_takes_its_time(
+    sweep: Command, closing: Callable[[Callable[[], None]], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The thread that waits for the command looks for signals meanwhile."""
+    looks, waited = list[None](), list[bool]()
+
+    class Watched(threading.Thread):
+        def is_alive(self) -> bool:
+            looks.append(None)
+            return super().is_alive()
+
+    functions = {name: getattr(threading, name) for name in ("current_thread", "main_thread")}
+    monkeypatch.setattr(signals, "threading", SimpleNamespace(Thread=Watched, **functions))
+
+    def several_looks() -> None:
+        enough = len(looks) + 3
+        wait_until(lambda: len(looks) >= enough or signals._installed is None, "the waiting thread looked thrice")
+        waited.append(len(looks) >= enough)
+
+    closing(several_looks)
+    code, out, err = sweep("run", "grid.yaml")
+    assert (code, out) == (130, "")
+    assert waited == [True]
+    assert err.count("interrupted by SIGINT") == 1
+    assert LINE in err
+
+
+COMPILING = "compiling kernels"
+KERNEL = "a_kernel"
+CONFIGS = Path(__file__).parents[2] / "configs"
+SITE = CONFIGS / "site.yaml"
+ONE = ("--set", "boulder.height=3.4 m", "--set", "soil.friction_angle=40 deg")
+
+
+def after_compiling(kernel):
+    """Return what calls kernels, the first one after it has been compiled."""
+    call, begun = _jit.Kernel.__call__, []
+
+    def cold(*given, **named):
+        if not begun:
+            begun.append(kernel)
+            with _jit.announce(kernel):
+                pass
+        return call(*given, **named)
+
+    return cold
+
+
+@pytest.fixture(scope="module")
+def compiled():
+    """Compile all kernels, where that was not done before."""
+    evaluation_of(crash_test("rwg"), Accuracy("", Steps(0.01), error_estimate=False)).warm_up()
+    simulate(crash_test("rwg"))
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("run", SITE, *ONE),
+        ("simulate", SITE, *ONE),
+        ("need", SITE, *ONE),
+        ("capacity", SITE, *ONE),
+        ("uncertainty", SITE, *ONE, "--half-width", "0.2", "--set", "vehicle.speed={mean: 30 mph, cov: 5 %}"),
+        ("tradeoff", SITE, *ONE, "--seconds", "0"),
+    ],
+)
+@pytest.mark.parametrize("kept", [True, False])
+def test_every_command_that_compiles_says_so_first(compiled, sweep, words, kept, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("boulder_kernels._cache.CACHE_FOLDER", str(tmp_path) if kept else None)
+    again = ["--overwrite"] if words[0] == "run" else []
+    sweep(*words)
+    assert COMPILING not in sweep(*words, *again)[2]
+    monkeypatch.setattr(_jit.Kernel, "__call__", after_compiling(KERNEL))
+    code, _, err = sweep(*words, *again)
+    assert code == 0
+    assert err.count(COMPILING) == 1
+    assert ("later commands load them" in err) == kept
+
+
+def test_values_are_shown_in_us_units_where_asked(sweep, possible_grid):
+    metric = json.loads(sweep("simulate", possible_grid, "--design", 1, "--json", "-q")[1])
+    code, out, _ = sweep("simulate", possible_grid, "--design", 1, "--json", "-q", "--units", "us")
+    us = json.loads(out)
+    assert code == 0
+    assert us["max_displacement_ft"] == pytest.approx(metric["max_displacement_m"] / 0.3048, rel=1e-13)
+    assert us["peak_force_kip"] == pytest.approx(metric["peak_force_kN"] / 4.4482216152605, rel=1e-13)
+    assert us["max_rotation_deg"] == metric["max_rotation_deg"]
+    assert us["verdict"] == metric["verdict"]
+    sweep("run", possible_grid, "-q")
+    assert "\nimpact_speed_mph" in sweep("simulate", "small-grid.sweep", "--all", "--units", "us")[1]
+    metric = json.loads(sweep("simulate", "small-grid.sweep", "--json")[1])
+    us = json.loads(sweep("simulate", "small-grid.sweep", "--json", "--units", "us")[1])
+    assert us["impact_speed_mph"] == pytest.approx(30.0)
+    assert us["max_displacement_ft"] == pytest.approx(metric["max_displacement_m"] / 0.3048, rel=1e-13)
+    assert "max_displacement_m" not in us

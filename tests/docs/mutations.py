@@ -168,10 +168,7 @@ MUTATIONS = (
     Mutation((144,), _DYNAMICS, "c.C_cos - abs(soil.lean[0]) * c.d if", "c.C_cos if"),
     Mutation((144,), _OUTLINED, "reaction.M - lean[0] * k.lever_d", "reaction.M + lean[0] * k.lever_d"),
     Mutation(
-        (145,),
-        _BESIDE,
-        "-slope_of(outline, i, WIDTH) * d / design.W",
-        "slope_of(outline, i, WIDTH) * d / design.W",
+        (145,), _BESIDE, "-slope_of(outline, i, WIDTH) * d / design.W", "slope_of(outline, i, WIDTH) * d / design.W"
     ),
     Mutation((145,), _BESIDE, "elements.ultimate[n] *= share", "elements.ultimate[n] *= 1.0"),
     Mutation(

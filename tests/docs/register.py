@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-import ast
 import functools
 import importlib
 import inspect
 import re
+import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+
+import pytest
 
 EQUATIONS = (*range(1, 56), 101, 102, *range(105, 109), *range(131, 138), *range(141, 148))
 """Those of the paper, and those added to it."""
@@ -52,12 +55,14 @@ def problems(text: str, root: Path) -> list[str]:
     numbers = [entry.number for entry in rows]
     found += [f"{n}: missing" for n in EQUATIONS if n not in numbers]
     found += [f"{n}: stands twice" for n in set(numbers) if numbers.count(n) > 1]
+    files = {test.partition("::")[0] for entry in rows for test in entry.tests}
+    by_day = run_by_day(tuple(sorted(file for file in files if (root / file).exists())), root)
     for entry in rows:
-        found += [f"{entry.number}: {problem}" for problem in _of_entry(entry, root)]
+        found += [f"{entry.number}: {problem}" for problem in _of_entry(entry, root, by_day)]
     return found
 
 
-def _of_entry(entry: Entry, root: Path) -> list[str]:
+def _of_entry(entry: Entry, root: Path, by_day: frozenset[str]) -> list[str]:
     if entry.way not in WAYS:
         return [f"'{entry.way}' is none of {WAYS}"]
     if not entry.meaning:
@@ -83,7 +88,7 @@ def _of_entry(entry: Entry, root: Path) -> list[str]:
         text = (root / file).read_text(encoding="utf-8") if (root / file).exists() else ""
         if not re.search(rf"^def {function_name}\(", text, re.MULTILINE):
             found.append(f"there is no test {test}")
-        elif is_nightly(text, function_name):
+        elif test not in by_day:
             found.append(f"test {test} is nightly")
     found += [f"unknown reading {word}" for word in _CODE.findall(entry.reading) if word not in SWITCHES]
     return found
@@ -112,47 +117,14 @@ def _documentation(name: str, function: Any) -> str:
     return "\n".join((inspect.getdoc(plain) or "", inspect.getsource(plain), inspect.getsource(module)))
 
 
-def is_nightly(text: str, test: str) -> bool:
-    """Whether plain ``pytest`` leaves out a test of a file: it, its module or all its parameters are marked nightly.
-
-    Parameters are looked at where the decorator lists them; a list that has a name or is computed counts as kept.
-    """
-    for node in _syntax_tree(text).body:
-        if isinstance(node, ast.FunctionDef) and node.name == test:
-            if any(_is_mark(decorator) or _has_nightly_parameters(decorator) for decorator in node.decorator_list):
-                return True
-        elif isinstance(node, ast.Assign | ast.AnnAssign):
-            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-            if "pytestmark" in map(ast.unparse, targets) and node.value is not None and _marks(node.value):
-                return True
-    return False
-
-
 @functools.cache
-def _syntax_tree(text: str) -> ast.Module:
-    return ast.parse(text)
-
-
-def _is_mark(node: ast.expr) -> bool:
-    """Whether this is the mark, with or without a reason in parentheses."""
-    node = node.func if isinstance(node, ast.Call) else node
-    return isinstance(node, ast.Attribute) and node.attr == "nightly"
-
-
-def _marks(node: ast.expr) -> bool:
-    """Whether the mark is here or somewhere in a list."""
-    return any(_is_mark(part) for part in ast.walk(node) if isinstance(part, ast.expr))
-
-
-def _has_nightly_parameters(decorator: ast.expr) -> bool:
-    """Whether this lists parameters and every one of them has the mark."""
-    if not isinstance(decorator, ast.Call) or not ast.unparse(decorator.func).endswith("mark.parametrize"):
-        return False
-    named = {keyword.arg: keyword.value for keyword in decorator.keywords}
-    values = decorator.args[1] if len(decorator.args) > 1 else named.get("argvalues")
-    if not isinstance(values, ast.List | ast.Tuple):
-        return False
-    return bool(values.elts) and all(map(_marks, values.elts))
+def run_by_day(files: tuple[str, ...], root: Path) -> frozenset[str]:
+    """Return the tests of files that plain ``pytest`` runs: what is not nightly."""
+    words = ("--collect-only", "-q", "-p", "no:cacheprovider", "-o", "addopts=--import-mode=importlib")
+    command = [sys.executable, "-m", "pytest", *words, "-m", "not nightly", *files]
+    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
+    assert done.returncode in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED), done.stdout
+    return frozenset(line.partition("[")[0] for line in done.stdout.splitlines() if "::" in line)
 
 
 def mentioned(text: str) -> set[int]:

@@ -139,13 +139,6 @@ def test_command_writes_single_blocks(tmp_path: Path, monkeypatch: pytest.Monkey
     assert file.read_text(encoding="utf-8") == whole.replace("| yes |", "| no |"), "this block and no other"
 
 
-def test_command_needs_the_repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(SystemExit) as stop:
-        main(["--check"])
-    assert stop.value.code == 2
-
-
 @pytest.mark.nightly
 def test_pictures_are_drawn_by_the_command(tmp_path: Path) -> None:
     for folder in ("configs", "docs/examples"):

@@ -40,15 +40,6 @@ def block(name: str) -> str:
     return f"gallery-{name.replace('_', '-')}"
 
 
-def test_there_are_six_sites_each_with_its_file_and_picture() -> None:
-    assert len(NAMES) == len(set(NAMES)) == 6
-    for name in NAMES:
-        part = section(name)
-        assert f"configs/{name}.yaml" in part
-        assert f"(images/{name}.png)" in part
-        assert (ROOT / "docs" / "images" / f"{name}.png").stat().st_size < MOST_BYTES
-
-
 @pytest.mark.compiled
 @pytest.mark.parametrize("name", NAMES)
 def test_the_answer_on_the_page_is_that_of_the_file(name: str) -> None:

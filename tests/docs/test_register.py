@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.docs.register import EQUATIONS, entries, is_nightly, mentioned, problems
+from tests.docs.register import EQUATIONS, entries, mentioned, problems
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
@@ -63,34 +63,9 @@ def test_what_is_lost_is_seen(pattern: str, replacement: str, problem: str) -> N
 
 
 def test_a_test_that_is_nightly_is_seen(tmp_path: Path) -> None:
-    (tmp_path / "test_rare.py").write_text("@pytest.mark.nightly\ndef test_mass():\n    pass\n")
+    (tmp_path / "test_rare.py").write_text("import pytest\n\n@pytest.mark.nightly\ndef test_mass():\n    pass\n")
     text = changed(r"^(\| 15 \|[^|]*\|[^|]*\|[^|]*\|)[^|]*\|", r"\1 `test_rare.py::test_mass` |")
     assert "15: test test_rare.py::test_mass is nightly" in problems(text, tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("above", "nightly"),
-    [
-        ("", False),
-        ("@pytest.mark.compiled", False),
-        ("@pytest.mark.nightly", True),
-        ("@pytest.mark.nightly()", True),
-        ("@pytest.mark.parametrize('n', [1, 2])\n@pytest.mark.nightly", True),
-        ("@pytest.mark.parametrize('n', [1, pytest.param(2, marks=pytest.mark.nightly)])", False),
-        ("@pytest.mark.parametrize('n', [pytest.param(2, marks=pytest.mark.nightly)])", True),
-        ("@pytest.mark.parametrize('n', (pytest.param(n, marks=[mark.nightly]) for n in range(2)))", False),
-        ("@pytest.mark.parametrize('n', [*(pytest.param(n, marks=mark.nightly) for n in range(2))])", True),
-        ("@pytest.mark.parametrize('n', argvalues=(pytest.param(2, marks=mark.nightly),))", True),
-        ("@pytest.mark.parametrize('n', [])", False),
-        ("@pytest.mark.parametrize('n', VALUES)", False),
-        ("pytestmark = pytest.mark.nightly\n", True),
-        ("pytestmark = [pytest.mark.compiled, pytest.mark.nightly]\n", True),
-        ("pytestmark = pytest.mark.compiled\n", False),
-        ("@pytest.mark.nightly\ndef test_other(): ...\n", False),
-    ],
-)
-def test_what_plain_pytest_leaves_out(above: str, nightly: bool) -> None:
-    assert is_nightly(f"{above}\ndef test_one(n): ...\n", "test_one") is nightly
 
 
 @pytest.mark.parametrize(

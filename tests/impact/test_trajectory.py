@@ -160,7 +160,7 @@ def test_maxima_do_not_depend_on_the_samples() -> None:
 
 
 LATE = Path(__file__).parents[1] / "judge" / "late_designs.csv"
-"""Shallow boulders that rock for seconds; see `tests.judge.test_late_rows`."""
+"""Shallow boulders that rock for seconds; see `tests.judge.test_refinement`."""
 SETTLES_LATE = LATE.with_name("settles_late.csv")
 """It has turned by 11 deg after one second, and by 15.562 deg, the most, within the next."""
 

@@ -1,20 +1,25 @@
-"""From a block of designs to judged rows."""
+"""From a block of designs to judged rows, and rows put together and taken apart."""
 
 from __future__ import annotations
 
 import pickle
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from boulder_kernels import simulate_table
-from boulder_sweep.columns import VERDICTS
+from boulder_sweep import simulate
+from boulder_sweep.columns import OUTCOME_COLUMNS, REASONS, VERDICTS
 from boulder_sweep.judge.accuracy import accuracy_of, control_of, readings_of
 from boulder_sweep.judge.evaluation import by_kernels, evaluation_of
+from boulder_sweep.judge.few_elements import DESIGNS, words_of_few_elements
 from boulder_sweep.judge.inputs import designs_of
-from boulder_sweep.judge.judged import ERROR
-from boulder_sweep.settings import load_text
+from boulder_sweep.judge.judged import ERROR, joined, not_computed
+from boulder_sweep.settings import load
+from boulder_sweep.store.part import verdict_counts
 from tests.runner.grids import grid, partly_impossible, plausible
 
 
@@ -82,31 +87,97 @@ def test_an_evaluation_is_sent_by_name_not_as_source():
     assert pickle.loads(sent) == evaluation
 
 
-def test_the_plain_function_is_the_kernel():
-    sweep = grid()
-    evaluation = evaluation_of(sweep, accuracy_of(sweep))
-    table = designs_of(sweep.block(0, 9)).table
-    direct = simulate_table(table, evaluation.readings, evaluation.control)
-    for one, other in zip(direct, by_kernels(table, evaluation.readings, evaluation.control), strict=True):
-        assert np.array_equal(one, other, equal_nan=True)
+@pytest.fixture(scope="module")
+def whole():
+    sweep = partly_impossible()
+    return evaluation_of(sweep, accuracy_of(sweep), plausible)(sweep.block(0, sweep.n_designs))
 
 
-HEAVY_TRUCK = """
-boulder: {length: 2 m, width: 2.5 m, height: 4 m, density: 2600 kg/m^3}
-site: {embedment_ratio: [0.7, 0.75]}
-soil: {density: 1859.9 kg/m^3, friction_angle: 43.2 deg, subgrade_reaction: 95 MN/m^3}
-vehicle: {mass: 65000 lb, speed: 40 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
-"""
+def equal(one, other) -> bool:
+    return one.words == other.words and all(
+        np.array_equal(one[name], other[name], equal_nan=one[name].dtype.kind == "f") for name in OUTCOME_COLUMNS
+    )
 
 
-def test_a_truck_inside_the_boulder_is_never_a_pass():
-    """Crushed by more than the cab is long: neither rotation nor penetration would keep it from a pass."""
-    sweep = load_text(HEAVY_TRUCK, Path("heavy.yaml"))
-    rows = evaluation_of(sweep, accuracy_of(sweep))(sweep.block(0, 2))
-    for row in (rows.row(0), rows.row(1)):
-        assert (row["verdict"], row["reason"]) == ("undecided", "crush")
-        assert row["vehicle_crush_m"] > 2.9
-        assert row["max_rotation_deg"] < 20.0
-        assert row["penetration_m"] < 1.0
-        assert row["margin"] is row["rating"] is None
-        assert "crush" in row["validity"].split(";")
+@settings(max_examples=50, deadline=None)
+@given(data=st.data())
+def test_pieces_joined_are_the_whole_wherever_it_is_cut(whole, data):
+    n = len(whole.verdict)
+    cuts = sorted(data.draw(st.sets(st.integers(1, n - 1), max_size=6)))
+    edges = [0, *cuts, n]
+    pieces = [joined([whole.rows(slice(a, b))]) for a, b in pairwise(edges)]
+    assert equal(joined(pieces), whole)
+
+
+def test_words_are_sorted_whatever_the_order_of_the_rows():
+    words = tuple(f"why {place}" for place in (5, 3, 9, 1, 7, 0, 2, 8, 6, 4))
+    row = joined([not_computed(words, np.arange(10)), not_computed(words[::-1], np.arange(10))])
+    assert row.reasons == (*REASONS, *sorted(words))
+    assert [row.reasons[code] for code in row.reason] == [*words, *words[::-1]]
+
+
+def test_words_that_no_row_uses_are_dropped():
+    row = not_computed(("b", "a", "c"), np.array([1]))
+    assert joined([row]).reasons == (*REASONS, "a")
+
+
+def test_counts_add_up(whole):
+    counts = verdict_counts(whole)
+    assert sum(counts.values()) == len(whole.verdict)
+    for verdict in VERDICTS:
+        total = sum(count for key, count in counts.items() if key.split("/")[0] == verdict)
+        assert total == np.count_nonzero(whole.verdict == VERDICTS.index(verdict))
+    assert counts["fail/overturns"] == np.count_nonzero(whole.reason == REASONS.index("overturns"))
+
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+
+
+def rwg(*overrides):
+    return load(CONFIGS / "rwg.yaml", overrides)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "few"),
+    [
+        ((), False),
+        (("model.soil.elements=1",), True),
+        (("model.soil.elements=199",), True),
+        (("model.soil.elements=200",), False),
+    ],
+)
+def test_below_200_elements_are_few(overrides, few):
+    assert rwg(*overrides).model.has_few_elements == few
+
+
+def test_one_element_fails_what_passes_in_closed_form():
+    """The words hold the difference that two simulations of the design show."""
+    one, closed = simulate(rwg("model.soil.elements=1")), simulate(rwg())
+    assert (one.verdict, closed.verdict) == ("fail", "pass")
+    off = 20.0 - closed.summary()["max_rotation_deg"]  # a table ends a row at its limit of rotation
+    words = words_of_few_elements(rwg("model.soil.elements=1"))
+    assert words == (
+        "1 soil element against the closed form: another verdict for 1 of 1 design of this file, the rotation off by "
+        f"up to {off:.2g} deg; take 200 or more, or closed_form"
+    )
+
+
+def test_the_difference_falls_with_the_number():
+    def off(count):
+        return float(words_of_few_elements(rwg(f"model.soil.elements={count}")).split(" up to ")[1].split()[0])
+
+    assert 6.0 < off(1) < 7.0
+    assert 0.0 < off(100) < 0.01 < off(10) < 1.0
+
+
+def test_designs_that_cannot_be_computed_are_left_out():
+    words = words_of_few_elements(rwg("site.embedment_depth=[2 m, 4 m]", "model.soil.elements=1"))
+    assert "1 of 1 design" in words
+    assert " 0 of 0 designs " in words_of_few_elements(rwg("site.embedment_depth=[4 m, 5 m]", "model.soil.elements=1"))
+
+
+def test_a_grid_is_sampled():
+    words = words_of_few_elements(load(CONFIGS / "m30_sizing.yaml", ["model.soil.elements=1"]))
+    changed, of, sample = words.partition("verdict for ")[2].split()[:3]
+    assert of == "of"
+    assert 0 < int(changed) < int(sample) <= DESIGNS

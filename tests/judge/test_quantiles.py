@@ -31,12 +31,7 @@ def test_values_are_the_quantiles_of_each_distribution() -> None:
         stats.lognorm(np.sqrt(spread), scale=60 * np.exp(-spread / 2)).ppf(0.05), rel=1e-6
     )
     assert taken.constants[SPEED] == pytest.approx(stats.uniform(12.5, 50 / 3.6 - 12.5).ppf(0.95), rel=1e-9)
-    assert taken.taken_at == {
-        "soil_density_kg_m3": "p5 low",
-        PHI: "p5 low",
-        BETA: "p5 low",
-        SPEED: "p5 high",
-    }
+    assert taken.taken_at == {"soil_density_kg_m3": "p5 low", PHI: "p5 low", BETA: "p5 low", SPEED: "p5 high"}
     assert not taken.distributions
 
 

@@ -74,12 +74,6 @@ def test_every_range_of_the_study_counts(name: str) -> None:
     assert bool(is_free(plain_designs(**{name: 0.99 * low}).table)[0]) is False
 
 
-def test_what_does_not_pass_has_no_grade() -> None:
-    row = judge(outcome(Status.LIMIT, theta_max=LIMITS.rotation, t_limit=0.1), plain_designs(), LIMITS).row(0)
-    assert row["robustness"] is None
-    assert row["stands_under"] is None
-
-
 def test_second_opinions_are_those_of_the_kernels() -> None:
     """Row by row, whatever else is in the block."""
     sweep = grid()
@@ -206,14 +200,7 @@ def test_other_outcomes_do_not_change() -> None:
             assert np.array_equal(values, asked[name], equal_nan=values.dtype.kind == "f"), name
 
 
-@pytest.mark.parametrize(
-    "override",
-    [
-        "model.readings=as_printed",
-        "soil.water_table=0.5 m",
-        "soil.cohesion=5 kPa",
-    ],
-)
+@pytest.mark.parametrize("override", ["model.readings=as_printed", "soil.water_table=0.5 m", "soil.cohesion=5 kPa"])
 def test_where_second_opinions_know_nothing_a_pass_is_open(override: str) -> None:
     sweep = load("configs/rwg.yaml", ["model.second_opinion=[broms, width_capped]", override])
     assert not robustness.can_be_asked(sweep)

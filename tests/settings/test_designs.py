@@ -25,12 +25,6 @@ KEYS = {
 }
 
 
-def _reasons(sweep, stop):
-    """Return why each of the first rows cannot be computed."""
-    found = sweep.block(0, stop).reasons
-    return [found[row] for row in range(stop)]
-
-
 def _reason(row):
     """Say plainly, for one row, why it cannot be computed."""
     exposed = row["boulder_height_m"] - row["embedment_depth_m"]
@@ -131,13 +125,6 @@ def test_the_whole_example(load_it, example):
     _check(sweep, 0, sweep.n_designs)
 
 
-def test_blocks_join_without_gap(load_it, example):
-    sweep = load_it(example)
-    whole = sweep.block(0, 1000).columns["impact_height_m"].to_numpy()
-    parts = [sweep.block(start, min(start + 37, 1000)) for start in range(0, 1000, 37)]
-    assert np.concatenate([part.columns["impact_height_m"].to_numpy() for part in parts]).tolist() == whole.tolist()
-
-
 @pytest.mark.parametrize(("start", "stop"), [(-1, 3), (3, 2), (0, 2737), (2737, 2737)])
 def test_rows_outside_of_the_grid(load_it, example, start, stop):
     with pytest.raises(IndexError, match="2736 designs"):
@@ -155,13 +142,6 @@ def test_chosen_designs_are_those_of_the_grid(load_it, example, numbers):
     assert chosen.reasons.codes.tolist() == np.asarray(whole.reasons.codes)[numbers].tolist()
     with pytest.raises(IndexError):
         sweep.plan.selection(np.array([2736]))
-
-
-def test_an_empty_block(load_it, example):
-    block = load_it(example).block(7, 7)
-    assert len(block) == 0
-    assert len(block.reasons) == 0
-    assert not block.reasons.any
 
 
 HUGE = (
@@ -228,15 +208,6 @@ def test_combinations_too_many_for_a_dictionary_are_worked_out_per_row(load_with
     _check(sweep, count**2 - 50, count**2)
 
 
-def test_few_values_stay_a_dictionary(load_it, example):
-    block = load_it(example).block(0, 2736)
-    assert {name: len(column.values) for name, column in block.columns.items() if column.codes is not None}[
-        "embedment_depth_m"
-    ] <= 19 * 16
-    assert all(column.codes is not None for column in block.columns.values())
-    assert len(block.columns["boulder_width_m"].values) == 1
-
-
 def test_a_long_list_of_ever_different_values_is_no_dictionary():
     source = Source(np.random.default_rng(1).random(3 * MAX_DICTIONARY), (0,))
     source.find_dictionary()
@@ -246,30 +217,12 @@ def test_a_long_list_of_ever_different_values_is_no_dictionary():
     assert len(dictionary) == len(source.values)
 
 
-def test_parts_of_a_grid_without_possible_rows(load_with):
-    sweep = load_with("boulder.height=[1.5, 2.5]", "site.embedment_depth=[1, 1.5, 2]")
-    deep = "embedment depth is not less than the boulder's height"
-    assert _reasons(sweep, 6) == ["", deep, deep, "", "", ""]
-
-
-def test_a_truck_that_passes_over_the_boulder_is_no_mistake(load_with):
-    sweep = load_with("site.embedment_depth=[2.03, 3.0]", "site.impact_height=0.9")
-    assert _reasons(sweep, 2) == ["", ""]
-    sweep = load_with("boulder.height=[2.6, 2.7, 3.44]", "site.impact_height=0.9")
-    assert _reasons(sweep, 3) == ["impact height is above the top of the boulder"] * 2 + [""]
-
-
 def test_sweeps_travel_to_other_processes(load_it, example):
     sweep = load_it(example)
     again = pickle.loads(pickle.dumps(sweep))
     assert again.resolved() == sweep.resolved()
     for one, other in zip(sweep.block(5, 9).columns.values(), again.block(5, 9).columns.values(), strict=True):
         assert one.to_numpy().tolist() == other.to_numpy().tolist()
-
-
-def test_a_plan_without_axes_has_one_row():
-    given = {name: Source(np.array([1.0])) for name in INPUT_COLUMNS}
-    assert DesignPlan([], given).n_designs == 1
 
 
 def test_impact_height() -> None:

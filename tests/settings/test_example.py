@@ -1,11 +1,18 @@
-"""The file as users are shown it loads as written and means what it says."""
+"""The file as users are shown it, and the files of the package: they load as written and mean what they say."""
 
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import boulder_sweep
 from boulder_sweep.columns import BY_NAME, COLUMNS, INPUT_COLUMNS, OPTIONAL_INPUTS, OUTCOME_COLUMNS, TO_BUILD
+from boulder_sweep.settings import load, load_text
+from boulder_sweep.settings.problems import SettingsError
+from boulder_sweep.store.provenance import settings_sha256
+from tests.report.conftest import SITE
 
 
 def test_axes_in_the_order_of_the_file(load_it, example):
@@ -22,16 +29,6 @@ def test_axes_in_the_order_of_the_file(load_it, example):
     assert isinstance(sweep.n_designs, int)
     assert sweep.axes[2].values.tolist() == [36.0, 40.0, 43.2]
     assert sweep.axes[3].values.tolist() == [25.0, 60.0, 95.0]
-
-
-def test_values_are_converted_once_and_exactly(load_it, example):
-    values = {name: column.to_numpy()[0] for name, column in load_it(example).block(0, 1).columns.items()}
-    assert values["vehicle_mass_kg"] == 6803.88555
-    assert values["impact_speed_m_s"] == 13.4112
-    assert values["vehicle_spring_N_m"] == 3103300.0
-    assert values["vehicle_damper_N_s_m"] == 138910.0
-    assert values["embedment_depth_m"] == 0.4 * 1.6
-    assert values["impact_height_m"] == 0.5 * ((1.6 - 0.4 * 1.6) + 0.5)
 
 
 def test_the_order_of_axes_follows_the_order_of_blocks_and_keys(load_it, example):
@@ -63,30 +60,17 @@ def test_defaults(load_it, minimal):
 @pytest.mark.parametrize(
     "key",
     [
-        "boulder.width",
-        "boulder.density",
-        "soil.density",
-        "soil.friction_angle",
-        "soil.subgrade_reaction",
-        "vehicle.mass",
-        "vehicle.speed",
-        "vehicle.spring",
-        "vehicle.damper",
-        "boulder.length",
-        "boulder.height",
+        *("boulder.length", "boulder.width", "boulder.height", "boulder.density", "vehicle.mass", "vehicle.speed"),
+        *("vehicle.spring", "vehicle.damper", "soil.density", "soil.friction_angle", "soil.subgrade_reaction"),
     ],
 )
 def test_required_keys(problems_of, minimal, key):
     section, name = key.split(".")
-    lines, inside = [], False
-    for line in minimal.splitlines():
-        inside = line == f"{section}:" if not line.startswith(" ") else inside
-        if not (inside and line.strip().startswith(f"{name}:")):
-            lines.append(line)
-    (problem,) = problems_of("\n".join(lines))
+    without = re.sub(rf"({section}:\n(?:  .*\n)*?)  {name}: .*\n", r"\1", minimal)
+    (problem,) = problems_of(without)
     assert problem.key == key
     assert "required and missing" in problem.message
-    assert problem.line == next(i for i, line in enumerate(lines, 1) if line == f"{section}:")
+    assert problem.line == 1 + without.splitlines().index(f"{section}:")
 
 
 def test_resolved_says_the_same_for_other_units_and_layout(load_it, load_with, minimal):
@@ -185,3 +169,108 @@ def test_block_has_every_input_column_in_order(load_it, example):
     assert tuple(block.columns) == INPUT_COLUMNS
     assert all(len(column) == 10 for column in block.columns.values())
     assert all(column.to_numpy().dtype == np.float64 for column in block.columns.values())
+
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+
+# Tables 1 to 3 of the paper.
+SHARED = {
+    "soil_density_kg_m3": 1859.9,
+    "friction_angle_deg": 43.2,
+    "subgrade_reaction_MN_m3": 95.0,
+    "strain_rate_factor": 1.0,
+    "vehicle_spring_N_m": 3103300.0,
+    "vehicle_damper_N_s_m": 138910.0,
+    "hood_height_m": 1.4,
+    "bed_offset_m": 2.9,
+}
+ABG = {
+    "boulder_length_m": 0.762,
+    "boulder_width_m": 1.016,
+    "boulder_height_m": 2.2,
+    "boulder_density_kg_m3": 3074.0,
+    "embedment_depth_m": 1.2,
+    "impact_height_m": 0.754,
+    "vehicle_mass_kg": 6795.0,
+    "impact_speed_m_s": 13.36,
+    "bumper_height_m": 0.508,
+}
+RWG = {
+    "boulder_length_m": 1.65,
+    "boulder_width_m": 1.68,
+    "boulder_height_m": 3.44,
+    "boulder_density_kg_m3": 2596.0,
+    "embedment_depth_m": 2.03,
+    "impact_height_m": 0.938,
+    "vehicle_mass_kg": 6722.0,
+    "impact_speed_m_s": 14.5,
+    "bumper_height_m": 0.5,
+}
+
+
+def _row(file, design=0):
+    block = load(CONFIGS / file).block(design, design + 1)
+    assert block.reasons[0] == ""
+    return {name: column.to_numpy()[0] for name, column in block.columns.items()}
+
+
+@pytest.mark.parametrize(
+    ("file", "design", "expected"),
+    [("crash_tests.yaml", 0, ABG), ("crash_tests.yaml", 1, RWG), ("abg.yaml", 0, ABG), ("rwg.yaml", 0, RWG)],
+)
+def test_crash_tests_hold_the_tables_of_the_paper(file, design, expected):
+    assert _row(file, design) == SHARED | expected
+
+
+def test_the_sizing_grid():
+    sweep = load(CONFIGS / "m30_sizing.yaml")
+    assert sweep.n_designs == 107_008
+    assert {axis.name for axis in sweep.axes} == {
+        "boulder_height_m",
+        "boulder_width_m",
+        "embedment_ratio",
+        "friction_angle_deg",
+        "subgrade_reaction_MN_m3",
+    }
+    assert not sweep.block(0, sweep.n_designs).reasons.any
+
+
+@pytest.mark.parametrize("path", sorted(CONFIGS.glob("*.yaml")), ids=lambda path: path.name)
+def test_every_file_is_valid_without_remarks(path):
+    assert load(path).notes == ()
+
+
+def loaded(block, tmp_path):
+    return load_text(f"{SITE}{block}\n", tmp_path / "site.yaml")
+
+
+def test_it_is_in_the_resolved_settings_and_in_no_hash(tmp_path):
+    plain, headed = loaded("", tmp_path), loaded("report: {client: City, date: 2026-11-25}", tmp_path)
+    assert "report" not in plain.resolved()
+    assert headed.resolved()["report"] == {"client": "City", "date": "2026-11-25"}
+    assert settings_sha256(plain.resolved()) == settings_sha256(headed.resolved())
+    assert [axis.name for axis in headed.axes] == [axis.name for axis in plain.axes]
+    assert loaded("report:", tmp_path).resolved() == plain.resolved()
+
+
+def test_an_override_replaces_an_entry(tmp_path):
+    (tmp_path / "site.yaml").write_text(f"{SITE}report: {{client: City}}\n")
+    sweep = boulder_sweep.load(tmp_path / "site.yaml", ["report.client=County", "report.author=C. Day"])
+    assert sweep.heading.given() == {"client": "County", "author": "C. Day"}
+
+
+@pytest.mark.parametrize(
+    ("block", "column", "words"),
+    [
+        ("report: City", 9, "report: must be a block of keys: project, client, author, date"),
+        ("report: {cleint: City}", 10, "report.cleint: is not a key of report"),
+        ("report: {client: [a, b]}", 18, "report.client: must be one line of text, not a list or a block"),
+        ("report: {client: ''}", 18, "report.client: is empty; write one line of text, or leave it out"),
+        (f"report: {{client: {'x' * 201}}}", 18, "report.client: has 201 characters; at most 200 fit into a heading"),
+    ],
+)
+def test_a_wrong_entry_is_refused_where_it_stands(block, column, words, tmp_path):
+    with pytest.raises(SettingsError) as refused:
+        loaded(block, tmp_path)
+    place = f"{tmp_path / 'site.yaml'}:{len(SITE.splitlines()) + 1}:{column}"
+    assert str(refused.value.problems[0]).startswith(f"{place}: {words}")

@@ -121,28 +121,30 @@ def test_no_key_of_another_meaning_is_suggested(problems_of, minimal, override):
     assert "did you mean" not in str(problems_of(minimal, override))
 
 
-def test_a_misspelled_key_is_not_reported_as_missing_too(problems_of, minimal):
-    (problem,) = problems_of(minimal.replace("width:", "widht:"))
-    assert problem.key == "boulder.widht"
-    (problem,) = problems_of(minimal.replace("vehicle:", "vehicel:"))
-    assert problem.key == "vehicel"
-    (problem,) = problems_of(minimal.replace("embedment_depth:", "embedment:"))
-    assert problem.key == "site.embedment"
-
-
-def test_embedment_is_given_in_one_way(problems_of, minimal):
-    (problem,) = problems_of(minimal.replace("site:\n", "site:\n  embedment_ratio: 0.5\n"))
-    assert "not both" in problem.message
-    (problem,) = problems_of(minimal.replace("site:\n  embedment_depth: 2.03\n", ""))
-    assert (problem.key, problem.line) == ("site", 1)
-    (problem,) = problems_of(minimal.replace("  embedment_depth: 2.03", "  impact_height: 0.9"))
-    assert (problem.key, problem.line) == ("site", 6)
-
-
-def test_accuracy_and_step_exclude_each_other(problems_of, minimal):
-    (problem,) = problems_of(minimal + "solver: {accuracy: fine, step: 1 ms}\n")
-    assert (problem.key, problem.line, problem.column) == ("solver.step", 17, 26)
-    assert "not both" in problem.message
+@pytest.mark.parametrize(
+    ("old", "new", "key", "place", "words"),
+    [
+        ("width:", "widht:", "boulder.widht", (3, 3), ""),  # and is not missing too
+        ("vehicle:", "vehicel:", "vehicel", (12, 1), ""),
+        ("embedment_depth:", "embedment:", "site.embedment", (7, 3), ""),
+        ("site:\n", "site:\n  embedment_ratio: 0.5\n", "site.embedment_depth", (8, 3), "not both"),
+        ("site:\n  embedment_depth: 2.03\n", "", "site", (1, 1), ""),
+        ("  embedment_depth: 2.03", "  impact_height: 0.9", "site", (6, 1), ""),
+        ("boulder:\n", "solver: {accuracy: fine, step: 1 ms}\nboulder:\n", "solver.step", (1, 26), "not both"),
+        (
+            "boulder:\n",
+            "solver: fast\nboulder:\n",
+            "solver",
+            (1, 9),
+            "a block of keys: accuracy, step, horizon",
+        ),
+    ],
+)
+def test_a_mistake_is_told_once_at_its_key(problems_of, minimal, old, new, key, place, words):
+    problem, *others = problems_of(minimal.replace(old, new, 1))
+    assert (problem.key, problem.line, problem.column) == (key, *place)
+    assert words in problem.message
+    assert not others
 
 
 @pytest.mark.parametrize(
@@ -168,12 +170,6 @@ def test_an_impact_above_the_boulder_is_refused(the_problem, load_with):
     problem = the_problem("site.impact_height=1.5")
     assert "above the top of the boulder, which stands 1.41 m out of the ground" in problem.message
     assert load_with("site.impact_height=1.41 m").block(0, 1).reasons[0] == ""
-
-
-def test_a_block_that_is_none(problems_of, minimal):
-    (problem, *_) = problems_of(minimal + "solver: fast\n")
-    assert (problem.key, problem.line) == ("solver", 17)
-    assert "must be a block of keys: accuracy, step, horizon" in problem.message
 
 
 def test_an_emptied_block_takes_its_defaults(load_it, minimal):

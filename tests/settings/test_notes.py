@@ -1,10 +1,14 @@
-"""Remarks on what is valid and unusual."""
+"""Remarks on values that are unusual, and the refusal of what is far from usual."""
 
 import numpy as np
 import pytest
 
+import boulder_sweep
+from boulder_sweep.cli.main import execute
 from boulder_sweep.crash_tests.rigid_wall import RigidWall
+from boulder_sweep.impact.recomputing import recompute
 from boulder_sweep.settings.checks import wall_crush
+from boulder_sweep.settings.fields import ALLOW_UNUSUAL, BY_PATH, EVERYTHING, FAR, HELD
 
 
 def _notes(sweep):
@@ -141,3 +145,162 @@ def test_the_crush_at_a_rigid_wall_is_that_of_the_analytic_solution():
     walls = [RigidWall(*map(float, one)) for one in vehicles]
     assert len({wall.over_damped for wall in walls}) == 2
     np.testing.assert_allclose(wall_crush(*vehicles.T), [wall.max_displacement_m for wall in walls], rtol=1e-9)
+
+
+LIST = """\
+name: listed
+boulder: {length: 1.65 m, width: 1.68 m, density: 2596 kg/m^3}
+site: {embedment_ratio: 0.55}
+soil: {density: 1860 kg/m^3, friction_angle: 40 deg, subgrade_reaction: 60 MN/m^3}
+vehicle: {speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
+table: trucks.csv
+"""
+TRUCKS = "boulder_height_m,vehicle_mass_lb\n2.4,15000\n2.4,15\n2.4,20000\n"
+
+
+def test_what_is_held_has_a_usual_range_within_the_admitted_one():
+    assert {path.split(".")[1] for path in HELD} >= {"mass", "density", "speed", "spring", "damper"}
+    for path in HELD:
+        usual, admitted = BY_PATH[path].usual, BY_PATH[path].admitted
+        assert admitted.low < usual.low / FAR
+        assert usual.low < usual.high < admitted.high
+
+
+def _entry(path, value):
+    if path == "boulder.mass":
+        return (f"{path}={value!r}", "boulder.length=20", "boulder.width=20", "boulder.height=20")
+    return (f"{path}={value!r}",)
+
+
+@pytest.mark.parametrize(
+    ("path", "side"),
+    [
+        (path, side)
+        for path in HELD
+        for side in ("low", "high")
+        if (path, side) != ("vehicle.speed", "high")  # 750 m/s is not admitted
+    ],
+)
+def test_a_factor_of_thirty_outside(load_with, problems_of, minimal, path, side):
+    usual = BY_PATH[path].usual
+    last = usual.low / FAR if side == "low" else usual.high * FAR
+    beyond = last * (0.999 if side == "low" else 1.001)
+    load_with(*_entry(path, last))
+    (problem,) = problems_of(minimal, *_entry(path, beyond))
+    assert problem.key == path
+    assert f"allow_unusual: [{path}]" in problem.message
+    for allowed in (f"[{path}]", path, EVERYTHING, f"[{path}, vehicle.speed]"):
+        sweep = load_with(*_entry(path, beyond), f"{ALLOW_UNUSUAL}={allowed}")
+        assert sweep.constants[BY_PATH[path].name] == beyond
+
+
+@pytest.mark.parametrize(
+    ("entry", "words"),
+    [
+        ("vehicle.mass=15 lb", "15 lb is less than 1/30 of the usual 2204.62 to 66138.7 lb (car to heavy truck"),
+        ("vehicle.mass=15.000 lb", "15 lb is less than 1/30"),
+        ("vehicle.mass=6.8e6", "6.8e+06 kg is more than 30 times the usual 1000 to 30000 kg"),
+        ("vehicle.mass=[6800, 12, 15]", "12 to 15 kg is less than"),
+        ("vehicle.mass=[12, 1e6]", "12 to 1e+06 kg is more than 30 times outside the usual"),
+        ("vehicle.mass={from: 1 kg, to: 7000 kg, count: 3}", "1 kg is less than"),
+        ("vehicle.mass={mean: [6800 kg, 15 kg], sd: 1 kg}", "15 kg is less than"),
+        ("vehicle.mass={distribution: uniform, low: 1 kg, high: 9 t}", "1 kg is less than"),
+        ("vehicle.mass={distribution: triangular, low: 1 kg, mode: 7 t, high: 9 t}", "1 kg is less than"),
+        ("vehicle.spring=3103.3", "a bare number is in N/m, not in kN/m"),
+        ("vehicle.damper=138.91", "not in kN*s/m"),
+        ("vehicle.speed=0.05", "0.05 m/s is less than"),
+        ("boulder.density=2.6", "not in t/m^3 or pcf"),
+        ("soil.density=1.86", "not in t/m^3 or pcf"),
+        (
+            "soil.layers=[{from: 1 m, density: 1.9, friction_angle: 36, subgrade_reaction: 60}]",
+            "1.9 kg/m^3 is less than 1/30 of the usual 1520 to 2240 kg/m^3",
+        ),
+        (
+            "vehicle.approach={length: 0.001 m, from: 0 m/s, acceleration: 1 m/s^2}",
+            "0.0447214 m/s is less than 1/30 of the usual 4 to 25 m/s",
+        ),
+    ],
+)
+def test_what_is_refused(the_problem, entry, words):
+    assert words in the_problem(entry).message
+
+
+@pytest.mark.parametrize("entry", ["vehicle.speed=0", "vehicle.speed=[0, 5, 10]", "vehicle.mass={mean: 6800, sd: 500}"])
+def test_what_is_admitted(load_with, entry):
+    load_with(entry)
+
+
+def test_each_has_its_place_and_one_entry_allows_all(problems_of, load_it, minimal):
+    text = minimal.replace("mass: 6722", "mass: [6722, 15, 16] lb").replace("density: 1859.9", "density: 1.86")
+    problems = problems_of(text)
+    places = [(9, 12, "soil.density"), *((13, column, "vehicle.mass") for column in (16, 20))]
+    assert [(one.line, one.column, one.key) for one in problems] == places
+    (remedy,) = {one.message.rpartition(" by ")[2] for one in problems}
+    assert load_it(f"{text}{remedy}\n").allowed == ("soil.density", "vehicle.mass")
+
+
+def test_named_vehicles_have_their_places(problems_of, minimal):
+    light = "  - {name: light, mass: 15 lb, speed: 30 mph, spring: 900 kN/m, damper: 25 kN*s/m}\n"
+    heavy = "  - {name: heavy, mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91}\n"
+    problems = problems_of(minimal[: minimal.index("vehicle:")] + f"vehicle:\n{light}{heavy}")
+    assert [(one.line, one.key) for one in problems] == [(13, "vehicle.mass"), (14, "vehicle.damper")]
+    assert problems[0].column == light.index("15 lb") + 1
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        ("[vehicle.mas]", "did you mean vehicle.mass?"),
+        ("[vehicle.mass, vehicle.wheels]", "'vehicle.wheels' is not an entry that is held to its usual range"),
+        ("criterion.max_rotation", "(boulder.density, boulder.mass, soil.density, vehicle.mass,"),
+        ("alll", "did you mean all?"),
+        ("{vehicle.mass: yes}", "is not an entry"),
+        ("[[vehicle.mass]]", "is not an entry"),
+        ("", "'' is not an entry"),
+    ],
+)
+def test_what_may_be_allowed(the_problem, value, words):
+    problem = the_problem(f"{ALLOW_UNUSUAL}={value}")
+    assert problem.key == ALLOW_UNUSUAL
+    assert words in problem.message
+
+
+@pytest.fixture
+def trucks(tmp_path, monkeypatch):
+    """Work where a file lists three trucks, the second of 15 lb."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "trucks.csv").write_text(TRUCKS)
+    (tmp_path / "listed.yaml").write_text(LIST)
+    return "listed.yaml"
+
+
+def test_a_row_of_a_list_is_an_error_and_the_others_are_computed(trucks, capsys):
+    assert execute(["run", trucks, "-q"]) == 3
+    assert "unusual 1" in capsys.readouterr().out
+    table = boulder_sweep.read("listed.sweep")
+    assert table.verdict.tolist() == ["fail", "error", "fail"]
+    assert table.reason.tolist() == ["overturns", "unusual", "overturns"]
+    assert np.isnan(table.max_rotation_deg[1])
+    assert boulder_sweep.load(trucks).block(1, 3).reasons[0] == "unusual"
+    again = recompute("listed.sweep", 1)
+    assert not again.unequal
+    (note,) = (one for one in boulder_sweep.load(trucks).notes if one.key == "vehicle.mass")
+    assert "1 design not computed (error, unusual), the first is design 1" in note.message
+
+
+@pytest.mark.parametrize("allowed", [EVERYTHING, "[vehicle.mass]"])
+def test_a_file_may_allow_the_rows_of_its_list(trucks, allowed):
+    assert execute(["run", trucks, "-q", "--set", f"{ALLOW_UNUSUAL}={allowed}"]) == 0
+    table = boulder_sweep.read("listed.sweep")
+    assert "error" not in table.verdict.tolist()
+    assert not recompute("listed.sweep", 1).unequal
+    assert boulder_sweep.load(trucks).resolved() != boulder_sweep.load(trucks, [f"{ALLOW_UNUSUAL}=all"]).resolved()
+
+
+def test_an_unusual_row_answers_no_question(trucks, capsys):
+    assert execute(["need", trucks, "-q", "--most", "speed"]) == 3
+    assert execute(["capacity", trucks, "-q"]) == 3
+
+
+def test_of_a_grid_what_is_allowed_changes_nothing_else(load_with):
+    assert load_with().resolved() == load_with(f"{ALLOW_UNUSUAL}=all").resolved()

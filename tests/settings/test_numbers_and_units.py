@@ -1,12 +1,17 @@
-"""Numbers and units as engineers write them, and the traps between YAML, Excel and the Imperial system."""
+"""Numbers, units, ranges and distributions as engineers write them, and the traps between YAML, Excel and feet."""
 
 import math
+from decimal import Decimal
 from fractions import Fraction
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
 
 from boulder_sweep.settings.units import EXPECTED, UnitError, factor
-from boulder_sweep.settings.values import split_number
+from boulder_sweep.settings.values import MAX_AXIS, split_number, spread
 
 
 @pytest.mark.parametrize(
@@ -280,3 +285,237 @@ def test_a_number_that_a_comma_cuts_in_two(problems_of, minimal, entry):
 
 def test_the_rest_of_a_number_in_a_list(the_problem):
     assert "write that without a comma, as in 15000" in the_problem("vehicle.mass=[15,000, 20,000] lb").message
+
+
+def _height(sweep):
+    (axis,) = sweep.axes
+    assert axis.name == "boulder_height_m"
+    return axis.values.tolist()
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("[3, 3.5, 4]", [3.0, 3.5, 4.0]),
+        ("[4, 3]", [4.0, 3.0]),
+        ("[3]", [3.0]),
+        ("[3, 3.5] m", [3.0, 3.5]),
+        ("[3 m, 350 cm]", [3.0, 3.5]),
+        ("[10, 12] ft", [3.048, 3.6576]),
+        ("'[3, 3.5] m'", [3.0, 3.5]),
+        ('"[3, 3.5]"', [3.0, 3.5]),
+        ("{from: 3, to: 4, count: 3}", [3.0, 3.5, 4.0]),
+        ("{from: 3 m, to: 4 m, step: 0.5 m}", [3.0, 3.5, 4.0]),
+        ("{from: 3, to: 4, step: 0.5} m", [3.0, 3.5, 4.0]),
+        ("{from: 10 ft, to: 11 ft, step: 6 in}", [3.048, 3.2004, 3.3528]),
+        ("{from: 4, to: 3, step: -0.5}", [4.0, 3.5, 3.0]),
+        ("{from: 4, to: 3, count: 3}", [4.0, 3.5, 3.0]),
+        ("{from: 3, to: 3, count: 1}", [3.0]),
+        ("{from: 3, to: 3, step: 0.1}", [3.0]),
+        ("{from: 3, to: 3.2, count: 3}", [3.0, 3.1, 3.2]),
+        ("{count: 3, to: 4, from: 3}", [3.0, 3.5, 4.0]),
+    ],
+)
+def test_values_as_written(load_with, text, expected):
+    assert _height(load_with(f"boulder.height={text}")) == expected
+
+
+def test_steps_do_not_drift(load_with):
+    sweep = load_with("site.embedment_ratio={from: 0.40, to: 0.70, step: 0.02}")
+    values = sweep.axes[0].values.tolist()
+    assert len(values) == 16
+    assert values == [float(Decimal("0.40") + i * Decimal("0.02")) for i in range(16)]
+
+
+@given(first=st.decimals("0.01", "20", places=3), step=st.decimals("0.001", "0.5", places=3), count=st.integers(1, 40))
+def test_every_value_of_a_step_range_is_the_float_nearest_to_its_decimal(first, step, count):
+    last = first + (count - 1) * step
+    values = spread(Fraction(first), Fraction(last), count)
+    assert values == [float(first + i * step) for i in range(count)]
+
+
+@given(a=st.fractions(-1000, 1000), b=st.fractions(-1000, 1000), count=st.integers(2, 50))
+def test_every_value_of_a_count_range_is_the_float_nearest_to_the_exact_one(a, b, count):
+    assert spread(a, b, count) == [float(a + (b - a) * i / (count - 1)) for i in range(count)]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[]", "empty"),
+        ("'[]'", "empty"),
+        ("{from: 3.4, to: 1.6, step: 0.1}", "goes downwards and the step does not"),
+        ("{from: 1.6, to: 3.4, step: -0.1}", "goes upwards and the step does not"),
+        ("{from: 1.6, to: 3.4, step: 0}", "step must not be 0"),
+        ("{from: 1.6, to: 3.45, step: 0.1}", "but at 3.4 m or 3.5 m"),
+        ("{from: 1.6, to: 3.4, count: 1}", "a count of 1 cannot hold both ends"),
+        ("{from: 1.6, to: 3.4, count: 0}", "whole number"),
+        ("{from: 1.6, to: 3.4, count: -3}", "whole number"),
+        ("{from: 1.6, to: 3.4, count: 2.5}", "whole number"),
+        ("{from: 1.6, to: 3.4, count: yes}", "whole number"),
+        ("{from: 1.6, to: 3.4, count: [3]}", "whole number"),
+        (f"{{from: 1.6, to: 3.4, count: {MAX_AXIS + 1}}}", "whole number"),
+        ("{from: 1.6, to: 3.4, count: 9999999999999999999999}", "whole number"),
+        ("{from: 1.6, to: 3.4, step: 1e-9}", "more than 1000000 values"),
+        ("{from: 1.6, to: 3.4, step: 1e-290}", "more than 1000000 values"),
+        ("{from: 1.6, to: 3.4}", "lacks count or step"),
+        ("{from: 1.6, count: 3}", "lacks to"),
+        ("{count: 3}", "lacks from and to"),
+        ("{}", "lacks from and to"),
+        ("{from: 1.6, to: 3.4, count: 3, step: 0.1}", "not both"),
+        ("{from: 1.6, to: 3.4, steps: 3}", "did you mean step"),
+        ("{from: 1.6 m, to: 3.4, count: 3}", "has no unit while the others have one"),
+        ("[6 ft, 7]", "'7' has no unit"),
+        ("[6 ft, 7] ft", "has a unit and so has the list"),
+        ("[[3], 4]", "one number is needed here, not a list"),
+        ("{from: [3], to: 4, count: 2}", "one number is needed here, not a list"),
+        ("[{from: 3, to: 4, count: 2}]", "one number is needed here, not a block"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(the_problem, text, words):
+    problem = the_problem(f"boulder.height={text}")
+    assert problem.key == "boulder.height"
+    assert words in problem.message
+
+
+def test_both_ends_of_a_range_are_reported(problems_of, minimal):
+    problems = problems_of(minimal.replace("height: 3.44", "height: {from: -1, to: 100, count: 2}"))
+    assert [(problem.line, problem.column) for problem in problems] == [(4, 18), (4, 26)]
+    assert all("admitted range of 0.01 to 20 m" in problem.message for problem in problems)
+
+
+def test_every_bad_value_of_a_list_is_reported_at_its_place(problems_of, minimal):
+    problems = problems_of(minimal.replace("height: 3.44", "height: [3, x, -1, 4, 200]"))
+    assert [problem.message[:4] for problem in problems] == ["'x' "]
+    problems = problems_of(minimal.replace("height: 3.44", "height: [3, -1, 4, 200]"))
+    assert [problem.column for problem in problems] == [15, 22]
+
+
+@pytest.mark.parametrize("key", ["criterion.max_rotation", "solver.horizon", "solver.step", "solver.accuracy"])
+@pytest.mark.parametrize("value", ["[1, 2]", "{from: 1, to: 2, count: 2}"])
+def test_settings_that_are_no_axes_take_one_value(the_problem, key, value):
+    assert "one value" in the_problem(f"{key}={value}").message
+
+
+PHI = "friction_angle_deg"
+
+
+@pytest.mark.parametrize(
+    ("text", "mean", "sd", "kind"),
+    [
+        ("{mean: 38 deg, sd: 3 deg}", 38.0, 3.0, "normal"),
+        ("{mean: 38, cov: 5 %}", 38.0, 1.9, "normal"),
+        ("{distribution: lognormal, mean: 38 deg, cov: 0.05}", 38.0, 1.9, "lognormal"),
+        ("{distribution: uniform, low: 36 deg, high: 42 deg}", 39.0, 6 / math.sqrt(12), "uniform"),
+        ("{distribution: beta, low: 30, high: 45, mean: 38, sd: 2}", 38.0, 2.0, "beta"),
+        ("{mean: 0.66322512 rad, sd: 0.05235988 rad}", 38.0, 3.0, "normal"),
+    ],
+)
+def test_mean_and_standard_deviation(load_with, text, mean, sd, kind):
+    sweep = load_with(f"soil.friction_angle={text}")
+    distribution = sweep.distributions[PHI]
+    assert distribution.kind == kind
+    assert sweep.constants[PHI] == pytest.approx(mean, rel=1e-6)
+    assert distribution.deviation(np.array([mean]))[0] == pytest.approx(sd, rel=1e-6)
+
+
+def test_a_triangle_has_the_moments_of_its_corners(load_with):
+    sweep = load_with("soil.friction_angle={distribution: triangular, low: 34, mode: 39, high: 42}")
+    triangle = stats.triang((39 - 34) / (42 - 34), 34, 42 - 34)
+    assert sweep.constants[PHI] == pytest.approx(triangle.mean())
+    assert sweep.distributions[PHI].deviation(np.zeros(1))[0] == pytest.approx(triangle.std())
+
+
+@pytest.mark.parametrize(
+    ("kind", "spread"), [("normal", "cov: 8 %"), ("normal", "sd: 3 deg"), ("lognormal", "cov: 8 %")]
+)
+def test_a_characteristic_value_is_the_five_percent_fractile(load_with, kind, spread):
+    sweep = load_with(f"soil.friction_angle={{distribution: {kind}, characteristic: 36 deg, {spread}}}")
+    mean = sweep.constants[PHI]
+    sd = sweep.distributions[PHI].deviation(np.array([mean]))[0]
+    if kind == "normal":
+        parent = stats.norm(mean, sd)
+    else:
+        spread_of_log = math.sqrt(math.log(1 + (sd / mean) ** 2))
+        parent = stats.lognorm(spread_of_log, scale=mean * math.exp(-0.5 * spread_of_log**2))
+    assert parent.ppf(0.05) == pytest.approx(36.0)
+
+
+def test_ends_truncate_and_are_the_admitted_range_by_default(load_with):
+    given = load_with("soil.friction_angle={mean: 38, sd: 3, low: 32 deg, high: 44 deg}").distributions[PHI]
+    assert (given.low, given.high) == (32.0, 44.0)
+    default = load_with("soil.friction_angle={mean: 38, sd: 3}").distributions[PHI]
+    assert (default.low, default.high) == (1.0, 60.0)
+
+
+def test_means_may_be_an_axis(load_with):
+    sweep = load_with("soil.friction_angle={mean: [36, 40] deg, cov: 5 %}")
+    assert sweep.n_designs == 2
+    assert sweep.axes[0].values.tolist() == [36.0, 40.0]
+    assert sweep.distributions[PHI].deviation(sweep.axes[0].values).tolist() == pytest.approx([1.8, 2.0])
+
+
+def test_correlation(load_with, the_problem):
+    both = ("soil.friction_angle={mean: 38, sd: 3}", "soil.subgrade_reaction={mean: 60, cov: 30 %}")
+    assert load_with(*both, "soil.correlation=0.5").correlation == 0.5
+    assert load_with(*both).correlation == 0.0
+    assert "needs a distribution of soil.friction_angle" in the_problem("soil.correlation=0.5").message
+
+
+def test_what_is_doubtful_decides_the_results_and_is_in_the_record(load_with):
+    record = load_with("soil.friction_angle={mean: 38, sd: 3}").resolved()
+    assert record["distributions"] == {PHI: {"kind": "normal", "sd": 3.0, "low": 1.0, "high": 60.0}}
+    assert "distributions" not in load_with().resolved()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("{mean: 38 deg}", "a normal distribution needs sd or cov"),
+        ("{sd: 3 deg}", "needs mean or characteristic"),
+        ("{mean: 38, sd: 3, cov: 8 %}", "give sd or cov, not both"),
+        ("{mean: 38, characteristic: 36, sd: 3}", "give mean or characteristic, not both"),
+        ("{mean: 38, sd: 0}", "must be more than 0"),
+        ("{mean: 38, sd: -3}", "must be more than 0"),
+        ("{mean: 38, sd: 3 m}", "'m' is a length; an angle is needed"),
+        ("{mean: 38, cov: 3 deg}", "'deg' is an angle; a plain number is needed"),
+        ("{mean: 380, sd: 3}", "outside the admitted range"),
+        ("{mean: 38, sd: 3, low: 39}", "the mean must be between low and high (39 to 60 deg)"),
+        ("{mean: 38, sd: 3, low: 50, high: 40}", "low (50 deg) must be less than high (40 deg)"),
+        ("{mean: 38, sd: 3, mode: 38}", "'mode' is not a key of a normal distribution"),
+        ("{mean: 38, sdd: 3}", "did you mean sd?"),
+        ("{mean: 38, sd: 3} deg", "behind each number"),
+        ("{normal: {mean: 38, sd: 3}}", "{distribution: normal, mean: ..., sd: ...}"),
+        ("{distribution: nromal, mean: 38, sd: 3}", "did you mean normal?"),
+        ("{distribution: uniform, low: 36}", "a uniform distribution needs high"),
+        ("{distribution: triangular, low: 36, high: 40, mode: 45}", "the mode must be between low and high"),
+        ("{distribution: beta, low: 36, high: 40, mean: 37, sd: 2}", "must be less than 1.732 deg"),
+        ("{distribution: lognormal, characteristic: 36, sd: 3}", "needs cov"),
+        ("{characteristic: 36, cov: 70 %}", "use lognormal"),
+        ("{characteristic: 58, sd: 3}", "outside the admitted range"),
+    ],
+)
+def test_mistakes(problems_of, minimal, text, words):
+    problems = problems_of(minimal, f"soil.friction_angle={text}")
+    assert any(words in problem.message for problem in problems)
+    assert {problem.key for problem in problems} == {"soil.friction_angle"}
+
+
+@pytest.mark.parametrize("text", ["43.2", "[36, 40]"])
+def test_a_partial_factor_divides_the_tangent(load_with, text):
+    plain = load_with(f"soil.friction_angle={text}")
+    factored = load_with(f"soil.friction_angle={text}", "partial_factor.friction_angle=1.25")
+    angles = plain.block(0, plain.n_designs).columns[PHI].to_numpy()
+    design = factored.block(0, factored.n_designs).columns[PHI].to_numpy()
+    assert np.tan(np.radians(angles)) / np.tan(np.radians(design)) == pytest.approx(1.25)
+    assert factored.resolved()["partial_factor"] == {"friction_angle": 1.25}
+    assert any("simulated and listed as" in note.message for note in factored.notes)
+    assert "partial_factor" not in plain.resolved()
+
+
+def test_a_partial_factor_beside_a_distribution_is_refused(problems_of, minimal):
+    overrides = ("soil.friction_angle={mean: 38, sd: 3}", "partial_factor.friction_angle=1.25")
+    (problem,) = problems_of(minimal, *overrides)
+    assert problem.key == "partial_factor.friction_angle"
+    (problem,) = problems_of(minimal, "partial_factor.friction_angle=0.8")
+    assert "outside the admitted range of 1 to 5" in problem.message

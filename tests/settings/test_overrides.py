@@ -1,6 +1,8 @@
-"""``--set KEY=VALUE``: the same rules as in the file, and an error that points at the option."""
+"""``--set KEY=VALUE`` and the names of entries: the same rules as in the file, and an error at the option."""
 
 import pytest
+
+from boulder_sweep.settings.fields import BOULDER_MASS, FIELDS, INPUTS, UnknownNameError, named
 
 
 @pytest.mark.parametrize(
@@ -116,3 +118,18 @@ def test_mistakes_of_file_and_options_come_together(problems_of, minimal):
         ("--set", "vehicle.mass"),
         ("--set", "vehicle.speed"),
     ]
+
+
+EVERY = (*FIELDS, BOULDER_MASS)
+
+
+@pytest.mark.parametrize("field", INPUTS, ids=lambda field: field.path)
+def test_every_input_has_three_names(field):
+    assert named(field.path) is field
+    assert named(field.name) is field
+    keys = [one.key for one in (*INPUTS, BOULDER_MASS)]
+    if keys.count(field.key) == 1:
+        assert named(field.key) is field is named(field.key, EVERY)
+    else:
+        with pytest.raises(UnknownNameError, match=rf"'{field.key}' is ambiguous; use .*{field.path}"):
+            named(field.key)

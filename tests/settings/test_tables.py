@@ -1,6 +1,12 @@
-"""Explicit lists of designs from CSV and Parquet files."""
+"""Lists of designs and measured curves from files: right, wrong, and made to do harm."""
 
+from __future__ import annotations
+
+import io
+import os
+import random
 import re
+import threading
 import zipfile
 from decimal import Decimal
 from pathlib import Path
@@ -10,10 +16,14 @@ import openpyxl
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from openpyxl import Workbook
 
+from boulder_sweep.crash_tests.measured import PULSE_SIGNALS, TEST_SIGNALS, read_history
 from boulder_sweep.locations import location_of, put
-from boulder_sweep.settings import SettingsError, load
+from boulder_sweep.settings import SettingsError, load, load_text
 from boulder_sweep.settings.fields import INPUTS
+from tests.counting import calls_of
+from tests.waiting import HANG_GUARD_S
 
 HEADER = "boulder_length_m,boulder_width_m,boulder_height_m,embedment_depth_m\n"
 ROWS = "0.762,1.016,2.2,1.2\n1.65,1.68,3.44,2.03\n"
@@ -35,9 +45,6 @@ def load_table(tmp_path):
         return load(tmp_path / "grid.yaml")
 
     return load_table
-
-
-TABLES = Path(__file__).parent / "tables"
 
 
 @pytest.fixture
@@ -97,30 +104,6 @@ def test_impossible_rows_stay_with_their_reason(load_table):
     sweep = load_table(HEADER + "1,1,2,1\n1,1,2,2\n1,1,2,3\n")
     reasons = sweep.block(0, 3).reasons
     assert [reasons[row] for row in range(3)] == ["", *["embedment depth is not less than the boulder's height"] * 2]
-
-
-def test_digits_of_other_scripts_are_no_numbers_as_in_the_file(messages_of):
-    messages = messages_of(HEADER + "\u0661.\u0662,1,2.2,1.2\n1,1,\uff12,1\n")
-    assert messages == [
-        "designs.csv:2:1: boulder_length_m: '\u0661.\u0662' is not a number; a length is needed, such as 1.65 m",
-        "designs.csv:3:5: boulder_height_m: '\uff12' is not a number; a length is needed, such as 1.65 m",
-    ]
-
-
-@pytest.mark.parametrize(
-    ("cell", "words"),
-    [
-        ("15,000", "vehicle_mass_lb: '15,000' is not a plain number; write 15000"),
-        ("1,500.5", "vehicle_mass_lb: '1,500.5' is not a plain number; write 1500.5"),
-        ("15.000,5", "vehicle_mass_lb: '15.000,5' is not a plain number; write 15000.5"),
-        ("15 000", "vehicle_mass_lb: '15 000' is not a plain number; write 15000"),
-        ("15000,5", "vehicle_mass_lb: '15000,5' is not a plain number; write 15000.5"),
-    ],
-)
-def test_separators_in_a_cell(messages_of, cell, words):
-    table = HEADER.replace("\n", ",vehicle_mass_lb\n") + f'1,1,2,1,"{cell}"\n'
-    (message,) = messages_of(table, grid=GRID.replace("mass: 6800, ", ""))
-    assert message == f"designs.csv:2: {words}"
 
 
 def test_cells_are_reported_with_line_and_column_all_at_once(messages_of):
@@ -192,12 +175,6 @@ def test_decimal_commas_where_a_comma_separates_no_cells(load_table, messages_of
         assert _column(load_table(table, grid=grid), "vehicle_mass_kg") == expected
 
 
-def test_rows_of_a_result_of_calculation_with_commas_in_every_column(load_table):
-    sweep = load_table((HEADER + ROWS).replace(",", ";").replace(".", ","))
-    assert _column(sweep, "boulder_length_m") == [0.762, 1.65]
-    assert _column(sweep, "embedment_depth_m") == [1.2, 2.03]
-
-
 @pytest.mark.parametrize(
     ("text", "heights"),
     [
@@ -219,33 +196,11 @@ def test_what_spreadsheets_and_pandas_write_around_the_numbers(load_table, text,
     assert sweep.block(0, 1).labels == {}
 
 
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [
-        ("blank_rows.csv", [2.6, 3.0]),
-        ("trailing_commas.csv", [2.6, 3.0]),
-        ("decimals.parquet", [2.6]),
-        ("formulas.xlsx", "formulas.xlsx:2:2: table: has formulas without values: open and save it once in a"),
-    ],
-)
-def test_tables_as_other_programs_wrote_them(load_table, messages_of, name, expected):
-    grid = GRID.replace("boulder: {{", "boulder: {{length: 1.65, width: 1.68, ")
-    content = (TABLES / name).read_bytes()
-    if isinstance(expected, str):
-        assert messages_of(content, name, grid)[0].startswith(expected)
-    else:
-        assert _column(load_table(content, name, grid), "boulder_height_m") == expected
-
-
 @pytest.mark.parametrize("numbers", [(0, 0), (2, 1), (1.5, 2), ("a", "b"), (-1, 0)])
 def test_a_first_column_without_a_name_that_does_not_count(messages_of, numbers):
     table = f",{HEADER}{numbers[0]},1,1,2,1\n{numbers[1]},1,1,2,1\n"
     (message,) = messages_of(table)
     assert message.startswith("designs.csv:1:1: the first column: has no name, and does not count the rows; give it")
-
-
-def test_a_mistake_beside_an_index_has_its_column(messages_of):
-    assert messages_of(f",{HEADER}0,1,x,2,1\n")[0].startswith("designs.csv:2:5: boulder_width_m: 'x' is not")
 
 
 def test_a_table_without_names_says_which_line_is_wanted(messages_of):
@@ -266,19 +221,14 @@ def test_mistakes_of_one_kind_are_counted(messages_of):
     ("name", "value", "column", "expected"),
     [
         ("boulder_length_ft", "5.5", "boulder_length_m", 1.6764),
-        ("boulder_length_in", "66", "boulder_length_m", 1.6764),
-        ("boulder_length_cm", "165", "boulder_length_m", 1.65),
         ("boulder_density_pcf", "162", "boulder_density_kg_m3", 162 * 0.45359237 / 0.3048**3),
         ("boulder_density_lb_ft3", "162", "boulder_density_kg_m3", 162 * 0.45359237 / 0.3048**3),
         ("soil_density_kN_m3", "18.2", "soil_density_kg_m3", 18200 / 9.80665),
-        ("soil_density_t_m3", "1.86", "soil_density_kg_m3", 1860.0),
         ("friction_angle_rad", "0.7", "friction_angle_deg", np.degrees(0.7)),
         ("subgrade_reaction_pci", "350", "subgrade_reaction_MN_m3", 350 * 4.4482216152605 / 0.0254**3 / 1e6),
-        ("subgrade_reaction_kN_m3", "95000", "subgrade_reaction_MN_m3", 95.0),
         ("vehicle_mass_lb", "15000", "vehicle_mass_kg", 15000 * 0.45359237),
         ("vehicle_mass_short_ton", "7.5", "vehicle_mass_kg", 15000 * 0.45359237),
         ("impact_speed_mph", "30", "impact_speed_m_s", 13.4112),
-        ("impact_speed_km_h", "48", "impact_speed_m_s", 48 / 3.6),
         ("vehicle_spring_kN_m", "3103.3", "vehicle_spring_N_m", 3103300.0),
         ("vehicle_spring_lb_in", "17720", "vehicle_spring_N_m", 17720 * 4.4482216152605 / 0.0254),
         ("vehicle_damper_kN_s_m", "138.91", "vehicle_damper_N_s_m", 138910.0),
@@ -410,15 +360,6 @@ def write_parquet(tmp_path):
     return write_parquet
 
 
-def test_parquet(write_parquet, load_table):
-    write_parquet(
-        boulder_length_m=[1.0, 2.0], boulder_width_m=[1, 2], boulder_height_m=[3.0, 4.0], embedment_depth_m=[1.5, 2.0]
-    )
-    sweep = load_table(None, "designs.parquet")
-    assert _column(sweep, "boulder_width_m") == [1.0, 2.0]
-    assert sweep.n_designs == 2
-
-
 def test_decimals_of_a_database_and_the_index_of_pandas(load_table, tmp_path):
     kinds = [pa.decimal128(2, 1), pa.decimal128(18, 3), pa.decimal256(40, 2), pa.decimal128(5, 0)]
     values = [["1.5", "2.0"], ["1.25", "2"], ["3.44", "4"], ["2", "3"]]
@@ -452,10 +393,11 @@ def test_mistakes_in_parquet(write_parquet, messages_of):
         assert any(message.startswith(start) for message in messages), start
 
 
-@pytest.mark.parametrize("content", [b"", b"PAR1", b"PAR1" + bytes(100) + b"PAR1", b"x" * 1000])
-def test_files_that_are_no_parquet(messages_of, content):
-    (message,) = messages_of(content, "designs.parquet")
-    assert "cannot be read as Parquet" in message
+@pytest.mark.parametrize("content", [b"", b"PAR1", b"PAR1" + bytes(100) + b"PAR1", b"PK", b"x" * 1000])
+@pytest.mark.parametrize(("name", "words"), [("designs.parquet", "Parquet"), ("designs.xlsx", "a spreadsheet")])
+def test_files_that_are_neither_parquet_nor_spreadsheets(messages_of, content, name, words):
+    (message,) = messages_of(content, name)
+    assert f"cannot be read as {words}" in message
 
 
 def test_a_long_table_stays_columns(load_table):
@@ -532,12 +474,6 @@ def test_mistakes_in_a_spreadsheet(write_xlsx, messages_of):
     assert "has 5 cells; the first line has 4" in messages[2]
 
 
-@pytest.mark.parametrize("content", [b"", b"PK", b"x" * 1000])
-def test_files_that_are_no_spreadsheet(messages_of, content):
-    (message,) = messages_of(content, "designs.xlsx")
-    assert "cannot be read as a spreadsheet" in message
-
-
 def test_a_spreadsheet_that_unpacks_to_too_much(messages_of, tmp_path, monkeypatch):
     monkeypatch.setattr("boulder_sweep.settings.design_list.MAX_UNPACKED_BYTES", 1_000_000)
     with zipfile.ZipFile(tmp_path / "designs.xlsx", "w", zipfile.ZIP_DEFLATED) as archive:
@@ -566,22 +502,14 @@ def test_an_empty_spreadsheet(write_xlsx, messages_of):
 
 
 @pytest.mark.parametrize("suffix", ["csv", "xlsx", "parquet"])
-def test_a_table_may_be_named_by_a_url(load_table, tmp_path, suffix):
+def test_a_table_may_be_named_by_a_url(load_table, write_parquet, write_xlsx, tmp_path, suffix):
     names, *rows = [line.split(",") for line in (HEADER + ROWS).splitlines()]
-    columns = {name: [float(row[position]) for row in rows] for position, name in enumerate(names)}
-    local = tmp_path / f"designs.{suffix}"
-    if suffix == "csv":
-        local.write_text(HEADER + ROWS)
-    elif suffix == "parquet":
-        pq.write_table(pa.table(columns), local)
-    else:
-        book = openpyxl.Workbook()
-        for row in [names, *[[float(cell) for cell in row] for row in rows]]:
-            book.active.append(row)
-        book.save(local)
-    url = f"memory://tables/designs.{suffix}"
-    put(location_of(url), local.read_bytes())
-    sweep, same = load_table(None, url), load_table(None, local.name)
+    numbers = [list(map(float, row)) for row in rows]
+    (tmp_path / "designs.csv").write_text(HEADER + ROWS)
+    write_parquet(**dict(zip(names, map(list, zip(*numbers, strict=True)), strict=True)))
+    write_xlsx(names, *numbers)
+    put(location_of(f"memory://tables/designs.{suffix}"), (tmp_path / f"designs.{suffix}").read_bytes())
+    sweep, same = (load_table(None, f"{folder}designs.{suffix}") for folder in ("memory://tables/", ""))
     assert _column(sweep, "boulder_height_m") == [2.2, 3.44]
     assert sweep.resolved() == same.resolved()
 
@@ -598,3 +526,219 @@ def test_a_url_that_gives_no_table_is_told_without_its_secrets(messages_of, url,
     (message,) = messages_of(None, url)
     assert words in message
     assert "SECRET" not in message
+
+
+SETTINGS = """\
+name: t
+table: {file}
+boulder: {{length: 1.65 m, width: 1.68 m, density: 2596 kg/m^3}}
+site: {{embedment_ratio: 0.5}}
+soil: {{density: 1859.9 kg/m^3, friction_angle: 43.2 deg, subgrade_reaction: 60 MN/m^3}}
+vehicle: {{mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}}
+"""
+HEIGHT = "boulder_height_m"
+TABLE = f'{HEIGHT},friction_angle_deg,vehicle_mass_lb,note\n2.5,40,15000,a\n2.6,41,15000,b\n3,42,14000,"c, d"\n'
+PULSE = "time [ms], displacement [mm], acceleration [g]\n0,0,0\n1,13,-1\n2,26,-2\n3,38,-3\n4,50,\n5,61,-4\n"
+TOKENS = [
+    *(b"nan", b"inf", b"-1e999", b"1" * 400, b"\0", b"\x1b[31m", b'"', b"'", b",", b";", b"\t", b"\n", b"\r", b"#"),
+    *(b"\xff", b"\xef\xbb\xbf", "１２".encode(), "−1".encode(), b"0x1f", b"1_0", b"=cmd()", b"[", b"]", b"design_id"),
+    *(b"verdict", HEIGHT.encode(), b"time [s]", b"-", b" ", b"e", b"."),
+]  # fmt: skip
+
+
+def parquet(**columns: object) -> bytes:
+    sink = io.BytesIO()
+    pq.write_table(pa.table(columns), sink, compression="zstd")
+    return sink.getvalue()
+
+
+def read(path: Path) -> None:
+    """Read a table, or a measured curve if its name says so; all that may be raised is a list of mistakes."""
+    try:
+        if path.name.startswith("pulse"):
+            read_history(path, PULSE_SIGNALS if path.name == "pulse.csv" else TEST_SIGNALS)
+        else:
+            assert load_text(SETTINGS.format(file=path.name), path.parent / "grid.yaml").n_designs > 0
+    except SettingsError as refused:
+        if not refused.problems or not all(map(str, refused.problems)):
+            raise AssertionError("refused without a word") from refused
+
+
+def mutated(content: bytes, chance: random.Random) -> bytes:
+    """Change some bytes: one by one, by pieces that are moved or lost, or by words that mean something."""
+    changed = bytearray(content)
+    for _ in range(chance.randint(1, 4)):
+        position = chance.randrange(len(changed) + 1)
+        how = chance.random()
+        if how < 0.3 and position < len(changed):
+            changed[position] = chance.randrange(256)
+        elif how < 0.6:
+            changed[position:position] = chance.choice(TOKENS)
+        elif how < 0.8:
+            del changed[position : position + chance.randint(1, 30)]
+        else:
+            other = chance.randrange(len(changed) + 1)
+            changed[position:position] = changed[other : other + chance.randint(1, 60)]
+    return bytes(changed)
+
+
+def fuzz(folder: Path, inputs: int, seed: int) -> None:
+    """Read so many files that are wrong in some way."""
+    chance = random.Random(seed)
+    note = pa.array(["a", "b", "a"]).dictionary_encode()
+    files = {
+        "table.csv": TABLE.encode(),
+        "pulse.csv": PULSE.encode(),
+        "pulse-test.csv": b"time [s]; rotation [deg]\n0;0\n0.1;2\n0.2;3\n",
+        "table.parquet": parquet(**{HEIGHT: [2.5, 2.6, 3.0], "friction_angle_deg": [40, 41, 42], "note": note}),
+    }
+    for number in range(inputs):
+        name = chance.choice(list(files))
+        content = mutated(files[name], chance)
+        path = folder / name
+        path.write_bytes(content)
+        try:
+            read(path)
+        except Exception as problem:
+            (folder / f"failing-{name}").write_bytes(content)
+            raise AssertionError(f"seed {seed}, input {number}: {content!r:.300}") from problem
+
+
+@pytest.fixture(scope="module")
+def seed():
+    return int(os.environ.get("TEST_SEED", "20263"))
+
+
+def test_a_thousand_wrong_files_are_refused_in_words(tmp_path, seed):
+    fuzz(tmp_path, 1000, seed)
+
+
+@pytest.mark.nightly
+def test_many_wrong_files_are_refused_in_words(tmp_path, seed):
+    fuzz(tmp_path, 100_000, seed + 1)
+
+
+def spreadsheet(note: str = "a") -> bytes:
+    book = Workbook()
+    for row in ([HEIGHT, "note"], [2.5, note], [2.6, "b"], [3, "c"]):
+        book.active.append(row)
+    sink = io.BytesIO()
+    book.save(sink)
+    return sink.getvalue()
+
+
+def test_a_spreadsheet_with_a_flipped_bit_is_refused_or_read_right(tmp_path, seed):
+    """Of a damaged file, zlib, the parser of XML and openpyxl raise almost anything."""
+    chance, content, path = random.Random(seed), spreadsheet(), tmp_path / "table.xlsx"
+    refusals = []
+    for number in range(100):
+        flipped = bytearray(content)
+        flipped[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
+        path.write_bytes(flipped)
+        try:
+            sweep = load_text(SETTINGS.format(file=path.name), tmp_path / "grid.yaml")
+        except SettingsError as error:
+            refusals.append(str(error))
+        else:
+            assert sweep.table.columns[HEIGHT].tolist() == [2.5, 2.6, 3.0], number
+            assert list(sweep.table.labels) == ["note"], number
+    assert len(refusals) > 50
+    assert [text for text in refusals if "table.xlsx" not in text] == []
+
+
+def test_a_cell_longer_than_a_spreadsheet_can_hold_is_refused_unread(tmp_path, monkeypatch):
+    packed, path = io.BytesIO(), tmp_path / "table.xlsx"
+    with (
+        zipfile.ZipFile(io.BytesIO(spreadsheet("&LONG;"))) as old,
+        zipfile.ZipFile(packed, "w", zipfile.ZIP_LZMA) as new,
+    ):
+        for name in old.namelist():
+            new.writestr(name, old.read(name).replace(b"&amp;LONG;", b"x" * 1_000_000))
+    path.write_bytes(packed.getvalue())
+    monkeypatch.setattr("openpyxl.load_workbook", lambda *_, **__: pytest.fail("the cell was read"))
+    with pytest.raises(SettingsError, match=r"table\.xlsx: has a cell of more than 32,767 characters"):
+        load_text(SETTINGS.format(file=path.name), tmp_path / "grid.yaml")
+
+
+def test_the_longest_cell_of_a_spreadsheet_is_read(tmp_path):
+    (tmp_path / "table.xlsx").write_bytes(spreadsheet("\N{GRINNING FACE}" * 16_383))
+    assert load_text(SETTINGS.format(file="table.xlsx"), tmp_path / "grid.yaml").n_designs == 3
+
+
+def test_columns_of_every_type(tmp_path):
+    columns = {
+        "list": pa.array([[2.0], [3.0]]),
+        "struct": pa.array([{"a": [1]}, {"a": None}]),
+        "map": pa.array([[("k", 1)], []], type=pa.map_(pa.string(), pa.int64())),
+        "bytes": pa.array([b"\xff\x1b", None]),
+        "day": pa.array([1, 2], type=pa.date32()),
+        "time": pa.array([1, None], type=pa.timestamp("ns")),
+        "decimal": pa.array([1, 2], type=pa.decimal128(10, 2)),
+        "truth": pa.array([True, None]),
+        "nothing": pa.nulls(2),
+        "half": pa.array(np.array([2.0, 2.5], dtype=np.float16)),
+        "unsigned": pa.array([2, 2**64 - 1], type=pa.uint64()),
+        "text": pa.array(["2.5", "=cmd()"]),
+        "words": pa.array(["a", None]).dictionary_encode(),
+    }
+    for kind, values in columns.items():
+        for name in (HEIGHT, f"{kind}_name"):
+            path = tmp_path / "table.parquet"
+            path.write_bytes(parquet(**{HEIGHT: pa.array([2.0, 2.5]), name: values}))
+            read(path)
+
+
+@pytest.mark.parametrize("values", [[2.0, float("nan")], [2.0, float("inf")], [2.0, None], [2.0, -1.0]])
+def test_numbers_that_are_none(tmp_path, values):
+    path = tmp_path / "table.parquet"
+    path.write_bytes(parquet(**{HEIGHT: pa.array(values)}))
+    with pytest.raises(SettingsError, match=HEIGHT):
+        load_text(SETTINGS.format(file=path.name), tmp_path / "grid.yaml")
+
+
+@pytest.mark.parametrize("name", ["table.csv", "table.parquet", "pulse.csv"])
+def test_a_named_pipe_is_not_waited_for(tmp_path, name):
+    """Whoever opens it for reading waits for one who opens it for writing, whom there is not."""
+    os.mkfifo(tmp_path / name)
+    writer = threading.Timer(HANG_GUARD_S, lambda: os.open(tmp_path / name, os.O_RDWR))  # hang guard
+    writer.daemon = True
+    writer.start()
+    assert calls_of(lambda: read(tmp_path / name)) < 100_000
+    assert writer.is_alive()
+    writer.cancel()
+
+
+@pytest.mark.parametrize("name", ["table.csv", "table.parquet", "pulse.csv"])
+def test_more_columns_than_a_table_has(tmp_path, name):
+    names = [f"c{position} [s]" for position in range(5000)]
+    text = (",".join(names) + "\n" + ",".join("1" * len(names)) + "\n").encode()
+    (tmp_path / name).write_bytes(parquet(**{name: [1.0] for name in names}) if name.endswith("parquet") else text * 2)
+    assert calls_of(lambda: read(tmp_path / name)) < 100_000  # a few a column; there are 12 million pairs
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (f'{HEIGHT},note\n2,"' + '\n","' * 300_000, "has a row of more than 1,000,000 characters; is a quotation mark"),
+        (f"{HEIGHT},note\n2," + "x" * 1_000_001, "has a row of more than 1,000,000 characters"),
+        (f"{HEIGHT},note\n2," + '"' + "x" * 200_000, "is a quotation mark not closed, or does text"),
+        (f"{HEIGHT}\n" + "2\n" * 6, "has more than 6 lines"),
+        (f"{HEIGHT}\n" + "\n#\n" * 3, "has more than 6 lines"),
+        (f"{HEIGHT},a_id\n2,a\n2,b\n2,c\n", "column a_id has more than 2 different words"),
+        (f"{HEIGHT},friction_angle_deg\n2,40\n2,40\n2,40\n", "has more than 40 bytes of numbers"),
+        (f"{HEIGHT}\n" + "x\n" * 300, "is not read beyond this line: too many mistakes"),
+    ],
+)
+def test_every_limit_of_a_text(tmp_path, monkeypatch, text, words):
+    monkeypatch.setattr("boulder_sweep.settings.design_list.MAX_TABLE_ROWS", 6 if "lines" in words else 10**6)
+    monkeypatch.setattr("boulder_sweep.settings.design_list.MOST_WORDS", 2)
+    monkeypatch.setattr(
+        "boulder_sweep.settings.design_list._TOO_MANY_WORDS", "column {} has more than 2 different words"
+    )
+    monkeypatch.setattr("boulder_sweep.settings.design_list.MOST_BYTES", 40 if "bytes" in words else 10**6)
+    monkeypatch.setattr("boulder_sweep.settings.text_table.MOST_MISTAKES", 100)
+    monkeypatch.setattr("boulder_sweep.settings.text_table.CHUNK", 300)
+    (tmp_path / "table.csv").write_text(text)
+    with pytest.raises(SettingsError) as refused:
+        load_text(SETTINGS.format(file="table.csv"), tmp_path / "grid.yaml")
+    assert words in str(refused.value)
