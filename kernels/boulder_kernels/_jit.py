@@ -32,6 +32,7 @@ from typing import Any
 
 import llvmlite.binding
 import numba
+import numpy as np
 
 from . import _cache, compiling
 from ._cache import source_hash
@@ -77,6 +78,18 @@ def _ask_for_wide_vectors() -> None:
 _ask_for_wide_vectors()
 
 
+@functools.cache
+def _array_of(record: np.dtype) -> Any:
+    """Return the type of an array of records, which takes Numba as long to work out as a thousand designs."""
+    return numba.typeof(np.zeros(1, record))
+
+
+def _type_of(value: Any) -> Any:
+    """Return the Numba type of an argument."""
+    is_of_records = isinstance(value, np.ndarray) and value.dtype.names
+    return _array_of(value.dtype) if is_of_records else numba.typeof(value)
+
+
 class Kernel:
     """A kernel that is compiled when it is first called, by Python or by another kernel; see `kernel`.
 
@@ -107,7 +120,7 @@ class Kernel:
         """Call the compiled function."""
         if named:
             args = inspect.signature(self.py_func).bind(*args, **named).args
-        kinds = tuple(map(numba.typeof, args))
+        kinds = tuple(map(_type_of, args))
         return (self._ready.get(kinds) or self._made_ready(kinds))(*args)
 
     def _made_ready(self, kinds: tuple[Any, ...]) -> Any:
@@ -230,7 +243,8 @@ def align_stack() -> None:
 
 @overload(align_stack)
 def _align_stack() -> Callable[..., None]:
-    return lambda: _alignment()
+    alignment: Any = _alignment
+    return lambda: alignment()
 
 
 def _compiled(function: Callable[..., Any], fastmath: set[str], *, inline: bool = False) -> Callable[..., Any]:

@@ -197,7 +197,8 @@ def partial_sums() -> np.ndarray:
 
 @overload(partial_sums)
 def _partial_sums() -> Callable[..., np.ndarray]:
-    return lambda: numba.carray(_room_for_sums(), (2 * WIDTH,))
+    room: Any = _room_for_sums
+    return lambda: numba.carray(room(), (2 * WIDTH,))
 
 
 @inlined

@@ -7,6 +7,7 @@ soil of a design that is not uniform makes fields of its own.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -49,9 +50,11 @@ class Attempt(NamedTuple):
 
 def numbers_of(record: Any) -> np.dtype:
     """Return the type of a record of the lanes' numbers for every field of a record."""
-    return np.dtype([(name, np.float64, (LANES,)) for name in record._fields], align=True)
+    numbers = np.dtype([(name, np.float64, (LANES,)) for name in record._fields], align=True)
+    return np.dtype((np.record, numbers))
 
 
+@functools.cache
 def group_type(soil: type | None, parts: int) -> np.dtype:
     """Return the type of a group of lanes.
 
@@ -87,10 +90,10 @@ def group_type(soil: type | None, parts: int) -> np.dtype:
             [("pieces", numbers_of(Piece), (parts,))] if soil is FewPieces else [("taper", numbers_of(TaperedPiece))]
         )
         records += [("given_pieces", numbers_of(GivenPiece), (parts,))]
-    return np.dtype(records, align=True)
+    return np.dtype((np.record, np.dtype(records, align=True)))
 
 
-def empty_groups(soil: type | None = None, parts: int = 0) -> Any:
+def empty_groups(soil: type | None = None, parts: int = 0) -> np.ndarray:
     """Return two groups of lanes: where designs run, and where they are started. Arguments: see `group_type`.
 
     Their vectors lie on whole lines of the fast memory.
@@ -98,13 +101,14 @@ def empty_groups(soil: type | None = None, parts: int = 0) -> Any:
     kind = group_type(soil, parts)
     room = np.zeros(2 * kind.itemsize + LINE, np.uint8)
     first = -room.ctypes.data % LINE
-    return room[first : first + 2 * kind.itemsize].view(kind).view(np.recarray)
+    return room[first : first + 2 * kind.itemsize].view(kind)
 
 
 def count_of(group: Any, name: str) -> int:
     """Return how many records a field of a group, or of its Numba type, has; 0 if there is none of this name."""
     if isinstance(group, numba.types.Record):
-        return group.fields[name].type.shape[0] if name in group.fields else 0
+        array: Any = group.fields[name].type if name in group.fields else None
+        return array.shape[0] if array else 0
     return len(group[name]) if name in group.dtype.names else 0
 
 
@@ -401,7 +405,7 @@ def load_given_piece(p: Any, lane: int) -> GivenPiece:
     )
 
 
-def by_count(load: Callable[[Any, int], Any]) -> Callable[[Any, int, int], tuple[Any, ...]]:
+def by_count(load: Callable[[Any, int], Any]) -> Callable[[Any, int], tuple[Any, ...]]:
     """Return a function that loads as many records, one after another, as there are in an array, into a tuple."""
 
     def load_all(parts: Any, lane: int) -> tuple[Any, ...]:
