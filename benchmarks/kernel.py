@@ -14,13 +14,12 @@ import numpy as np
 import boulder_kernels as bk
 from boulder_kernels import Constants, lanes
 from boulder_kernels.design import design_at
-from boulder_kernels.layered import COUNTS, TO, filled_layers, uniform_layers
+from boulder_kernels.layered import COUNTS, TO, FewLayers, filled_layers, uniform_layers
 from boulder_kernels.outcomes import empty_outcomes
-from boulder_kernels.outlined import HEIGHT, given_beside
+from boulder_kernels.outlined import HEIGHT, TaperedSoil, given_beside
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_kernels.soil import Kinematics, Reaction, closed_form, element_sums
 from boulder_kernels.table import some_rows
-from boulder_kernels.workspace import LayeredLanes, TaperedLanes
 from boulder_sweep.judge.accuracy import LONGEST_HORIZON
 from boulder_sweep.settings.model import SECOND_OPINIONS
 from boulder_sweep.soils import with_law
@@ -93,8 +92,8 @@ def measure() -> Table:
 
     work: dict[str, Callable[[], object]] = {
         "box": in_lanes(stacked, None, 0),
-        **{f"{count} layers": in_lanes(table, LayeredLanes, count) for count, table in layered.items()},
-        "taper": in_lanes(same_taper(designs), TaperedLanes, 1),
+        **{f"{count} layers": in_lanes(table, FewLayers, count) for count, table in layered.items()},
+        "taper": in_lanes(same_taper(designs), TaperedSoil, 1),
         **{law: partial(second_opinions, with_law(passes, law), asked) for law in SECOND_OPINIONS},
         "sums": partial(repeated(element_sums), lines, with_elements, SUMS),
         "closed": partial(repeated(closed_form), lines, closed, CLOSED_FORMS),

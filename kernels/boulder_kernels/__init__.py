@@ -5,7 +5,6 @@ equation numbers in this package are theirs. Everything here is plain numbers in
 subgrade reaction beta in MN/m^3 as in Eq 24), and nothing here knows of files, units or tables on disk.
 """
 
-from . import _lowering
 from ._cache import source_hash
 from .control import Control
 from .design import Constants, Design, DesignTable, Readings, as_printed, constants_of, corrected

@@ -32,30 +32,31 @@ from typing import Any
 
 import llvmlite.binding
 import numba
-from numba.extending import lower_builtin, type_callable
+import numpy as np
 
 from . import _cache, compiling
 from ._cache import source_hash
 
 __all__ = [
     "Kernel",
+    "align_stack",
     "exact_inlined",
     "exact_kernel",
-    "function_of",
-    "in_columns",
     "inlined",
+    "is_none",
     "kernel",
     "overload",
     "plain",
-    "rows_of",
     "source_hash",
-    "unless_none",
+    "through",
 ]
 
 SETTINGS: Any = numba.config
 """Numba's settings, which it fills in at run time."""
 IS_PLAIN = bool(SETTINGS.DISABLE_JIT)
 """Whether kernels stay plain Python: NUMBA_DISABLE_JIT is set."""
+LINE = 64
+"""Bytes of a line of the fast memory."""
 _LOCK = threading.RLock()
 announce: Callable[[str], contextlib.AbstractContextManager[Any]] = contextlib.nullcontext
 """Called with the name of a kernel when it must be compiled, which is done within what it returns."""
@@ -75,6 +76,18 @@ def _ask_for_wide_vectors() -> None:
 
 
 _ask_for_wide_vectors()
+
+
+@functools.cache
+def _array_of(record: np.dtype) -> Any:
+    """Return the type of an array of records, which takes Numba as long to work out as a thousand designs."""
+    return numba.typeof(np.zeros(1, record))
+
+
+def _type_of(value: Any) -> Any:
+    """Return the Numba type of an argument."""
+    is_of_records = isinstance(value, np.ndarray) and value.dtype.names
+    return _array_of(value.dtype) if is_of_records else numba.typeof(value)
 
 
 class Kernel:
@@ -107,7 +120,7 @@ class Kernel:
         """Call the compiled function."""
         if named:
             args = inspect.signature(self.py_func).bind(*args, **named).args
-        kinds = tuple(map(numba.typeof, args))
+        kinds = tuple(map(_type_of, args))
         return (self._ready.get(kinds) or self._made_ready(kinds))(*args)
 
     def _made_ready(self, kinds: tuple[Any, ...]) -> Any:
@@ -170,58 +183,68 @@ class Kernel:
         return self.py_func.__qualname__
 
 
-def function_of(source: str, **names: Any) -> Callable[..., Any]:
-    """Return the function that a source text defines, with the names it refers to: for what `overload` writes out."""
-    exec(source, names)
-    return names[source[len("def ") : source.index("(")]]
-
-
 def overload(function: Callable[..., Any]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Decorate what returns the implementation of a function inside kernels, for arguments of some Numba types."""
     return numba.extending.overload(function, inline="always", strict=False)
 
 
-def in_columns(record: Any) -> Callable[[Any, int], Any]:
-    """Return a function that takes a record out of a column of an array, whose first rows are its fields."""
-
-    def take(array: Any, row: int) -> Any:
-        """Return the record, numbers in place of columns."""
-        return record(*array[: len(record._fields), row])
-
-    lower_take(take, record)
-    return take
+def is_none(value: Any) -> bool:
+    """Return whether a value, or what a Numba type stands for, is None."""
+    return value is None or isinstance(value, numba.types.NoneType)
 
 
-def rows_of(context: Any, builder: Any, kinds: Any, values: Any, first: int, count: int) -> list[Any]:
-    """Load the numbers of a column of an array from some of its rows."""
-    array = context.make_array(kinds[0])(context, builder, values[0])
-    columns = builder.extract_value(array.shape, 1)
-    index, numbers = context.cast(builder, values[1], kinds[1], numba.types.intp), []
-    if first:
-        index = builder.add(index, builder.mul(columns, context.get_constant(numba.types.intp, first)))
-    for _ in range(count):
-        numbers.append(builder.load(builder.gep(array.data, [index], inbounds=True)))
-        index = builder.add(index, columns)
-    return numbers
+def through(add: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that passes what has been met on from item to item of a tuple, and returns what was met in all.
 
+    Inside kernels every item is a call of its own: a loop would keep the one over lanes from being vectorised, and
+    what has been met could not change its type.
 
-def lower_take(take: Any, record: Any) -> None:
-    """Tell Numba of a function of `boulder_kernels._jit.in_columns`.
-
-    It is one load for every field: an index that need not be checked lets a loop over rows be vectorised.
+    Parameters
+    ----------
+    add
+        Takes what has been met before an item, a state, and the item.
     """
 
-    def result(array: Any, row: Any) -> Any:
-        """Return the type of the result, or None where a column is not one piece of memory."""
-        return numba.types.NamedUniTuple(array.dtype, len(record._fields), record) if array.layout == "C" else None
+    def pass_on(met: Any, state: Any, items: tuple[Any, ...]) -> Any:
+        """Go through the items."""
+        for item in items:
+            met = add(met, state, item)
+        return met
 
-    def loads(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        """Load its numbers."""
-        numbers = rows_of(context, builder, sig.args, args, 0, len(record._fields))
-        return context.make_tuple(builder, sig.return_type, numbers)
+    def choose(met: Any, state: Any, items: Any) -> Callable[..., Any]:
+        """Return the way through as many items as the type has."""
+        if len(items) == 1:
+            return lambda met, state, items: add(met, state, items[0])
+        return lambda met, state, items: pass_on(add(met, state, items[0]), state, items[1:])
 
-    type_callable(take)(lambda context: result)
-    lower_builtin(take, numba.types.Array, numba.types.Any)(loads)
+    overload(pass_on)(choose)
+    return pass_on
+
+
+@numba.extending.intrinsic
+def _alignment(typing: Any) -> Any:
+    """Align the stack of the function that this is inlined into."""
+
+    def align(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        builder.function.attributes.add("nounwind")  # as it is anyway: llvmlite writes no alignment of the stack alone
+        builder.function.attributes.alignstack = LINE
+        return context.get_dummy_value()
+
+    return numba.types.void(), align
+
+
+def align_stack() -> None:
+    """Let the function that calls this keep its stack on whole lines of the fast memory, as lanes are.
+
+    What finds no room in the registers goes to the stack, a vector as long as a line: nearly four hundred times in a
+    step. By default a vector may lie across two lines there, which takes twice as long.
+    """
+
+
+@overload(align_stack)
+def _align_stack() -> Callable[..., None]:
+    alignment: Any = _alignment
+    return lambda: alignment()
 
 
 def _compiled(function: Callable[..., Any], fastmath: set[str], *, inline: bool = False) -> Callable[..., Any]:
@@ -272,36 +295,3 @@ def exact_inlined(function: Callable[..., Any]) -> Callable[..., Any]:
 def plain(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return the Python function of a kernel, for calls that are not worth a library; what it calls is compiled."""
     return getattr(function, "py_func", function)
-
-
-def unless_none(names: str, function: Callable[..., Any], otherwise: str, **known: Any) -> Callable[..., Any]:
-    """Return a function that calls another unless its last argument is None; inside kernels chosen when compiled.
-
-    What is not needed is not compiled, and the two may give results of different types: an ``if`` in a kernel allows
-    neither.
-
-    Parameters
-    ----------
-    names
-        Names of the arguments, separated by blanks.
-    function
-        Called with them.
-    otherwise
-        Expression of them for None.
-    known
-        What else it refers to, by name.
-    """
-    arguments = ", ".join(names.split())
-    when_none = function_of(f"def when_none({arguments}):\n return {otherwise}", **known)
-    unless = function_of(f"def unless({arguments}):\n return function({arguments})", function=function)
-
-    def call(*given: Any) -> Any:
-        """Call the one for these arguments."""
-        return (when_none if given[-1] is None else plain(function))(*given)  # what it calls is compiled
-
-    def choose(*given: Any) -> Callable[..., Any]:
-        """Return the one for arguments of these Numba types."""
-        return when_none if isinstance(given[-1], numba.types.NoneType) else unless
-
-    overload(call)(choose)
-    return call

@@ -30,7 +30,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from ._jit import function_of, inlined, overload
+from ._jit import inlined, overload
 from .design import Constants, Readings
 from .numerics import sine_versine
 from .outlined import is_outlined
@@ -230,9 +230,6 @@ def _soil_in(c: Any) -> Any:
     return getattr(c, "soil", None)
 
 
-LIFT = "c.C_cos * abs(sin) + c.C_sin * versin"
-
-
 def lift_of(sin: float, versin: float, c: Constants) -> float:
     """Return the energy of the weight, lifted by a rotation with this sine and versine [J] (Eqs 37-39, 144)."""
     lift = c.C_cos * abs(sin) + c.C_sin * versin
@@ -242,8 +239,9 @@ def lift_of(sin: float, versin: float, c: Constants) -> float:
 
 @overload(lift_of)
 def _lift_of(sin: Any, versin: Any, c: Any) -> Callable[..., float]:
-    more = " + c.soil.lean[0] * c.d * sin" if is_outlined(_soil_in(c)) else ""
-    return function_of(f"def lift_of(sin, versin, c):\n return {LIFT}{more}")
+    if is_outlined(_soil_in(c)):
+        return lambda sin, versin, c: c.C_cos * abs(sin) + c.C_sin * versin + c.soil.lean[0] * c.d * sin
+    return lambda sin, versin, c: c.C_cos * abs(sin) + c.C_sin * versin
 
 
 def least_couple(c: Constants) -> float:
@@ -254,5 +252,4 @@ def least_couple(c: Constants) -> float:
 
 @overload(least_couple)
 def _least_couple(c: Any) -> Callable[..., float]:
-    less = " - abs(c.soil.lean[0]) * c.d" if is_outlined(_soil_in(c)) else ""
-    return function_of(f"def least_couple(c):\n return c.C_cos{less}")
+    return (lambda c: c.C_cos - abs(c.soil.lean[0]) * c.d) if is_outlined(_soil_in(c)) else (lambda c: c.C_cos)

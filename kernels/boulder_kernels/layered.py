@@ -12,18 +12,17 @@ design or, in lanes, numbers; `boulder_kernels.soil_laws` chooses by their type.
 
 from __future__ import annotations
 
-import functools
 from collections import namedtuple
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import exact_inlined, exact_kernel, function_of
+from ._jit import exact_inlined, exact_kernel, through
 from .design import (
     Constants,
     Design,
     DesignTable,
+    Readings,
     SoilMass,
     body_of_box,
     constants_with,
@@ -348,30 +347,56 @@ def filled_layers(layers: np.ndarray, count: int) -> np.ndarray:
     return np.ascontiguousarray(filled.reshape(len(layers), count * len(GivenLayer._fields)).T)
 
 
-@functools.cache
-def constants_of_few(count: int) -> Callable[..., Any]:
-    """Return a function that gives the constants of a design in as many layers as given.
+@exact_inlined
+def with_record(c: Constants, soil: Any) -> Any:
+    """Return constants together with the record of their soil."""
+    return LayeredConstants(
+        c.m_eff,
+        c.J_eff,
+        c.inverse_m_eff,
+        c.inverse_J_eff,
+        c.c_x,
+        c.c_y,
+        c.l_n,
+        c.z_0,
+        c.d,
+        c.elements,
+        c.K_soil,
+        c.R_soil,
+        c.x_yield,
+        c.h,
+        c.g_x,
+        c.k_v,
+        c.k_m,
+        c.tau_v,
+        c.v_0,
+        c.C_cos,
+        c.C_sin,
+        c.d_N,
+        c.theta_corner,
+        soil,
+    )
 
-    Its arguments are design, readings and a tuple of `GivenLayer`; what it does is written out layer by layer.
-    """
-    lines = ["def constants(design, readings, given):", "so_far = nothing_lumped()"]
-    for m in range(count):
-        low = f"layer_{m - 1}.to" if m else "0.0"
-        to = f"min(given[{m}].to / design.d, 1.0)" if m < count - 1 else "1.0"
-        inputs = ", ".join(f"given[{m}].{name}" for name in GivenLayer._fields[1:])
-        lines.append(f"layer_{m} = layer_of(design, {low}, {to}, {inputs})")
-        lines.append(f"so_far = lumped_with(so_far, layer_{m}, given[{m}].density, given[{m}].friction, design)")
-    fields = ", ".join(f"c.{name}" for name in Constants._fields)
-    lines += [
-        "b = so_far.bounds",
-        "c = constants_with(design, body_of_box(design), readings, 0, so_far.mass, b.K_soil, b.R_soil, b.x_yield)",
-        f"return Record({fields}, FewLayers(so_far.sums, ({''.join(f'layer_{m}, ' for m in range(count))})))",
-    ]
-    known = (nothing_lumped, layer_of, lumped_with, body_of_box, constants_with, FewLayers)
-    names = {function.__name__: function for function in known}
-    function = function_of("\n ".join(lines), Record=LayeredConstants, **names)
-    function.__module__ = __name__
-    return exact_inlined(function)
+
+@exact_inlined
+def add_given(met: Any, design: Design, given: GivenLayer) -> Any:
+    """Work out a layer below others: what follows from them, their lower end, and they."""
+    so_far, low, above = met
+    to = min(given.to / design.d, 1.0)
+    layer = layer_of(design, low, to, given.density, given.friction, given.subgrade, given.p_0, given.p_1)
+    return lumped_with(so_far, layer, given.density, given.friction, design), to, (*above, layer)
+
+
+add_all_given = through(add_given)
+
+
+@exact_inlined
+def constants_of_few(design: Design, readings: Readings, given: tuple[GivenLayer, ...]) -> Any:
+    """Return the constants of a design in as many layers as given, the last of them down without end."""
+    so_far, _, layers = add_all_given((nothing_lumped(), 0.0, ()), design, given)
+    b = so_far.bounds
+    c = constants_with(design, body_of_box(design), readings, 0, so_far.mass, b.K_soil, b.R_soil, b.x_yield)
+    return with_record(c, FewLayers(so_far.sums, layers))
 
 
 def uniform_layers(design: Design) -> np.ndarray:

@@ -11,14 +11,13 @@ is worked out at a state: without a branch, and for few layers without a loop, a
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import function_of, inlined, kernel, overload
+from ._jit import inlined, kernel, overload, through
 from .layered import FewLayers, Layer, SoilElements, SoilLayers, SoilSums
 from .numerics import WIDTH, add, field, partial_sums, total
 from .soil import TINY, Kinematics, Potential, Reaction
@@ -274,13 +273,19 @@ def end_walk(w: Walk, line: Line) -> Walk:
 
 def walk_through(line: Line, soil: Any) -> Walk:
     """Return what is met on the way down through all layers, `SoilLayers` or `FewLayers`."""
-    return (_walk_written_out(len(soil.layers)) if isinstance(soil, FewLayers) else _walk_by_arrays)(line, soil)
+    if isinstance(soil, FewLayers):
+        return end_walk(pass_layers(start_walk(), line, soil.layers), line)
+    return _walk_by_arrays(line, soil)
+
+
+pass_layers = through(pass_layer)
 
 
 @overload(walk_through)
 def _walk_through(line: Any, soil: Any) -> Callable[..., Walk]:
-    few = soil.instance_class is FewLayers
-    return _walk_written_out(len(soil[1])) if few else _walk_by_arrays
+    if soil.instance_class is FewLayers:
+        return lambda line, soil: end_walk(pass_layers(start_walk(), line, soil.layers), line)
+    return _walk_by_arrays
 
 
 def _walk_by_arrays(line: Line, soil: SoilLayers) -> Walk:
@@ -293,16 +298,6 @@ def _walk_by_arrays(line: Line, soil: SoilLayers) -> Walk:
     return end_walk(w, line)
 
 
-@functools.cache
-def _walk_written_out(count: int) -> Callable[..., Walk]:
-    """Return the walk through a known number of layers: a loop would keep the one over lanes from being vectorised."""
-    through = "start_walk()"
-    for m in range(count):
-        through = f"pass_layer({through}, line, soil.layers[{m}])"
-    source = f"def walk(line, soil):\n return end_walk({through}, line)"
-    return function_of(source, start_walk=start_walk, pass_layer=pass_layer, end_walk=end_walk)
-
-
 def sums_of(soil: Any) -> SoilSums:
     """Return the sums of layers."""
     return soil.sums if isinstance(soil, FewLayers) else SoilSums(*soil.sums)
@@ -312,8 +307,12 @@ def sums_of(soil: Any) -> SoilSums:
 def _sums_of(soil: Any) -> Callable[..., SoilSums]:
     if soil.instance_class is FewLayers:
         return lambda soil: soil.sums
-    sums = ", ".join(f"soil.sums[{i}]" for i in range(len(SoilSums._fields)))
-    return function_of(f"def sums_of(soil):\n return SoilSums({sums})", SoilSums=SoilSums)
+    return _sums_from_array
+
+
+def _sums_from_array(soil: SoilLayers) -> SoilSums:
+    s = soil.sums
+    return SoilSums(s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9], s[10], s[11])
 
 
 class Turned(NamedTuple):

@@ -24,11 +24,15 @@ The loop over j is vectorised if its elements are read by `field`, whose index n
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numba
 import numpy as np
+from llvmlite import ir
+from numba.core import cgutils
 
-from ._jit import exact_inlined, inlined
+from ._jit import exact_inlined, inlined, overload
 
 
 class SineVersine(NamedTuple):
@@ -160,21 +164,41 @@ WIDTH = 32
 """Partial sums: with 8, a vector of the widest registers, the loop would be unrolled and not vectorised."""
 
 
-def field(values: Any, offset: int, index: int) -> float:
-    """Return the number at an offset and an index from it, neither negative, of an array or a record that begins so."""
-    # A number of NumPy's, so that lanes without a design divide by zero here as they do when compiled.
-    number: float = (values[0] if isinstance(values, tuple) else values)[offset + index]
+@inlined
+def field(values: np.ndarray, offset: int, index: int) -> float:
+    """Return the number of an array at an offset and an index from it, neither negative."""
+    number: float = values[np.uintp(offset + index)]  # no sign: nothing is counted from the end
     return number
 
 
-def put(values: Any, offset: int, index: int, value: float) -> None:
+@inlined
+def put(values: np.ndarray, offset: int, index: int, value: float) -> None:
     """Write the number at an offset and an index from it, see `field`."""
-    (values[0] if isinstance(values, tuple) else values)[offset + index] = value
+    values[np.uintp(offset + index)] = value
+
+
+@numba.extending.intrinsic
+def _room_for_sums(typing: Any) -> Any:
+    """Return where there is room for partial sums on the stack, free again when the function returns; all zero."""
+
+    def allocate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        numbers = ir.ArrayType(ir.DoubleType(), 2 * WIDTH)
+        room = cgutils.alloca_once(builder, numbers)
+        builder.store(ir.Constant(numbers, None), room)
+        return builder.bitcast(room, ir.DoubleType().as_pointer())
+
+    return numba.types.CPointer(numba.types.float64)(), allocate
 
 
 def partial_sums() -> np.ndarray:
     """Return the partial sums of two numbers for every element, all of them zero, shape (2 WIDTH,)."""
     return np.zeros(2 * WIDTH)
+
+
+@overload(partial_sums)
+def _partial_sums() -> Callable[..., np.ndarray]:
+    room: Any = _room_for_sums
+    return lambda: numba.carray(room(), (2 * WIDTH,))
 
 
 @inlined

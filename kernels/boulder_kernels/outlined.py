@@ -16,15 +16,14 @@ moment -D cos(theta) (Eq 144): the restoring couple of a box has equal arms eith
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import exact_inlined, exact_kernel, function_of, kernel, overload
-from .design import Body, Constants, Design, G, SoilMass, body_of_box, constants_with, design_in, wedge_slope
+from ._jit import exact_inlined, exact_kernel, kernel, overload, through
+from .design import Body, Constants, Design, G, Readings, SoilMass, body_of_box, constants_with, design_in, wedge_slope
 from .layered import (
     DENSITY,
     FRICTION,
@@ -35,12 +34,12 @@ from .layered import (
     SUBGRADE,
     TO,
     Bounds,
-    LayeredConstants,
     Lumped,
     SoilElements,
     fill_elements,
     layer_of,
     nothing_lumped,
+    with_record,
 )
 
 HEIGHT, WIDTH, NEAR, FAR = range(4)
@@ -372,31 +371,41 @@ def given_beside(designs: np.ndarray, layers: np.ndarray, outlines: np.ndarray, 
     return np.concatenate([designs, out])
 
 
-@functools.cache
-def constants_beside(count: int) -> Callable[..., Any]:
-    """Return a function that gives the constants of a design beside as many pieces as given; 0 for `TaperedSoil`.
+@exact_inlined
+def add_given_piece(met: Any, design: Design, given: GivenPiece) -> Any:
+    """Work out a piece below others: what follows from them, their lower end, and they."""
+    so_far, low, above = met
+    piece = worked_out(design, low, given)
+    return lumped_beside(so_far, piece, given, design), piece.to, (*above, piece)
 
-    Its arguments are design, readings and the body and a tuple of `GivenPiece`; what it does is written out.
-    """
-    lines = ["def constants(design, readings, given):", "body, pieces = given", "so_far = nothing_lumped()"]
-    for n in range(max(count, 1)):
-        low = f"piece_{n - 1}.to" if n else "0.0"
-        lines.append(f"piece_{n} = worked_out(design, {low}, pieces[{n}])")
-        lines.append(f"so_far = lumped_beside(so_far, piece_{n}, pieces[{n}], design)")
-    fields = ", ".join(f"c.{name}" for name in Constants._fields)
-    soil = f"FewPieces(lean, ({''.join(f'piece_{n}, ' for n in range(count))}))"
-    tapered = "TaperedPiece(piece_0.K, piece_0.R, piece_0.P_1 / piece_0.K, piece_0.w_0, piece_0.w_1)"
-    lines += [
-        "b = so_far.bounds",
-        "c = constants_with(design, body, readings, 0, so_far.mass, b.K_soil, b.R_soil, b.x_yield)",
-        "lean = Lean(lean_with(body, design, readings.restoring_gravity))",
-        f"return Record({fields}, {soil if count else f'TaperedSoil(lean, ({tapered},))'})",
-    ]
-    known = (nothing_lumped, worked_out, lumped_beside, constants_with, lean_with, Lean)
-    names = {function.__name__: function for function in (*known, FewPieces, TaperedSoil, TaperedPiece)}
-    function = function_of("\n ".join(lines), Record=LayeredConstants, **names)
-    function.__module__ = __name__
-    return exact_inlined(function)
+
+add_given_pieces = through(add_given_piece)
+
+
+@exact_inlined
+def constants_and_pieces(
+    design: Design, readings: Readings, body: Body, given: tuple[GivenPiece, ...]
+) -> tuple[Constants, Lean, tuple[Piece, ...]]:
+    """Return the constants of a design beside as many pieces as given, how it leans, and the pieces."""
+    so_far, _, pieces = add_given_pieces((nothing_lumped(), 0.0, ()), design, given)
+    b = so_far.bounds
+    c = constants_with(design, body, readings, 0, so_far.mass, b.K_soil, b.R_soil, b.x_yield)
+    return c, Lean(lean_with(body, design, readings.restoring_gravity)), pieces
+
+
+@exact_inlined
+def constants_beside_pieces(design: Design, readings: Readings, body: Body, given: tuple[GivenPiece, ...]) -> Any:
+    """Return the constants of a design in `FewPieces`."""
+    c, lean, pieces = constants_and_pieces(design, readings, body, given)
+    return with_record(c, FewPieces(lean, pieces))
+
+
+@exact_inlined
+def constants_beside_taper(design: Design, readings: Readings, body: Body, given: tuple[GivenPiece]) -> Any:
+    """Return the constants of a design in `TaperedSoil`."""
+    c, lean, pieces = constants_and_pieces(design, readings, body, given)
+    p = pieces[0]
+    return with_record(c, TaperedSoil(lean, (TaperedPiece(p.K, p.R, p.P_1 / p.K, p.w_0, p.w_1),)))
 
 
 def is_outlined(soil: Any) -> bool:
@@ -411,10 +420,14 @@ def with_outline(soil: Any, outline: np.ndarray) -> Any:
 
 @overload(with_outline)
 def _with_outline(soil: Any, outline: Any) -> Callable[..., Any]:
-    values = ", ".join(f"soil.{name}" for name in soil.instance_class._fields[:-1])
-    return function_of(
-        f"def with_outline(soil, outline):\n return Record({values}, outline)", Record=soil.instance_class
-    )
+    if soil.instance_class is OutlinedElements:
+        return lambda soil, outline: OutlinedElements(soil.elements, soil.lean, outline)
+    return _with_outline_of_pieces
+
+
+def _with_outline_of_pieces(soil: OutlinedPieces, outline: np.ndarray) -> OutlinedPieces:
+    s = soil
+    return OutlinedPieces(s.to, s.K, s.P_0, s.P_1, s.R, s.w_0, s.w_1, s.lean, outline)
 
 
 def body_beside(design: Design, soil: Any) -> Body:

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import function_of, inlined, kernel, overload
+from ._jit import inlined, kernel, overload, through
 from .layered_soil import potential_of_elements, power_of_elements, reaction_of_elements
 from .outlined import NODES, WEIGHTS, FewPieces, OutlinedElements, OutlinedPieces, Piece, TaperedSoil
 from .soil import TINY, Kinematics, Potential, Reaction
@@ -126,7 +126,7 @@ def piece_of(m: int, low: float, soil: OutlinedPieces) -> Piece:
     return Piece(low, soil.to[m], soil.K[m], soil.P_0[m], soil.P_1[m], soil.R[m], soil.w_0[m], soil.w_1[m])
 
 
-def through(add: Callable[..., Any]) -> Callable[..., Any]:
+def through_soil(add: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function that passes what has been met on from piece to piece, and returns what has been met in all.
 
     Parameters
@@ -137,8 +137,7 @@ def through(add: Callable[..., Any]) -> Callable[..., Any]:
     Returns
     -------
     callable
-        Takes what has been met before, the state, and `OutlinedPieces` or `FewPieces`. Few are written out: a loop
-        would keep the one over lanes from being vectorised.
+        Takes what has been met before, the state, and `OutlinedPieces` or `FewPieces`.
     """
 
     def by_arrays(met: Any, state: Any, soil: OutlinedPieces) -> Any:
@@ -149,20 +148,17 @@ def through(add: Callable[..., Any]) -> Callable[..., Any]:
             low = soil.to[m]
         return met
 
-    def written_out(count: int) -> Callable[..., Any]:
-        """Return the way through a known number of pieces."""
-        met = "met"
-        for m in range(count):
-            met = f"add({met}, state, soil.pieces[{m}])"
-        return function_of(f"def through(met, state, soil):\n return {met}", add=add)
+    few = through(add)
 
     def way(met: Any, state: Any, soil: Any) -> Any:
         """Go through them."""
-        return (written_out(len(soil.pieces)) if isinstance(soil, FewPieces) else by_arrays)(met, state, soil)
+        return few(met, state, soil.pieces) if isinstance(soil, FewPieces) else by_arrays(met, state, soil)
 
     def choose(met: Any, state: Any, soil: Any) -> Callable[..., Any]:
         """Return the way for arguments of these Numba types."""
-        return written_out(len(soil[1])) if soil.instance_class is FewPieces else by_arrays
+        if soil.instance_class is FewPieces:
+            return lambda met, state, soil: few(met, state, soil.pieces)
+        return by_arrays
 
     overload(way)(choose)
     return way
@@ -201,7 +197,7 @@ def add_reaction(s: Sums, k: Kinematics, piece: Piece) -> Sums:
     return drag_between(turn, piece.to, k.B, k.slope_v, piece, s)
 
 
-pressed_by = through(add_reaction)
+pressed_by = through_soil(add_reaction)
 
 
 @inlined
@@ -264,7 +260,7 @@ def add_energy(met: Stored, x: Stretch, piece: Piece) -> Stored:
     return Stored(V.zeroth, V.first, springs_of(x.A, x.slope_x, piece, met.pressed))
 
 
-stored_in = through(add_energy)
+stored_in = through_soil(add_energy)
 
 
 @inlined
@@ -283,7 +279,7 @@ def add_power(power: float, k: Kinematics, piece: Piece) -> float:
     return power + k.B * s.zeroth - k.slope_v * s.first
 
 
-braked_by = through(add_power)
+braked_by = through_soil(add_power)
 
 
 @inlined

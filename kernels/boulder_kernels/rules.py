@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import exact_inlined, exact_kernel, in_columns
+from ._jit import exact_inlined, exact_kernel, inlined
 from .control import VALID_ROTATION, Control, control_in
 from .error_estimates import LEAST_LATE_M
 from .outcomes import THETA_ERROR, X_ERROR, OutcomeTable, Status, copy_outcome, outcome_in
@@ -118,7 +118,26 @@ SLOWER_SPEEDS = (*(k / 50.0 for k in range(49, 24, -1)), 0.4, 0.3)
 ISLAND_RATIO, ISLAND_SLIDE = 0.35, 0.5
 """With still less depth over height, and a longer slide [m], the speeds at which it stands can be 1 % wide: finer than
 these steps. Such a boulder is not a pass."""
-limits_in, sizes_in, course_in = in_columns(VerdictLimits), in_columns(Sizes), in_columns(Course)
+
+
+@inlined
+def limits_in(a: np.ndarray, row: int) -> VerdictLimits:
+    """Return the limits in a column of an array."""
+    return VerdictLimits(a[0, row], a[1, row], a[2, row], a[3, row])
+
+
+@inlined
+def sizes_in(a: np.ndarray, row: int) -> Sizes:
+    """Return the sizes in a column of an array."""
+    return Sizes(a[0, row], a[1, row], a[2, row], a[3, row], a[4, row], a[5, row], a[6, row], a[7, row])
+
+
+@inlined
+def course_in(a: np.ndarray, row: int) -> Course:
+    """Return the course in a column of an array."""
+    return Course(
+        a[0, row], a[1, row], a[2, row], a[3, row], a[4, row], a[5, row], a[6, row], a[7, row], a[8, row], a[9, row]
+    )
 
 
 @exact_inlined
@@ -298,7 +317,60 @@ class FlagInputs(NamedTuple):
     """Friction angle [deg], density [kg/m^3] and strain rate factor of the soil, as they were given."""
 
 
-tested_in, flag_inputs_in = in_columns(Tested), in_columns(FlagInputs)
+@inlined
+def tested_in(a: np.ndarray, row: int) -> Tested:
+    """Return the limits in a column of an array."""
+    return Tested(
+        a[0, row],
+        a[1, row],
+        a[2, row],
+        a[3, row],
+        a[4, row],
+        a[5, row],
+        a[6, row],
+        a[7, row],
+        a[8, row],
+        a[9, row],
+        a[10, row],
+        a[11, row],
+        a[12, row],
+        a[13, row],
+        a[14, row],
+        a[15, row],
+        a[16, row],
+        a[17, row],
+        a[18, row],
+        a[19, row],
+        a[20, row],
+        a[21, row],
+        a[22, row],
+        a[23, row],
+        a[24, row],
+        a[25, row],
+        a[26, row],
+    )
+
+
+@inlined
+def flag_inputs_in(a: np.ndarray, row: int) -> FlagInputs:
+    """Return the inputs in a column of an array."""
+    return FlagInputs(
+        a[0, row],
+        a[1, row],
+        a[2, row],
+        a[3, row],
+        a[4, row],
+        a[5, row],
+        a[6, row],
+        a[7, row],
+        a[8, row],
+        a[9, row],
+        a[10, row],
+        a[11, row],
+        a[12, row],
+        a[13, row],
+        a[14, row],
+    )
 
 
 @exact_inlined

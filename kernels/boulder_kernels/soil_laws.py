@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import exact_inlined, function_of, kernel, overload, unless_none
+from ._jit import exact_inlined, is_none, kernel, overload, plain
 from .design import Body, Constants, Design, Readings, constants_of, constants_with
 from .layered import (
     FewLayers,
@@ -25,6 +25,7 @@ from .layered import (
     SoilSums,
     fill_elements,
     fill_layers,
+    with_record,
 )
 from .layered_soil import (
     potential_of_elements,
@@ -102,15 +103,10 @@ def law_of(c: Any) -> SoilLaw:
     return LAWS.get(type_of(c[-1] if type_of(c) is LayeredConstants else c), UNIFORM)
 
 
-def by_law(field: str, *names: str) -> Callable[..., Any]:
-    """Return a function that calls that of the law of its last argument, for Python and for kernels.
+def by_law(field: str) -> Callable[..., Any]:
+    """Return a function that calls a field of `SoilLaw` of the law of its last argument, for Python and for kernels.
 
-    Parameters
-    ----------
-    field
-        Field of `SoilLaw`.
-    names
-        Names of the arguments. The last is constants, whose record is passed on in their place, or a record.
+    The last argument is constants, whose record is passed on in their place, or a record.
     """
 
     def call(*arguments: Any) -> Any:
@@ -120,25 +116,25 @@ def by_law(field: str, *names: str) -> Callable[..., Any]:
             return uniform(*arguments)
         return getattr(law_of(c), field)(*arguments[:-1], c.soil if type(c) is LayeredConstants else c)
 
-    def write_call(*arguments: Any) -> Callable[..., Any]:
+    def choose(*arguments: Any) -> Callable[..., Any]:
         """Return the call for arguments of these Numba types."""
-        record = f"{names[-1]}.soil" if type_of(arguments[-1]) is LayeredConstants else names[-1]
-        passed = ", ".join([*names[:-1], record])
-        source = f"def {field}_by_law({', '.join(names)}):\n return of_law({passed})"
-        return function_of(source, of_law=getattr(law_of(arguments[-1]), field))
+        of_law = getattr(law_of(arguments[-1]), field)
+        if type_of(arguments[-1]) is not LayeredConstants:
+            return (lambda a, c: of_law(a, c)) if len(arguments) == 2 else (lambda a, b, c: of_law(a, b, c))
+        return (lambda a, c: of_law(a, c.soil)) if len(arguments) == 2 else (lambda a, b, c: of_law(a, b, c.soil))
 
     uniform = getattr(UNIFORM, field)
-    overload(call)(write_call)
+    overload(call)(choose)
     return call
 
 
-soil_reaction = by_law("reaction", "k", "c")
+soil_reaction = by_law("reaction")
 """Force and moment of the soil at lines ``k`` of displacement, velocity and lever (Eqs 19, 20)."""
-soil_potential = by_law("potential", "A", "slope_x", "c")
+soil_potential = by_law("potential")
 """Elastic energy of the soil by the same representation as the forces, a convex function of both displacements [m]."""
-drag_power = by_law("drag_power", "k", "c")
+drag_power = by_law("drag_power")
 """Power that the drag takes out of the motion [W], by the same representation as the forces (Eqs 34-36)."""
-fill_soil = by_law("fill", "design", "layers", "soil")
+fill_soil = by_law("fill")
 """Work out a record from the layers of a design, shape (M, 6), and return what follows from them, `Lumped`."""
 
 
@@ -156,17 +152,6 @@ class SoilProfile(NamedTuple):
     """Layers from the top down, shape (M, 6), see `boulder_kernels.layered`."""
     soil: Any
     """`SoilElements` or `SoilLayers`, worked out from the layers by whoever computes the constants."""
-
-
-def with_record(c: Constants, soil: Any) -> Any:
-    """Return constants together with the record of their soil."""
-    return LayeredConstants(*c, soil)
-
-
-@overload(with_record)
-def _with_record(c: Any, soil: Any) -> Callable[..., Any]:
-    values = ", ".join(f"c.{name}" for name in Constants._fields)
-    return function_of(f"def with_record(c, soil):\n return Record({values}, soil)", Record=LayeredConstants)
 
 
 def keep_lean(body: Body, design: Design, gravity: bool, soil: Any) -> None:
@@ -197,30 +182,35 @@ def constants_in_profile(design: Design, readings: Readings, elements: int, prof
     return with_record(c, profile.soil)
 
 
-constants_in = unless_none(
-    "design readings elements profile",
-    constants_in_profile,
-    "constants_of(design, readings, elements)",
-    constants_of=constants_of,
-)
-"""Constants of the motion of one design in its soil.
+def constants_in(design: Design, readings: Readings, elements: int, profile: SoilProfile | None) -> Any:
+    """Constants of the motion of one design in its soil.
 
-Parameters
-----------
-design
-    The design, SI; density, friction angle and subgrade reaction of a soil in layers are those of the layers.
-readings
-    Which formulas are read as printed.
-elements
-    Number N of elements of a uniform soil, or 0 for the closed form.
-profile
-    Its `SoilProfile`, whose record the constants keep; None for the uniform soil of the design.
+    Parameters
+    ----------
+    design
+        The design, SI; density, friction angle and subgrade reaction of a soil in layers are those of the layers.
+    readings
+        Which formulas are read as printed.
+    elements
+        Number N of elements of a uniform soil, or 0 for the closed form.
+    profile
+        Its `SoilProfile`, whose record the constants keep; None for the uniform soil of the design.
 
-Returns
--------
-Constants or LayeredConstants
-    Non-finite or non-positive where the design is impossible, see `boulder_kernels.design.is_computable`.
-"""
+    Returns
+    -------
+    Constants or LayeredConstants
+        Non-finite or non-positive where the design is impossible, see `boulder_kernels.design.is_computable`.
+    """
+    if profile is None:
+        return constants_of(design, readings, elements)
+    return plain(constants_in_profile)(design, readings, elements, profile)  # what it calls is compiled
+
+
+@overload(constants_in)
+def _constants_in(design: Any, readings: Any, elements: Any, profile: Any) -> Callable[..., Any]:
+    if is_none(profile):
+        return lambda design, readings, elements, profile: constants_of(design, readings, elements)
+    return lambda design, readings, elements, profile: constants_in_profile(design, readings, elements, profile)
 
 
 def empty_soil(layers: int, elements: int, outline: np.ndarray | None = None) -> Any:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import kernel, plain, unless_none
+from ._jit import is_none, kernel, overload, plain
 from .control import STEP_RATIO, Control, control_for
 from .design import Design, DesignTable, Readings, design_at, design_in
 from .error_estimates import safety_of, step_errors, take_seconds
@@ -16,6 +17,7 @@ from .lanes import simulate_lanes
 from .layered import (
     LAYERED,
     PRESSURE,
+    FewLayers,
     OutlinedTable,
     filled_layers,
     lanes_count,
@@ -35,11 +37,10 @@ from .outcomes import (
     outcome_table,
     write_outcome,
 )
-from .outlined import given_beside, is_outlined, with_outline
+from .outlined import FewPieces, TaperedSoil, given_beside, is_outlined, with_outline
 from .settling import proof_is_possible
 from .soil_laws import SoilProfile, empty_soil, profile_of
 from .time_history import Record, no_record
-from .workspace import LayeredLanes, OutlinedLanes, TaperedLanes
 
 
 @kernel
@@ -54,10 +55,28 @@ def take_outline(row: int, soil: Any, outlines: np.ndarray) -> Any:
     return with_outline(soil, outlines[row])
 
 
-soil_in = unless_none("row soil outlines", take_outline, "soil")
-"""The soil to fill for one design of a table."""
-profile_in = unless_none("row soil layers", take_profile, "None")
-"""The soil of one design of a table; None for the uniform soil of the design."""
+def soil_in(row: int, soil: Any, outlines: np.ndarray | None) -> Any:
+    """Return the soil to fill for one design of a table."""
+    return soil if outlines is None else plain(take_outline)(row, soil, outlines)
+
+
+@overload(soil_in)
+def _soil_in(row: Any, soil: Any, outlines: Any) -> Callable[..., Any]:
+    if is_none(outlines):
+        return lambda row, soil, outlines: soil
+    return lambda row, soil, outlines: take_outline(row, soil, outlines)
+
+
+def profile_in(row: int, soil: Any, layers: np.ndarray | None) -> SoilProfile | None:
+    """Return the soil of one design of a table; None for the uniform soil of the design."""
+    return None if layers is None else plain(take_profile)(row, soil, layers)
+
+
+@overload(profile_in)
+def _profile_in(row: Any, soil: Any, layers: Any) -> Callable[..., Any]:
+    if is_none(layers):
+        return lambda row, soil, layers: None
+    return lambda row, soil, layers: take_profile(row, soil, layers)
 
 
 @kernel
@@ -156,12 +175,12 @@ def given_to_lanes(designs: np.ndarray, layers: np.ndarray | None, outlines: np.
         return Given(designs, None, 0)
     if outlines is None:
         count = lanes_count(layers.shape[1])
-        return Given(np.concatenate([designs, filled_layers(layers, count)]), LayeredLanes, count) if count else None
+        return Given(np.concatenate([designs, filled_layers(layers, count)]), FewLayers, count) if count else None
     pieces = layers.shape[1] + outlines.shape[1] - 2
     if is_taper(layers, outlines):
-        return Given(given_beside(designs, layers, outlines, 1), TaperedLanes, 1)
+        return Given(given_beside(designs, layers, outlines, 1), TaperedSoil, 1)
     count = lanes_count(pieces)
-    return Given(given_beside(designs, layers, outlines, count), OutlinedLanes, count) if count else None
+    return Given(given_beside(designs, layers, outlines, count), FewPieces, count) if count else None
 
 
 def is_taper(layers: np.ndarray, outlines: np.ndarray) -> bool:

@@ -13,7 +13,7 @@ from boulder_kernels.following import RUNNING, begin_to_turn, enter_modes, first
 from boulder_kernels.lanes import follow_lane, start_designs
 from boulder_kernels.layered import PRESSURE, SUBGRADE, TO, uniform_layers
 from boulder_kernels.modes import AT_END, TOLERANCE, initial_modes
-from boulder_kernels.workspace import CLOCK, END_STATE, LANES, MODES, PACE, STATE, load, room, store
+from boulder_kernels.workspace import LANES, empty_groups, load_impact, store_state
 from tests import oracle
 from tests.kernels.samples import layered_constants
 from tests.oracle import dynamics, events, restoring
@@ -118,27 +118,34 @@ def test_designs_enter_their_lanes_behind_the_onset() -> None:
     below = RWG._replace(e=np.float64(-2.0))
     how, onset = control(0.014, 1.0, LIMIT, stop_at_limit=True), onset_of(constants_of(RWG, CORRECTED, 0))
     for first in (RWG, slow, below):
-        ws = np.zeros(room(None, 0))
+        ws = empty_groups()[0]
         with np.errstate(divide="ignore", invalid="ignore"):
             start_designs(ws, np.stack(table_of([first] + [RWG] * (LANES - 1))), 0, CORRECTED, how)
         for lane, design in {0: first, LANES - 1: RWG if LANES > 1 else first}.items():
-            clock, turning = load(ws, CLOCK, lane), load(ws, MODES, lane).turning
+            i = load_impact(ws, lane)
+            clock, turning = i.clock, i.modes.turning
             if design is RWG:
                 assert clock.t == pytest.approx(onset, rel=1e-12)
                 assert (clock.h, turning) == (0.014, TURNING_FORWARD)
-                assert load(ws, STATE, lane).x_v == pytest.approx(RWG.v_0 * onset, rel=0.1)
+                assert i.y.x_v == pytest.approx(RWG.v_0 * onset, rel=0.1)
             else:
                 assert (clock.t, clock.h, turning) == (0.0, 0.014, SEATED)
 
 
+def numbers_in(groups: np.ndarray) -> np.ndarray:
+    """Every number of every lane, shape (n, LANES)."""
+    return np.frombuffer(groups.tobytes()).reshape(-1, LANES)
+
+
 def test_a_design_whose_motion_is_no_number_is_started_again() -> None:
     """By shorter steps, in its own lane; no other lane is touched."""
-    how, ws = control(0.014, 1.0, LIMIT, stop_at_limit=True), np.zeros(room(None, 0))
+    how, groups = control(0.014, 1.0, LIMIT, stop_at_limit=True), empty_groups()
+    ws = groups[0]
     start_designs(ws, np.stack(table_of([RWG] * LANES)), 0, CORRECTED, how)
-    store(ws, END_STATE, 0, State(*[np.nan] * 6))
-    before, others = ws.copy(), np.arange(len(ws)) % LANES != 0
+    store_state(ws.end_state, 0, State(*[np.nan] * 6))
+    before, others = numbers_in(groups), np.arange(LANES) != 0
     assert follow_lane(ws, 0, CORRECTED, how) == RUNNING
-    clock = load(ws, CLOCK, 0)
-    assert (clock.t, clock.attempts, load(ws, MODES, 0).turning) == (0.0, 0.0, SEATED)
-    assert clock.h_full == load(ws, PACE, 0).h_touching == RETRY * 0.014
-    assert np.array_equal(ws[others], before[others])
+    i = load_impact(ws, 0)
+    assert (i.clock.t, i.clock.attempts, i.modes.turning) == (0.0, 0.0, SEATED)
+    assert i.clock.h_full == i.pace.h_touching == RETRY * 0.014
+    assert np.array_equal(numbers_in(groups)[:, others], before[:, others])

@@ -12,7 +12,7 @@ from boulder_kernels._jit import plain
 from boulder_kernels.design import Body, Design
 from boulder_kernels.dynamics import least_couple, lift_of
 from boulder_kernels.layered import COUNTS, OutlinedTable, uniform_layers
-from boulder_kernels.outlined import GivenPiece, constants_beside, given_beside
+from boulder_kernels.outlined import GivenPiece, constants_beside_pieces, constants_beside_taper, given_beside
 from boulder_kernels.soil_laws import constants_in, drag_power, profile_of, soil_potential, soil_reaction
 from boulder_kernels.table import is_layered, is_paired, simulate_table, some_rows
 from boulder_kernels.workspace import LANES
@@ -41,7 +41,8 @@ def constants_of_lanes(table: OutlinedTable, row: int, count: int) -> Any:
     given = given_beside(designs, table.layers, table.outlines, max(count, 1))[:, row]
     body, pieces = np.split(given[len(Design._fields) :], [len(Body._fields)])
     pieces = tuple(GivenPiece(*piece) for piece in pieces.reshape(-1, len(GivenPiece._fields)))
-    return plain(constants_beside(count))(Design(*given[: len(Design._fields)]), READINGS, (Body(*body), pieces))
+    constants = plain(constants_beside_pieces if count else constants_beside_taper)
+    return constants(Design(*given[: len(Design._fields)]), READINGS, Body(*body), pieces)
 
 
 @pytest.mark.parametrize(
