@@ -101,7 +101,7 @@ REASON_WORDS = {
     "crush": "the truck would be inside the boulder",
     "override": "it hardly reaches the bumper",
     "foot": "a rounded foot is not modelled",
-    "shape": "no box stands for its shape",
+    "shape": "no known shape stands for it",
     "slower_truck": "a slower truck overturns it",
     "validity": "the model does not hold for it",
     "error": "too near to a limit for the accuracy",
