@@ -125,6 +125,8 @@ def verdict_line(trajectory: Trajectory) -> str:
         details = [] if theta is None else [f"{theta:.1f}° of {limit:g}° allowed"]
         if end is not None and end > settings["solver"]["horizon_s"]:
             details.append(f"simulated for {end:.4g} s")
+    if row["shape"] is not None:
+        details.append(f"{row['shape'].replace('_', ' ')} is the worst of the shapes of its mass and sizes")
     words = (trajectory.verdict.upper(), REASON_WORDS.get(trajectory.reason, trajectory.reason), *details)
     return f"{name}: {', '.join(word for word in words if word)}"
 
