@@ -22,6 +22,7 @@ from docs.studies import (
     site_data,
     soil,
     stones,
+    taped,
 )
 from docs.studies.coverage import NUMBERS, coverage_table, coverages, grid_table, random_table
 from docs.studies.extremes import admitted_table, box_shares_table, refusal_table
@@ -284,6 +285,8 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "moves": _moves,
     "partial-factors": answers.partial_factors,
     "stone-shapes": lambda root: shapes.shapes_table(root / GRID).markdown(),
+    "taped-stones": lambda root: taped.taped_table(root / GRID).markdown(),
+    "taped-words": lambda root: taped.taped_words(root / GRID),
     "stone-example": stones.stone_of_example,
     "stone-settings": stones.settings_of_example,
     "stone-site": stones.site_of_example,
@@ -303,5 +306,6 @@ LONG = {
     *("readings-crash-tests", "readings-grid", "readings-words", "coverage", "box-shares", "front-face"),
     *(name for name in CONTENTS if name.startswith("forms-")),
     *("grades", "wild-families", "moves", "partial-factors", "stone-site"),
+    *("taped-stones", "taped-words"),
 }
 """Blocks that take more than ten seconds, or share what does: computed again every night, not with every change."""

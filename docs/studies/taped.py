@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from math import gamma
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from boulder_sweep.columns import BOULDER_MASS, SHAPES
 from boulder_sweep.crash_tests.tables import Table
-from boulder_sweep.designs import LEAST_SOLIDITY, LEAST_TAPED, SIDES, DesignBlock, block_of
+from boulder_sweep.designs import SIDES, DesignBlock, block_of
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.inputs import designs_of
-from boulder_sweep.judge.judged import FAIL, PASS, Judged
+from boulder_sweep.judge.judged import PASS, Judged
 from boulder_sweep.settings.shape import BOX, ProfilePoint, Shape
 from boulder_sweep.soils import with_soil
 from boulder_sweep.stones.rock import LEAST_FOOT
@@ -33,6 +33,8 @@ CUT = (0.3, 1.0)
 """Where the foot is cut, below the middle, as a share of where it has half the sides of the middle."""
 NOISE = 0.06
 """Standard deviation of the radius of a section, as a share, in waves around it and along the height."""
+TAPE_M = 0.05
+"""To what a tape is read."""
 NEAR = (0.85, 1.15)
 """Depths, over the least at which the stone passes by its own profile."""
 RATIOS = (0.15, 0.9)
@@ -53,11 +55,6 @@ class Stones(NamedTuple):
     """Inputs by the columns of the table, the taped sizes among them, shape (n,)."""
     outlines: np.ndarray
     """Their own outlines, see `boulder_kernels.outlined`, shape (n, P, 4)."""
-
-
-def section_share(m: float) -> float:
-    """Return the area of |x/a|^m + |y/b|^m = 1 over that of its rectangle."""
-    return gamma(1.0 + 1.0 / m) ** 2 / gamma(1.0 + 2.0 / m)
 
 
 def stone(rng: np.random.Generator) -> tuple[np.ndarray, float]:
@@ -162,32 +159,50 @@ def near_the_limit(evaluation: Evaluation, count: int = STONES) -> tuple[Stones,
     return stones, high * rng.uniform(*NEAR, len(kept))
 
 
-if __name__ == "__main__":
-    import sys, time
-    from pathlib import Path
+def rounded(stones: Stones) -> Stones:
+    """Return the stones with sizes as a tape gives them."""
+    return stones._replace(
+        given=stones.given | {side: np.round(stones.given[side] / TAPE_M) * TAPE_M for side in SIDES}
+    )
 
-    ev = grid_evaluation(Path("configs/" + sys.argv[1]))
-    t = time.time()
-    s, d = near_the_limit(ev)
-    print(len(d), time.time() - t)
-    true = by_own_profile(s, d, ev)
-    b = blocks(s, d)
-    fam = replace(ev, second_opinion=())(b)
-    f = designs_of(b).solidity
-    print("fills", np.quantile(f, [0, 0.1, 0.5, 0.9, 1]), "refused", sum(bool(b.reasons[k]) for k in range(len(d))))
-    tp, fp = true.verdict == PASS, fam.verdict == PASS
-    print("true pass", tp.sum(), "family pass", fp.sum(), "unsafe", (fp & ~tp).sum(), "lost", (tp & ~fp).sum())
-    print(np.unique([fam.row(k)["shape"] for k in range(len(d))], return_counts=True))
-    print(np.unique([fam.row(k)["reason"] for k in np.flatnonzero(tp & ~fp)], return_counts=True))
-    des = designs_of(b)
-    rows = np.flatnonzero(des.taped)
-    for k, name in enumerate(SHAPES):
-        one = replace(ev, second_opinion=(), control=ev.control._replace(side_by_side=False)).judged(
-            des.rows(rows).in_shape(k, ev.model)
-        )
-        p = one.verdict == PASS
-        print(
-            name, "unsafe", (p & ~tp[rows]).sum(), "lost", (tp[rows] & ~p).sum(), "fails", (one.verdict == FAIL).sum()
-        )
-    for k in np.flatnonzero(fp & ~tp)[:10]:
-        print(true.row(k)["reason"], true.row(k)["max_rotation_deg"], fam.row(k)["max_rotation_deg"], f[k])
+
+@cache
+def verdicts(grid: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Return which stones pass by their own profile, and by what may stand for them, bool, shape (n,) each."""
+    evaluation = replace(grid_evaluation(grid), second_opinion=())
+    stones, depth = near_the_limit(evaluation)
+    block = blocks(stones, depth)
+    designs = evaluation.designs(block)
+    found = {
+        "the worst of the three shapes": evaluation(block),
+        f"the same, sizes taped to {100.0 * TAPE_M:g} cm": evaluation(blocks(rounded(stones), depth)),
+    }
+    alone = replace(evaluation, control=evaluation.control._replace(side_by_side=False))
+    for number, shape in enumerate(SHAPES):
+        found[shape.replace("_", " ")] = alone.judged(designs.in_shape(number, evaluation.model))
+    box = stones.given | {"embedment_depth_m": depth, "boulder_density_kg_m3": designs.table.rho_b}
+    found["the box of its sizes and mass"] = evaluation(block_of({k: v for k, v in box.items() if k != BOULDER_MASS}))
+    own = by_own_profile(stones, depth, evaluation).verdict == PASS
+    return own, {name: judged.verdict == PASS for name, judged in found.items()}
+
+
+def taped_table(grid: Path) -> Table:
+    """Return how verdicts differ from those by the stones' own profiles."""
+    own, found = verdicts(grid)
+    table = Table(("in place of the stone", "passes where it fails", "does not pass where it does"))
+    for name, passes in found.items():
+        unsafe, lost = (f"{100.0 * np.mean(those):.1f} %" for those in (passes & ~own, own & ~passes))
+        table.add(name, unsafe, lost)
+    return table
+
+
+def taped_words(grid: Path) -> str:
+    """Return what the table is about."""
+    own, _ = verdicts(grid)
+    stones, _ = near_the_limit(replace(grid_evaluation(grid), second_opinion=()))
+    length, width, height = (stones.given[side] for side in SIDES)
+    fills = stones.given[BOULDER_MASS] / (stones.given["boulder_density_kg_m3"] * length * width * height)
+    return (
+        f"{own.size} generated stones fill {fills.min():.0%} to {fills.max():.0%} of their sizes, half of them "
+        f"{np.quantile(fills, 0.25):.0%} to {np.quantile(fills, 0.75):.0%}; by their own profiles {own.sum()} pass."
+    )

@@ -50,8 +50,9 @@ vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*
 
 @pytest.fixture
 def weighed(tmp_path):
-    """A stone that fills less than 95 % of the box of its sides."""
-    (tmp_path / "weighed.yaml").write_text(AS_WEIGHED, encoding="utf-8")
+    """A stone that fills less than 40 % of the box of its sides, by a density that is a mistake."""
+    text = AS_WEIGHED.replace("mass: 23.5 t", "mass: 23.5 t, density: 6500 kg/m^3")
+    (tmp_path / "weighed.yaml").write_text(text, encoding="utf-8")
     return tmp_path / "weighed.yaml"
 
 
@@ -63,7 +64,7 @@ def test_a_stone_whose_shape_is_not_known_is_undecided_and_no_failure(sweep, wei
     out = sweep("uncertainty", weighed, "-q")[1]
     assert re.search(r"^undecided +0\.0000 +0\.0000 +1\.0000 +1\.0000 ", out, re.MULTILINE)
     assert "not decided: undecided (shape)" in out
-    assert "undecided (shape): the boulder fills less than 95 %" in out
+    assert "undecided (shape): by its mass the boulder fills less" in out
     known = ("--set", "boulder.density=2485 kg/m^3")
     row = json.loads(sweep("uncertainty", weighed, "--json", "-q", *known)[1])["rows"][0]
     assert (row["p_pass"], row["p_undecided"], row["p_undecided_reason"]) == (1.0, 0.0, None)
@@ -76,7 +77,7 @@ def test_a_need_that_nothing_decides_names_the_reason(sweep, weighed, words):
         words = (*words, "--at", "mean")
     out = sweep("need", weighed, "-q", "--notes", *words)[1]
     assert "undecided: no value is known to pass" in out
-    assert "undecided (shape): the boulder fills less than 95 %" in out
+    assert "undecided (shape): by its mass the boulder fills less" in out
     assert "blocked" not in out
     assert "another boulder" not in out
 

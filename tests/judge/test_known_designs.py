@@ -118,7 +118,8 @@ def test_an_island_is_told_alike_and_never_recommended(tmp_path: Path) -> None:
 
 
 def test_a_stone_of_no_known_shape_is_undecided_and_not_hopeless() -> None:
-    weighed = boulder_sweep.load(KNOWN / "weighed.yaml", ["site.embedment_depth=2.4 m"])
+    slip = "boulder.density=6500 kg/m^3"  # by which it would fill less than 40 % of its sizes
+    weighed = boulder_sweep.load(KNOWN / "weighed.yaml", ["site.embedment_depth=2.4 m", slip])
     drawn = boulder_sweep.uncertainty(weighed).frame.iloc[0]
     assert (drawn.p_undecided, drawn.p_undecided_reason) == (1.0, "shape")
     assert drawn.p_pass_high == 1.0
