@@ -285,6 +285,7 @@ CONTENTS: dict[str, Callable[[Path], str]] = {
     "moves": _moves,
     "partial-factors": answers.partial_factors,
     "stone-shapes": lambda root: shapes.shapes_table(root / GRID).markdown(),
+    "rocks": lambda _: taped.rocks_table().markdown(),
     "taped-stones": lambda root: taped.taped_table(root / GRID).markdown(),
     "taped-words": lambda root: taped.taped_words(root / GRID),
     "stone-example": stones.stone_of_example,

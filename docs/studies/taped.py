@@ -15,9 +15,9 @@ from boulder_sweep.designs import SIDES, DesignBlock, block_of
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.judged import PASS, Judged
-from boulder_sweep.settings.shape import BOX, ProfilePoint, Shape
+from boulder_sweep.settings.shape import ProfilePoint, Shape
 from boulder_sweep.soils import with_soil
-from boulder_sweep.stones.rock import LEAST_FOOT
+from boulder_sweep.stones.rock import LEAST_FOOT, ROCKS
 from docs.studies.forms import BED_OFFSET_M, BUMPER_M, HOOD_M, grid_evaluation
 
 STONES = 300
@@ -26,7 +26,7 @@ PIECES = 16
 AROUND = 96
 """Points of a section."""
 FILLS = (0.45, 0.95)
-"""Fill of the superellipsoids before noise."""
+"""Fill of the stones."""
 PLAN, UPRIGHT = (2.0, 12.0), (1.0, 12.0)
 """Exponents of sections, from an ellipse to nearly a rectangle, and of the sides over the height."""
 CUT = (0.3, 1.0)
@@ -104,12 +104,11 @@ def blocks(stones: Stones, depth: np.ndarray) -> DesignBlock:
 def by_own_profile(stones: Stones, depth: np.ndarray, evaluation: Evaluation) -> Judged:
     """Judge stones by their own profiles at some depths [m]."""
     given = {name: values for name, values in stones.given.items() if name != BOULDER_MASS}
-    box = designs_of(block_of(given | {"embedment_depth_m": depth})).table
-    model = evaluation.model
-    any_shape = Shape((*BOX[:1], *(ProfilePoint(k / PIECES, 0.5, 0.5, 0.5) for k in range(1, PIECES)), *BOX[1:]))
-    table = with_soil(box, model.resistance, model.ground, shape=any_shape)._replace(outlines=stones.outlines)
-    alone = replace(evaluation, control=evaluation.control._replace(side_by_side=False), second_opinion=())
-    designs = designs_of(block_of(given | {"embedment_depth_m": depth}))
+    designs, model = designs_of(block_of(given | {"embedment_depth_m": depth})), evaluation.model
+    # The soil does not depend on the profile.
+    any_shape = Shape(tuple(ProfilePoint(k / PIECES, 1.0 - 0.5 * k / PIECES, 0.5, 0.5) for k in range(PIECES + 1)))
+    table = with_soil(designs.table, model.resistance, model.ground, shape=any_shape)._replace(outlines=stones.outlines)
+    alone = replace(evaluation, control=evaluation.control._replace(side_by_side=False))
     return alone.judged(designs._replace(table=table))
 
 
@@ -184,6 +183,14 @@ def verdicts(grid: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     found["the box of its sizes and mass"] = evaluation(block_of({k: v for k, v in box.items() if k != BOULDER_MASS}))
     own = by_own_profile(stones, depth, evaluation).verdict == PASS
     return own, {name: judged.verdict == PASS for name, judged in found.items()}
+
+
+def rocks_table() -> Table:
+    """Return the densities of kinds of rock."""
+    table = Table(("`boulder.rock`", "from, kg/m³", "mostly", "to"))
+    for name, (low, mode, high) in ROCKS.items():
+        table.add(f"`{name}`", *(f"{value:.0f}" for value in (low, mode, high)))
+    return table
 
 
 def taped_table(grid: Path) -> Table:
