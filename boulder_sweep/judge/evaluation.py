@@ -194,7 +194,7 @@ class Evaluation:
             if not len(left):
                 break
             shaped = designs.rows(left).in_shape(shape, self.model)
-            many = one_by_one if shaped.table.outlines.shape[1] > 2 else alone
+            many = one_by_one if SHAPES[shape] == "barrel" else alone  # the others have one piece
             both = [worst.rows(left), many.judged(shaped)]
             case = worst_case(both) * len(left) + np.arange(len(left))
             worst = with_rows(worst, left, joined(both).rows(case))

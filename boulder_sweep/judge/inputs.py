@@ -91,6 +91,7 @@ class Designs(NamedTuple):
 
     def in_shape(self, shape: int, model: Model) -> Designs:
         """Return boulders that are all `taped` by the shape of this number, in the soil of a model."""
+        assert self.rocks is not None  # taped boulders are weighed
         given = plain(self.table)._replace(rho_b=self.rocks, K_epsilon=self.given_factors)
         table = with_shape(given, model.resistance, model.ground, SHAPES[shape], self.solidity)
         return self._replace(table=table, factors=self.given_factors, shape=shape)

@@ -183,3 +183,27 @@ def test_mistakes_are_said_before_anything_is_computed_and_before_any_note(sweep
     assert (code, out) == (2, "")
     assert message in err
     assert "note: " not in err
+
+
+YARD = """stone,boulder_length_cm,boulder_width_cm,boulder_height_cm,boulder_mass_t
+deep,150,150,300,13.2
+flat,160,160,120,5.2
+good,170,180,280,19.8
+"""
+
+
+def test_a_yard_of_taped_stones_is_sorted_by_depth_and_says_which_serve(sweep, tmp_path):
+    (tmp_path / "yard.csv").write_text(YARD, encoding="utf-8")
+    (tmp_path / "yard.yaml").write_text(
+        """table: yard.csv
+boulder: {density: 2650 kg/m^3}
+site: {embedment_depth: 1 m}
+soil: {density: 1860 kg/m^3, friction_angle: 38 deg, subgrade_reaction: 60 MN/m^3}
+vehicle: {mass: 15000 lb, speed: 20 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
+""",
+        encoding="utf-8",
+    )
+    _, out, _ = sweep("need", tmp_path / "yard.yaml", "-q", "--margin", "0")
+    assert "2 of the 3 stones serve at this site: good, deep" in out
+    places = [out.index(f"{name} ", out.index("stone  design")) for name in ("good", "deep", "flat")]
+    assert places == sorted(places)
