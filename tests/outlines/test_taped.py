@@ -24,6 +24,7 @@ from boulder_sweep.settings.problems import SettingsError
 from boulder_sweep.settings.shape import ProfilePoint, Shape
 from boulder_sweep.soils import with_shape, with_soil
 from boulder_sweep.stones.taped import taped_profiles
+from boulder_sweep.views.scene import SideView
 from tests.answers.designs import bare_need
 from tests.outlines.oracle import Stone
 
@@ -199,3 +200,15 @@ def test_a_kind_of_rock_is_an_uncertain_density():
 def test_mistakes_are_reported_where_they_stand(boulder, expected):
     with pytest.raises(SettingsError, match=expected):
         sweep_of(boulder)
+
+
+def test_a_picture_shows_every_shape():
+    history = simulate(taped([0.7]))
+    shown = [item for item in SideView(history).ground() if item.style == "initial"]
+    assert len(shown) == len(SHAPES)
+    for item in shown:
+        x, y = np.array(item.points).T
+        assert np.ptp(x) == pytest.approx(1.65, rel=1e-9)
+        assert (y.min(), y.max()) == pytest.approx((-2.3, 1.14), rel=1e-9)
+    assert len({item.points for item in shown}) == len(SHAPES)
+    assert len([item for item in SideView(simulate(taped([0.97]))).ground() if item.style == "initial"]) == 1
