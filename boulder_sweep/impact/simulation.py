@@ -135,7 +135,8 @@ def history_of(
     row, how = judged.row(0), evaluation.readings
     if row["shape"] is not None:
         designs = designs.in_shape(SHAPES.index(row["shape"]), sweep.model)
-    deciding = _deciding(evaluation.control, how, row["step_s"], layered=is_layered(designs.table))
+    control = evaluation.control_of_shape(row["shape"])
+    deciding = _deciding(control, how, row["step_s"], layered=is_layered(designs.table))
     drawn = deciding._replace(stop_at_limit=False, horizon=_drawn_s(row, deciding.horizon))
     times = _sample_times(drawn.horizon, sample_s)
     record = _empty_record(times)

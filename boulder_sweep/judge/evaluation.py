@@ -187,18 +187,22 @@ class Evaluation:
     def _worst_shapes(self, designs: Designs) -> Judged:
         """Judge boulders as taped and weighed by the worst of their shapes; by the first in which one fails."""
         alone = replace(self, second_opinion=())  # which know boxes only
-        one_by_one = replace(alone, control=self.control._replace(side_by_side=self.outlines_in_lanes))
         worst, left = alone.judged(designs.in_shape(0, self.model)), np.arange(designs.size)
         for shape in range(1, len(SHAPES)):
             left = left[worst.verdict[left] != FAIL]
             if not len(left):
                 break
             shaped = designs.rows(left).in_shape(shape, self.model)
-            many = one_by_one if SHAPES[shape] == "barrel" else alone  # the others have one piece
-            both = [worst.rows(left), many.judged(shaped)]
+            both = [worst.rows(left), replace(alone, control=self.control_of_shape(SHAPES[shape])).judged(shaped)]
             case = worst_case(both) * len(left) + np.arange(len(left))
             worst = with_rows(worst, left, joined(both).rows(case))
         return worst
+
+    def control_of_shape(self, shape: str | None) -> Control:
+        """Return how boulders of one of `SHAPES` are simulated: the barrel has two pieces, the others have one."""
+        if shape != "barrel":
+            return self.control
+        return self.control._replace(side_by_side=self.outlines_in_lanes)
 
     def _decided(self, designs: Designs) -> Rows:
         """Simulate designs until each is decided at its own speed."""

@@ -91,20 +91,27 @@ def test_many_stones_lie_in_their_soil_as_each_does_by_its_profile(law, shape):
             np.testing.assert_array_equal(found[row], known[0])
 
 
-def test_the_worst_of_the_shapes_decides_and_is_named():
+@pytest.mark.parametrize(("speed", "deciding"), [("30 mph", {0}), ("15 mph", {0, 1})])
+def test_the_worst_of_the_shapes_decides_and_is_named(speed, deciding):
     """Against each shape simulated on its own; depths from too shallow to enough for all."""
-    sweep = taped([0.5, 0.65, 0.8], "[1.4 m, 1.7 m, 1.9 m, 2.1 m, 2.3 m, 2.5 m]")
+    boulder = f"mass: {[fill * 2600 * BOX for fill in (0.5, 0.65, 0.8)]} kg, density: 2600 kg/m^3"
+    text = FILE.format(boulder=boulder, depth="[0.9 m, 1.2 m, 1.4 m, 1.7 m, 1.9 m, 2.1 m, 2.3 m, 2.5 m]")
+    sweep = load_text(text.replace("30 mph", speed), Path("yard.yaml"))
     judge, block = evaluation(sweep), sweep.block(0, sweep.n_designs)
     rows, designs = judge(block), judge.designs(block)
-    each = [judge.judged(designs.in_shape(shape, sweep.model)) for shape in range(len(SHAPES))]
-    verdicts = set()
+    one_by_one = replace(judge, control=judge.control._replace(side_by_side=False))
+    judges = [judge, one_by_one, judge]  # of the barrel, which has two pieces
+    each = [one.judged(designs.in_shape(shape, sweep.model)) for shape, one in enumerate(judges)]
+    verdicts, shapes = set(), set()
     for place in range(len(rows)):
         row, alone = rows.row(place), [one.row(place) for one in each]
         fails = [one for one in alone if one["verdict"] == "fail"]
         known = fails[0] if fails else min(alone, key=lambda one: (one["verdict"] == "pass", one["margin"] or 0.0))
         assert row == known
         assert alone[SHAPES.index(row["shape"])] == row
+        shapes.add(SHAPES.index(row["shape"]))
         verdicts.add((row["verdict"], tuple(one["verdict"] for one in alone)))
+    assert shapes == deciding
     assert {"pass", "fail"} <= {verdict for verdict, _ in verdicts}
     assert any(len(set(alone)) > 1 for _, alone in verdicts)  # the shapes are not all alike
 
