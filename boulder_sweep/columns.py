@@ -26,8 +26,8 @@ REASONS = (
 WAY_OUT = {
     "foot": "soil that presses on a rounded foot also lifts, which is not modelled: bed it in concrete, cut it flat, "
     "or bury it deeper and test",
-    "shape": "the boulder fills less than 95 % of the box of its length, width and height, and no box of the same mass "
-    "stands for it: give its profile (boulder.profile or boulder.taper)",
+    "shape": "by its mass the boulder fills less than 40 % of the box of its length, width and height, and no shape is "
+    "known that stands for it: check mass, density and sizes, or give its profile (boulder.profile or boulder.taper)",
     "validity": "the model does not hold beyond 20 deg of rotation, nor for a boulder less deep than 0.35 of its "
     "height that slides by more than 0.5 m: bury it deeper, or test it",
     "slower_truck": "a slower truck overturns it, which does not push it aside as far: bury it deeper",
@@ -37,6 +37,9 @@ GRADES = ("robust", "sensitive", "open")
 """What is known of a pass under other forms of the model."""
 STANDINGS = ("paper", "paper;broms", "paper;width_capped", "paper;broms;width_capped")
 """Models that a pass stands under: the paper's motion, and second opinions by other laws of the soil."""
+SHAPES = ("narrower_downwards", "barrel", "narrower_upwards")
+"""Shapes of which the worst stands for a boulder as taped and weighed (`boulder_sweep.stones.taped`), in the order in
+which they are simulated: the one that most often fails first."""
 RATINGS = ("P1", "P2", "P3")
 """Penetration ratings of ASTM F2656, the best first."""
 
@@ -260,6 +263,16 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "its rock; 1 where no mass is given",
         lambda facts: facts.designs.solidity,
         rows="judged",
+    ),
+    OutcomeColumn(
+        "shape",
+        "dictionary",
+        "",
+        "of a boulder as taped and weighed, which fills less than 95 % of the box of its sizes: the shape that decides "
+        "the row, the worst of those with its mass and sizes; null for any other",
+        lambda facts: np.full(facts.designs.size, facts.designs.shape, dtype=np.int32),
+        rows="judged",
+        words=SHAPES,
     ),
     OutcomeColumn(
         "validity",

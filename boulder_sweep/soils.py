@@ -13,8 +13,10 @@ import numpy as np
 from boulder_kernels import DesignTable
 from boulder_kernels import ground as kernels
 from boulder_kernels.layered import LayeredTable, OutlinedTable
+from boulder_kernels.table import some_rows
 from boulder_sweep.settings.model import RESISTANCES, Ground
-from boulder_sweep.settings.shape import BOX, Shape
+from boulder_sweep.settings.shape import BOX, ProfilePoint, Shape
+from boulder_sweep.stones.taped import taped_profiles
 
 SLICES = 16
 """Slices of the buried depth in which the law that depends on the width takes that of their middle."""
@@ -105,6 +107,33 @@ def with_soil(table: DesignTable, law: str, ground: Ground, turned: float = 0.0,
     if len(profile):
         return OutlinedTable(*table, layers, outlines)
     return table if ground.is_proportional else LayeredTable(*table, layers)
+
+
+def with_shape(table: DesignTable, law: str, ground: Ground, shape: str, fills: np.ndarray) -> OutlinedTable:
+    """Return the same for boulders as taped and weighed, by one of the shapes that they may have.
+
+    Parameters
+    ----------
+    table, law, ground
+        As of `with_soil`; the density is that of the rock.
+    shape
+        One of `boulder_sweep.columns.SHAPES`.
+    fills
+        Volume of each boulder over that of the box of its sides, shape (n,).
+    """
+    profiles = taped_profiles(shape, fills)
+    if law != "width_capped":  # no other looks at the width
+        soil = with_soil(table, law, ground, shape=Shape(_points(profiles[0])))
+        return soil._replace(outlines=profiles * np.stack([table.H, table.W, table.L, table.L], axis=-1)[:, None, :])
+    rows = [np.flatnonzero(fills == fill) for fill in np.unique(fills)]
+    each = [with_soil(some_rows(table, some), law, ground, shape=Shape(_points(profiles[some[0]]))) for some in rows]
+    order = np.argsort(np.concatenate(rows))
+    return OutlinedTable(*(np.ascontiguousarray(np.concatenate(column)[order]) for column in zip(*each, strict=True)))
+
+
+def _points(profile: np.ndarray) -> tuple[ProfilePoint, ...]:
+    """Return a profile of shape (P, 4) as points."""
+    return tuple(ProfilePoint(*point) for point in profile.tolist())
 
 
 def is_layered(law: str, ground: Ground, shape: Shape) -> bool:

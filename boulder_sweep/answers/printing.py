@@ -350,7 +350,8 @@ def need_lines(
             lines += [f"next, {words}:", f"  {command}"]
     shown = _every_answer(need, units) if table else screen_lines(need, units)
     lines += ["", *shown]
-    remarks = undecided_lines(need.arrow) if need.probability is not None else []
+    remarks = yard_lines(need)
+    remarks += undecided_lines(need.arrow) if need.probability is not None else []
     remarks += caution_lines(need.sweep.model, reasons_in(need.arrow), units)
     if need.key.name == BOULDER_MASS.name:
         remarks += _edges(need, units)
@@ -400,13 +401,33 @@ def screen_lines(need: Need, units: str = "si") -> list[str]:
     if found is not None and found.conditions > 1 and need.sweep.table is None and need.key.name != BOULDER_MASS.name:
         lines, columns = _by_boulder(need, rows, units)
     count = len(lines)
-    if count > MOST_SHOWN and found is not None:
+    if is_yard(need):
+        lines.sort(key=lambda row: (row["passes_at"] is None, row["passes_at"]))
+    elif count > MOST_SHOWN and found is not None:
         least = PREFERENCES[found.prefer]
         lines.sort(key=lambda row: (row.get("failing", row["passes_at"] is None), row[least]))
     shown = table_lines([*([_marker(need, units)] if count > 1 else []), *columns], lines[:MOST_SHOWN])
     if count > MOST_SHOWN:
-        shown.append(f"({MOST_SHOWN} of {count:,}{', the best first' if found else ''}; --table has all answers)")
+        best = ", the shallowest first" if is_yard(need) else ", the best first" if found else ""
+        shown.append(f"({MOST_SHOWN} of {count:,}{best}; --table has all answers)")
     return shown
+
+
+def is_yard(need: Need) -> bool:
+    """Return whether the depths of listed stones as weighed are asked for."""
+    return need.sweep.table is not None and BOULDER_MASS.name in need.sweep.table.columns and need.key.name == DEPTH
+
+
+def yard_lines(need: Need) -> list[str]:
+    """Return which stones of a yard serve at the site, the shallowest first; none of other questions."""
+    if not is_yard(need):
+        return []
+    rows = _shown_part(need).to_pylist()
+    serve = sorted((row for row in rows if row["passes_at"] is not None), key=lambda row: row["passes_at"])
+    names = [" ".join(str(row[name]) for name in need.sweep.plan.labels or ("design_id",)) for row in serve]
+    more = "" if len(names) <= MOST_SHOWN else f" and {len(names) - MOST_SHOWN} more"
+    some = f": {', '.join(names[:MOST_SHOWN])}{more}" if names else ""
+    return [f"{len(serve)} of the {counted(len(rows), 'stone')} serve at this site{some}"]
 
 
 def _by_boulder(need: Need, rows: Sequence[Row], units: str) -> tuple[list[Row], list[Column]]:

@@ -17,7 +17,7 @@ from boulder_kernels.control import control_for
 from boulder_kernels.outcomes import FINER, NONE_NEEDED
 from boulder_kernels.soil_laws import constants_in
 from boulder_kernels.table import is_layered, is_paired, problem_at, step_of_solution
-from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS
+from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS, SHAPES
 from boulder_sweep.impact.history import Motion
 from boulder_sweep.impact.trajectory import Trajectory
 from boulder_sweep.judge.accuracy import accuracy_of, finer_controls, reported_step_s
@@ -133,7 +133,10 @@ def history_of(
     inputs = {name: float(column.to_numpy()[0]) for name, column in block.columns.items()}
     designs = evaluation.designs(block)
     row, how = judged.row(0), evaluation.readings
-    deciding = _deciding(evaluation.control, how, row["step_s"], layered=is_layered(designs.table))
+    if row["shape"] is not None:
+        designs = designs.in_shape(SHAPES.index(row["shape"]), sweep.model)
+    control = evaluation.control_of_shape(row["shape"])
+    deciding = _deciding(control, how, row["step_s"], layered=is_layered(designs.table))
     drawn = deciding._replace(stop_at_limit=False, horizon=_drawn_s(row, deciding.horizon))
     times = _sample_times(drawn.horizon, sample_s)
     record = _empty_record(times)

@@ -26,9 +26,17 @@ from boulder_kernels.rules import (
     rule_by_slower,
 )
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
-from boulder_sweep.judge.accuracy import LONGEST_HORIZON, Accuracy, control_of, finer_controls, readings_of
+from boulder_sweep.columns import SHAPES
+from boulder_sweep.judge.accuracy import (
+    LONGEST_HORIZON,
+    OUTLINES_IN_LANES,
+    Accuracy,
+    control_of,
+    finer_controls,
+    readings_of,
+)
 from boulder_sweep.judge.inputs import Designs, designs_of
-from boulder_sweep.judge.judged import PASS, Judged, joined, not_computed, worst_of
+from boulder_sweep.judge.judged import FAIL, PASS, Judged, joined, not_computed, with_rows, worst_case, worst_of
 from boulder_sweep.judge.robustness import DECISIVE, can_be_asked, with_second_opinions
 from boulder_sweep.judge.verdict import Limits, judged_rows, limits_of, rows_of
 from boulder_sweep.settings.model import Model
@@ -81,6 +89,8 @@ class Evaluation:
         Whether second opinions know such designs.
     against_slower
         Whether shallow boulders that slide are judged against slower trucks, too; not where the caller does so.
+    outlines_in_lanes
+        Whether there are so many designs that outlines of more than one piece are simulated several at a time.
     """
 
     readings: Readings
@@ -93,6 +103,7 @@ class Evaluation:
     second_opinion: tuple[str, ...] = ()
     askable: bool = False
     against_slower: bool = True
+    outlines_in_lanes: bool = False
 
     def __call__(self, block: DesignBlock) -> Judged:
         """Simulate and judge a block.
@@ -155,6 +166,12 @@ class Evaluation:
         reduced by it. Those that do not pass so, too, keep their verdict and get a margin just below the one asked for.
         Second opinions are asked with the reduced limit.
         """
+        taped = designs.taped
+        if taped.any():
+            some = np.flatnonzero(taped)
+            return joined([self.judged(designs.rows(~taped)), self._worst_shapes(designs.rows(some))]).rows(
+                np.argsort(np.concatenate([np.flatnonzero(~taped), some]))
+            )
         rows = self._decided(designs)
         if self.against_slower:
             self._hold_slower(rows, designs)
@@ -166,6 +183,26 @@ class Evaluation:
         limits = self.limits._replace(rotation=(1.0 - self.least_margin) * self.limits.rotation)
         passes = designs.rows(judged.verdict == PASS)
         return with_second_opinions(judged, passes, self.second_opinion, self.model.resistance, limits, self.longest_s)
+
+    def _worst_shapes(self, designs: Designs) -> Judged:
+        """Judge boulders as taped and weighed by the worst of their shapes; by the first in which one fails."""
+        alone = replace(self, second_opinion=())  # which know boxes only
+        worst, left = alone.judged(designs.in_shape(0, self.model)), np.arange(designs.size)
+        for shape in range(1, len(SHAPES)):
+            left = left[worst.verdict[left] != FAIL]
+            if not len(left):
+                break
+            shaped = designs.rows(left).in_shape(shape, self.model)
+            both = [worst.rows(left), replace(alone, control=self.control_of_shape(SHAPES[shape])).judged(shaped)]
+            case = worst_case(both) * len(left) + np.arange(len(left))
+            worst = with_rows(worst, left, joined(both).rows(case))
+        return worst
+
+    def control_of_shape(self, shape: str | None) -> Control:
+        """Return how boulders of one of `SHAPES` are simulated: the barrel has two pieces, the others have one."""
+        if shape != "barrel":
+            return self.control
+        return self.control._replace(side_by_side=self.outlines_in_lanes)
 
     def _decided(self, designs: Designs) -> Rows:
         """Simulate designs until each is decided at its own speed."""
@@ -271,4 +308,5 @@ def evaluation_of(sweep: Sweep, accuracy: Accuracy, simulate: Simulate = by_kern
         model=sweep.model,
         second_opinion=sweep.model.second_opinion if askable else (),
         askable=askable,
+        outlines_in_lanes=sweep.n_designs >= OUTLINES_IN_LANES,
     )

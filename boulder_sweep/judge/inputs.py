@@ -14,10 +14,10 @@ import numpy as np
 from boulder_kernels import DesignTable
 from boulder_kernels.layered import OutlinedTable
 from boulder_kernels.outlined import FAR, HEIGHT, NEAR
-from boulder_sweep.columns import BOULDER_MASS
-from boulder_sweep.designs import LEAST_SOLIDITY, solidity_of
+from boulder_sweep.columns import BOULDER_MASS, SHAPES
+from boulder_sweep.designs import LEAST_SOLIDITY, LEAST_TAPED, solidity_of
 from boulder_sweep.settings.model import Model
-from boulder_sweep.soils import with_soil
+from boulder_sweep.soils import plain, with_shape, with_soil
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
@@ -57,6 +57,8 @@ class Designs(NamedTuple):
     """Density of the rock where the file gives masses, so that it is not that of what is simulated [kg/m^3]."""
     factors: np.ndarray | None = None
     """Strain rate factor as given, where that of `table` also holds what law, slope and water make of it."""
+    shape: int = -1
+    """Which of `SHAPES` stands for boulders as taped and weighed; -1 where none does."""
 
     @property
     def size(self) -> int:
@@ -69,7 +71,7 @@ class Designs(NamedTuple):
         fills = None if self.fills is None else self.fills[chosen]
         rocks = None if self.rocks is None else self.rocks[chosen]
         factors = None if self.factors is None else self.factors[chosen]
-        return Designs(table, self.bed_offset[chosen], fills, rocks, factors)
+        return Designs(table, self.bed_offset[chosen], fills, rocks, factors, self.shape)
 
     @property
     def given_factors(self) -> np.ndarray:
@@ -80,6 +82,19 @@ class Designs(NamedTuple):
     def solidity(self) -> np.ndarray:
         """Volume of each boulder over that of the box of its sides, shape (n,)."""
         return np.ones(self.size) if self.fills is None else self.fills
+
+    @property
+    def taped(self) -> np.ndarray:
+        """Which of them are known by sizes and mass only, so that a family of shapes stands for each, bool, (n,)."""
+        known = self.rocks is None or isinstance(self.table, OutlinedTable)
+        return np.zeros(self.size, dtype=bool) if known else (self.solidity >= LEAST_TAPED) & ~self.has_known_shape
+
+    def in_shape(self, shape: int, model: Model) -> Designs:
+        """Return boulders that are all `taped` by the shape of this number, in the soil of a model."""
+        assert self.rocks is not None  # taped boulders are weighed
+        given = plain(self.table)._replace(rho_b=self.rocks, K_epsilon=self.given_factors)
+        table = with_shape(given, model.resistance, model.ground, SHAPES[shape], self.solidity)
+        return self._replace(table=table, factors=self.given_factors, shape=shape)
 
     @property
     def length(self) -> np.ndarray:

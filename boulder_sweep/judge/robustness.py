@@ -105,7 +105,8 @@ def can_be_asked(sweep: Sweep) -> bool:
     They know boxes, plain dry soil and corrected readings, and are not asked of assumed rock.
     """
     model = sweep.model
-    return model.ground.is_usual and model.shape.is_box and not model.rock_assumed and model.preset == "corrected"
+    known = model.shape.is_box and not model.rock_assumed and not any(case.is_taped for case in (sweep, *sweep.cases))
+    return model.ground.is_usual and known and model.preset == "corrected"
 
 
 def meaning_of(row: Mapping[str, Any]) -> str | None:

@@ -121,7 +121,7 @@ FLAGS = (
         "rock_density",
         "a density that rock does not have",
         f"boulder density outside {_ROCK[0]:.0f} to {_ROCK[1]:.0f} kg/m³",
-        "The granites tested have 2596 and 3074 kg/m³; lighter sound rock is rare.",
+        "The granites tested have 2596 and 3074 kg/m³; lighter sound rock, some limestones, is rare.",
     ),
     Flag(
         "soil_pair",

@@ -10,7 +10,7 @@ for the page of a report:
 5. ``fail / slower_truck``: a shallow boulder that slides would stop the truck, but a slower truck overturns it
    (`boulder_kernels.rules.SLOWER_SPEEDS`).
 6. ``undecided / foot``: the foot of the boulder is rounded, on which the soil also lifts, or small.
-7. ``undecided / shape``: by its mass the boulder fills less than 95 % of the box of its sides, and has no profile.
+7. ``undecided / shape``: by its mass the boulder fills less than 40 % of the box of its sides, and has no profile.
 8. ``undecided / crush``: the front of the truck is crushed by more than its length; the model no longer describes it.
 9. ``undecided / override``: the boulder overlaps the bumper by less than is required; the truck may ride over.
 10. ``undecided / horizon``: the simulated time ended, the longer one of such rows too, without proof that rotation and

@@ -16,7 +16,7 @@ from boulder_kernels.layered import PRESSURE_SLOPE
 from boulder_kernels.rules import OF_CRITERION, RULES
 from boulder_kernels.table import is_paired
 from boulder_sweep.columns import INPUTS, OPTIONAL_INPUTS, OUTCOMES, TO_BUILD
-from boulder_sweep.designs import LEAST_SOLIDITY, MOST_SOLIDITY, REASONS
+from boulder_sweep.designs import LEAST_SOLIDITY, LEAST_TAPED, MOST_SOLIDITY, REASONS
 from boulder_sweep.investigation import family_bounds
 from boulder_sweep.judge.accuracy import finer_controls, reported_step_s
 from boulder_sweep.judge.inputs import SOURCES
@@ -62,6 +62,11 @@ OUTCOME_WORDS = {
 REFUSED_AT = ("", "embedment_depth_m", "hood_height_m", "impact_height_m", "boulder_mass_kg", "")
 """The inputs beside which the page says why a design cannot be computed, in the order of `REASONS`; of an unusual value
 it says so in its note."""
+TAPED = (
+    "by its mass the boulder is no box, and this page does not know the shapes that it may have: sweep simulate and "
+    "sweep need judge it by the worst of them; map and tables here are theirs"
+)
+"""Why the page simulates no boulder as taped and weighed; the last of its refusals."""
 FIXED_SIDES = ["boulder_length_m", "boulder_width_m", "boulder_height_m"]
 """Sides that the reader cannot change where the boulder is a stone with a profile of its own."""
 OF_THE_PAGE = {"L": "reach_m", "bed_offset": "bed_offset_m"}
@@ -111,7 +116,7 @@ def page_data(
         "start": dict(start),
         "soil": _soil(law, ground, shape),
         "face": isinstance(settings["inputs"]["impact_height_m"], str),
-        "refusals": [*zip(REASONS, REFUSED_AT, strict=True)],
+        "refusals": [*zip(REASONS, REFUSED_AT, strict=True), (TAPED, "boulder_mass_kg")],
         "refused": {"outside": OUTSIDE, "empty": EMPTY, "not_a_number": NOT_A_NUMBER},
         "front": {
             "calibrated": settings["model"]["calibrated_crush_m"],
@@ -127,6 +132,7 @@ def page_data(
             "fixed": FIXED_SIDES if shape.taper is None else [],
             "rock_assumed": settings["model"].get("rock_assumed", False),
             "least_solidity": LEAST_SOLIDITY,
+            "least_taped": LEAST_TAPED,
             "most_solidity": MOST_SOLIDITY,
         },
         "words": REASON_WORDS,

@@ -11,8 +11,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from boulder_sweep.columns import BOULDER_MASS, WAY_OUT
-from boulder_sweep.designs import LEAST_SOLIDITY, MOST_SOLIDITY, SIDES
+from boulder_sweep.columns import BOULDER_MASS, SHAPES, WAY_OUT
+from boulder_sweep.designs import LEAST_SOLIDITY, LEAST_TAPED, MOST_SOLIDITY
 from boulder_sweep.investigation import api_curve, off_families, terzaghi_curve
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.distributions import BOUNDED, Distribution, SetDistributions
@@ -260,7 +260,7 @@ def _remarks(sweep: Sweep, written: Mapping[str, str]) -> Iterator[tuple[str, st
         off = _without_partner(_outside(ratio, BY_NAME["embedment_ratio"]))
         if off.any():
             yield "site.embedment_depth", f"depth over height: {_unusual('embedment_ratio', ratio[off])}"
-    yield "boulder.mass", _on_mass(values, groups, sweep.model)
+    yield "boulder.mass", _on_mass(sweep)
     yield "vehicle.spring", _off_front(values, groups, sweep.model.calibrated_crush_m)
     if not sweep.model.shape.stands_flat:
         foot = "its foot is less than half as wide or long as the largest section"
@@ -277,25 +277,22 @@ def _remarks(sweep: Sweep, written: Mapping[str, str]) -> Iterator[tuple[str, st
     yield "soil.subgrade_reaction", _off_families(angle, reaction) or _mixed_families(angle, reaction)
 
 
-def _on_mass(values: Mapping[str, np.ndarray], groups: list[dict[str, np.ndarray]], model: Model) -> str:
-    """Return what is assumed of boulders that were weighed, and whether no box stands for them."""
-    if BOULDER_MASS not in values:
+def _on_mass(sweep: Sweep) -> str:
+    """Return what is assumed of boulders that were weighed, and what stands for those that are no boxes."""
+    if BOULDER_MASS not in sweep.plan.given:
         return ""
-    names = (BOULDER_MASS, "boulder_density_kg_m3", *SIDES)
-    listed = next((group for group in groups if len(group) > 1 and BOULDER_MASS in group), {})
-    if all(name in listed or len(values[name]) == 1 for name in names):
-        mass, rock, *sides = (values[name] for name in names)
-        solidity = mass / (rock * np.prod(np.broadcast_arrays(*sides), axis=0))
-    else:
-        ends = [(float(values[name].min()), float(values[name].max())) for name in names]
-        solidity = np.array([ends[0][i] / math.prod(end[1 - i] for end in ends[1:]) for i in range(2)])
-    fills = describe_share(solidity.min(), solidity.max())
-    words = [f"by its mass a boulder fills {fills} of the box of its length, width and height"]
-    if model.rock_assumed:
+    low, high = sweep.solidity
+    words = [f"by its mass a boulder fills {describe_share(low, high)} of the box of its length, width and height"]
+    if sweep.model.rock_assumed:
         words[0] += f" if its rock has {ROCK_KG_M3:g} kg/m^3, which is assumed: give boulder.density. No pass is robust"
-    if solidity.min() < LEAST_SOLIDITY and model.shape.is_box:
-        words.append(f"below {LEAST_SOLIDITY:.0%} designs are undecided (shape): {WAY_OUT['shape']}")
-    return "; ".join(words) if len(words) > 1 or model.rock_assumed else ""
+    if sweep.is_taped:
+        family = ", ".join(SHAPES).replace("_", " ")
+        words.append(f"below {LEAST_SOLIDITY:.0%} it is judged by the worst of these shapes: {family}")
+        if low < LEAST_TAPED:
+            words.append(f"below {LEAST_TAPED:.0%} designs are undecided (shape): {WAY_OUT['shape']}")
+    if high > 1.0 and sweep.model.shape.is_box:
+        words.append("more than 100 % is the rounding of the tape: the boulder is a box of the mass as weighed")
+    return "; ".join(words) if len(words) > 1 or sweep.model.rock_assumed else ""
 
 
 def describe_share(low: float, high: float) -> str:

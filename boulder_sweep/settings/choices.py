@@ -30,6 +30,7 @@ from boulder_sweep.settings.shape import ProfilePoint, Scan, Shape
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence, block_of
 from boulder_sweep.settings.units import UnitError, factor
 from boulder_sweep.settings.values import NumberError, quoted, read_count, read_entries, read_single, split_number
+from boulder_sweep.stones.rock import ROCKS
 
 MOST_LAYERS = 100
 MOST_POINTS = 100
@@ -210,6 +211,28 @@ def unfold_scan(boulder: Mapping, folder: Path) -> tuple[Scan, list[str]]:
     boulder.entries["profile"] = Entry("profile", position, Sequence(position, points))
     said = Scan(words["file"], scan.sha256, standing.up, standing.facing, standing.cut_m)
     return said, scan.surface_cautions
+
+
+def unfold_rock(boulder: Mapping) -> None:
+    """Give a boulder the density of its kind of rock: a triangular distribution over the published range.
+
+    Parameters
+    ----------
+    boulder
+        The block of the boulder, changed in place.
+
+    Raises
+    ------
+    LeafError
+        There is no such rock, or a density beside it.
+    """
+    entry = boulder.entries["rock"]
+    if "density" in boulder.entries:
+        raise wrong(boulder.entries["density"].position, "density follows from boulder.rock; remove one of them")
+    word = _one_of(entry.value, tuple(ROCKS), BY_NAME["rock"].kind)
+    texts = (f"{value:g} kg/m^3" for value in ROCKS[word])
+    spread = {"distribution": "triangular", **dict(zip(("low", "mode", "high"), texts, strict=True))}
+    boulder.entries["density"] = Entry("density", entry.position, block_of(entry.position, spread))
 
 
 def _read_scan_words(node: Node) -> dict[str, str]:

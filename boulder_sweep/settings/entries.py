@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from boulder_sweep.settings import fields
-from boulder_sweep.settings.choices import SIDES, read_setting, shares_of, sides_of, unfold_scan
+from boulder_sweep.settings.choices import SIDES, read_setting, shares_of, sides_of, unfold_rock, unfold_scan
 from boulder_sweep.settings.distributions import Distribution, Input, SetDistributions, read_input
 from boulder_sweep.settings.log_layers import Log
 from boulder_sweep.settings.problems import Mistakes, Position, ProblemList, shorten, unknown_word, wrong
@@ -110,6 +110,9 @@ class Entries:
             approaches = unfold_approaches(self.root, mistakes)
         self.derived |= {APPROACH: approaches} if approaches else {}
         boulder = self.root.get("boulder")
+        if isinstance(boulder, Mapping) and "rock" in boulder.entries:
+            with self.reporting("boulder.rock", ["boulder.density"]):
+                unfold_rock(boulder)
         if isinstance(boulder, Mapping) and "scan" in boulder.entries:
             self.given.add("boulder.scan")
             folder = self._folder_of(boulder.entries["scan"].position)

@@ -62,7 +62,7 @@ INPUTS: tuple[Field, ...] = (
         "boulder.density",
         "boulder_density_kg_m3",
         _DENSITY,
-        Usual(2400.0, 3074.0, "rock; a bare number is in kg/m^3, not in t/m^3 or pcf"),
+        Usual(2000.0, 3074.0, "rock; a bare number is in kg/m^3, not in t/m^3 or pcf"),
         held=True,
         also=("rho", "rho_b", "unit_weight"),
     ),

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from boulder_sweep.columns import RATINGS
 from boulder_sweep.settings.shape import ProfilePoint, Scan, Shape, tapered
+from boulder_sweep.stones.rock import ROCKS
 
 PRESETS = ("as_printed", "corrected")
 
@@ -370,7 +371,15 @@ class Model:
         "",
         "scan of the stone, from which its profile and, with its mass, its density follow",
         None,
-        also=("mesh", "rock", "stone"),
+        also=("mesh", "stone"),
+    )
+    rock: str | None = setting(
+        "boulder.rock",
+        "",
+        "kind of rock, in place of its density: an uncertain input by published ranges",
+        None,
+        choices=tuple(ROCKS),
+        kind="a kind of rock",
     )
     rock_assumed: bool = False
     """Whether the density of the rock is `ROCK_KG_M3` because the file gives the mass of the boulders only."""

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from boulder_sweep.designs import UNUSUAL, DesignBlock, DesignPlan, Label, Source
+from boulder_sweep.columns import BOULDER_MASS
+from boulder_sweep.designs import LEAST_SOLIDITY, SIDES, UNUSUAL, DesignBlock, DesignPlan, Label, Source
 from boulder_sweep.settings.distributions import Distribution, SetDistributions
 from boulder_sweep.settings.fields import ALLOW_UNUSUAL, BY_NAME, HELD, INPUTS
 from boulder_sweep.settings.model import CLOSED_FORM, Criterion, Model, SolverSettings
@@ -304,6 +305,30 @@ class Sweep:
             **({SECTION: given} if (given := self.heading.given()) else {}),
             **({UNITS: self.units} if self.units != SYSTEMS[0] else {}),
         }
+
+    @cached_property
+    def solidity(self) -> tuple[float, float]:
+        """Least and largest share of the box of its sides that a boulder fills by its mass; 1 where none is given."""
+        groups = [axis.columns for axis in self.axes] + ([] if self.table is None else [self.table.columns])
+        values = {name: np.array([value]) for name, value in self.constants.items()}
+        for group in groups:
+            values |= group
+        if BOULDER_MASS not in values:
+            return 1.0, 1.0
+        names = (BOULDER_MASS, "boulder_density_kg_m3", *SIDES)
+        listed = next((group for group in groups if len(group) > 1 and BOULDER_MASS in group), {})
+        if all(name in listed or len(values[name]) == 1 for name in names):
+            mass, rock, *sides = (values[name] for name in names)
+            fills = mass / (rock * np.prod(np.broadcast_arrays(*sides), axis=0))
+            return float(fills.min()), float(fills.max())
+        ends = [(float(values[name].min()), float(values[name].max())) for name in names]
+        low, high = (ends[0][i] / math.prod(end[1 - i] for end in ends[1:]) for i in range(2))
+        return low, high
+
+    @property
+    def is_taped(self) -> bool:
+        """Whether a family of shapes stands for some boulder, see `boulder_sweep.stones.taped`."""
+        return self.model.shape.is_box and self.solidity[0] < LEAST_SOLIDITY
 
     def _inputs(self) -> dict[str, Any]:
         """Return the values of the inputs by column name, lists where they vary."""

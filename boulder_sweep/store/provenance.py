@@ -23,7 +23,7 @@ from boulder_sweep.settings.sweep import SHOWN
 
 PREFIX = "boulder_sweep."
 """Prefix of this package's entries in the metadata of a file."""
-FORMAT = 2
+FORMAT = 3
 """Of tables and of files of answers: grows by one whenever a column or an entry comes, goes or means something else."""
 _PACKAGES = ("boulder-sweep", "numpy", "numba", "llvmlite", "pyarrow")
 _PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
@@ -35,7 +35,7 @@ _DECIDING_SOURCES = (
     "investigation.py",
     "judge/*.py",
     *(f"settings/{name}.py" for name in ("distributions", "fields", "model", "shape")),
-    "stones/rock.py",
+    *(f"stones/{name}.py" for name in ("rock", "taped")),
 )
 """Modules, in addition to the kernels, whose code determines the rows: of settings and stones what others import."""
 _JSON = {"format", "settings", "readings", "control", "accuracy", "versions"} | {

@@ -13,8 +13,10 @@ import numpy as np
 
 from boulder_kernels.design import G, wedge_slope
 from boulder_kernels.outlined import FAR, HEIGHT, NEAR
+from boulder_sweep.columns import SHAPES
 from boulder_sweep.impact.history import soil_profile
 from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
+from boulder_sweep.stones.taped import taped_profiles
 
 if TYPE_CHECKING:
     from boulder_sweep.impact.trajectory import Trajectory
@@ -124,12 +126,29 @@ class SideView:
             SceneItem("line", "limit", ((line, 0.0), (line, w.top - 0.75))),
             SceneItem("text", "limit", ((line + 0.06, w.top - 0.8),), f"{rating}: cargo bed\nmust stop here"),
             SceneItem("line", "initial", (*((x, z - design.d) for x, z in outline), (outline[0][0], -design.d))),
+            *self._other_shapes(),
             SceneItem("line", "scale", ((x, y), (x + length, y))),
             SceneItem("text", "scale", ((x, y + 0.08),), f"{unit / 1e3:.0f} kN"),
             SceneItem("text", "contact_force", ((x, y + 0.80),), "force of the vehicle"),
             SceneItem("text", "soil_force", ((x, y + 0.58),), f"soil, each 1/{SLICES} of its depth"),
             SceneItem("text", "weight", ((x, y + 0.36),), "weight of the boulder"),
         ]
+
+    def _other_shapes(self) -> list[SceneItem]:
+        """Return the other shapes that a boulder as taped and weighed may have, where they stand at first."""
+        row, design = self.trajectory.row, self.trajectory.motion.design
+        sizes, items = (design.H, design.W, design.L, design.L), []
+        for shape in SHAPES if row["shape"] is not None else ():
+            if shape != row["shape"]:
+                outline = taped_profiles(shape, np.array([row["solidity"]]))[0] * sizes
+                heights = outline[:, HEIGHT] - design.d
+                struck = np.interp(design.e, heights, outline[:, NEAR])
+                near, far = (
+                    [*zip(x.tolist(), heights.tolist(), strict=True)]
+                    for x in (struck - outline[:, NEAR], struck + outline[:, FAR])
+                )
+                items.append(SceneItem("line", "initial", (*near, *far[::-1], near[0])))
+        return items
 
     def moving(self, sample: int) -> list[SceneItem]:
         """Return what moves, at one sample: soil wedge, boulder, truck, forces."""

@@ -101,7 +101,7 @@ REASON_WORDS = {
     "crush": "the truck would be inside the boulder",
     "override": "it hardly reaches the bumper",
     "foot": "a rounded foot is not modelled",
-    "shape": "no box stands for its shape",
+    "shape": "no known shape stands for it",
     "slower_truck": "a slower truck overturns it",
     "validity": "the model does not hold for it",
     "error": "too near to a limit for the accuracy",
@@ -125,6 +125,8 @@ def verdict_line(trajectory: Trajectory) -> str:
         details = [] if theta is None else [f"{theta:.1f}° of {limit:g}° allowed"]
         if end is not None and end > settings["solver"]["horizon_s"]:
             details.append(f"simulated for {end:.4g} s")
+    if row["shape"] is not None:
+        details.append(f"{row['shape'].replace('_', ' ')} is the worst of the shapes of its mass and sizes")
     words = (trajectory.verdict.upper(), REASON_WORDS.get(trajectory.reason, trajectory.reason), *details)
     return f"{name}: {', '.join(word for word in words if word)}"
 

@@ -27,6 +27,7 @@ from docs.studies import (
     site_data,
     soil,
     stones,
+    taped,
     validity,
     vehicle,
     wild,
@@ -115,6 +116,9 @@ CONTENTS: dict[str, Callable[[Path], str | Table]] = {
     "need-probability": answers.need_with_probability,
     "partial-factors": answers.partial_factors,
     "stone-shapes": lambda root: shapes.shapes_table(root / GRID),
+    "rocks": lambda _: taped.rocks_table(),
+    "taped-stones": lambda root: taped.taped_table(root / GRID),
+    "taped-words": lambda root: taped.taped_words(root / GRID),
     "stone-example": stones.stone_of_example,
     "stone-settings": stones.settings_of_example,
     "stone-site": stones.site_of_example,
@@ -129,5 +133,6 @@ LONG = {
     *("readings-crash-tests", "readings-grid", "readings-words", "coverage", "box-shares", "front-face"),
     *(name for name in CONTENTS if name.startswith("forms-")),
     *("grades", "wild-families", "partial-factors", "stone-shapes", "stone-site"),
+    *("taped-stones", "taped-words"),
 }
 """Blocks that take more than ten seconds, or share what does: computed again every night, not with every change."""

@@ -226,6 +226,7 @@ def _alignment(typing: Any) -> Any:
     """Align the stack of the function that this is inlined into."""
 
     def align(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """Set what LLVM is told of the function."""
         builder.function.attributes.add("nounwind")  # as it is anyway: llvmlite writes no alignment of the stack alone
         builder.function.attributes.alignstack = LINE
         return context.get_dummy_value()

@@ -11,7 +11,7 @@ A point of the boulder at (a, b) from the common centre of mass, a to the right 
 
 Soil, foot and sides are sums over as many pieces each, of which 16 are enough: parts of the soil, along which pressures
 are averaged exactly, strips of the foot that are narrower at its ends, and Gauss's points of the sides. Pieces are
-added up in one order, so that the bits are those of any processor. Every force is either the slope of one potential or
+added up in one order, so that every processor gives the same bits. Every force is either the slope of one potential or
 takes energy out of the motion.
 """
 
@@ -305,7 +305,7 @@ class Element(NamedTuple):
     near: float
     """And where it is pushed back [N]."""
     turning: float
-    """Their moment about the common centre of mass, that of the lift included [N m]."""
+    """Moment of these and of the lift about the common centre of mass [N m]."""
     lift: float
     """Vertical force [N]."""
     energy: float

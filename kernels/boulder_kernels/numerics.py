@@ -182,6 +182,7 @@ def _room_for_sums(typing: Any) -> Any:
     """Return where there is room for partial sums on the stack, free again when the function returns; all zero."""
 
     def allocate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """Reserve the room once, at the beginning of the function."""
         numbers = ir.ArrayType(ir.DoubleType(), 2 * WIDTH)
         room = cgutils.alloca_once(builder, numbers)
         builder.store(ir.Constant(numbers, None), room)

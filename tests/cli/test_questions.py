@@ -196,8 +196,9 @@ vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*
 
 @pytest.fixture
 def weighed(tmp_path):
-    """A stone that fills less than 95 % of the box of its sides."""
-    (tmp_path / "weighed.yaml").write_text(AS_WEIGHED, encoding="utf-8")
+    """A stone that fills less than 40 % of the box of its sides, by a density that is a mistake."""
+    text = AS_WEIGHED.replace("mass: 23.5 t", "mass: 23.5 t, density: 6500 kg/m^3")
+    (tmp_path / "weighed.yaml").write_text(text, encoding="utf-8")
     return tmp_path / "weighed.yaml"
 
 
@@ -209,7 +210,7 @@ def test_a_stone_whose_shape_is_not_known_is_undecided_and_no_failure(sweep, wei
     out = sweep("uncertainty", weighed, "-q")[1]
     assert re.search(r"^undecided +0\.0000 +0\.0000 +1\.0000 +1\.0000 ", out, re.MULTILINE)
     assert "not decided: undecided (shape)" in out
-    assert "undecided (shape): the boulder fills less than 95 %" in out
+    assert "undecided (shape): by its mass the boulder fills less" in out
     known = ("--set", "boulder.density=2485 kg/m^3")
     row = json.loads(sweep("uncertainty", weighed, "--json", "-q", *known)[1])["rows"][0]
     assert (row["p_pass"], row["p_undecided"], row["p_undecided_reason"]) == (1.0, 0.0, None)
@@ -222,7 +223,7 @@ def test_a_need_that_nothing_decides_names_the_reason(sweep, weighed, words):
         words = (*words, "--at", "mean")
     out = sweep("need", weighed, "-q", "--notes", *words)[1]
     assert "undecided: no value is known to pass" in out
-    assert "undecided (shape): the boulder fills less than 95 %" in out
+    assert "undecided (shape): by its mass the boulder fills less" in out
     assert "blocked" not in out
     assert "another boulder" not in out
 
@@ -373,3 +374,27 @@ def test_where_something_qualifies_nothing_is_asked_next(sweep):
     _, out, _ = sweep("need", CONFIGS / "site.yaml", "-q")
     assert suggested(out) == []
     assert "sweep " not in out
+
+
+YARD = """stone,boulder_length_cm,boulder_width_cm,boulder_height_cm,boulder_mass_t
+deep,150,150,300,13.2
+flat,160,160,120,5.2
+good,170,180,280,19.8
+"""
+
+
+def test_a_yard_of_taped_stones_is_sorted_by_depth_and_says_which_serve(sweep, tmp_path):
+    (tmp_path / "yard.csv").write_text(YARD, encoding="utf-8")
+    (tmp_path / "yard.yaml").write_text(
+        """table: yard.csv
+boulder: {density: 2650 kg/m^3}
+site: {embedment_depth: 1 m}
+soil: {density: 1860 kg/m^3, friction_angle: 38 deg, subgrade_reaction: 60 MN/m^3}
+vehicle: {mass: 15000 lb, speed: 20 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
+""",
+        encoding="utf-8",
+    )
+    _, out, _ = sweep("need", tmp_path / "yard.yaml", "-q", "--margin", "0")
+    assert "2 of the 3 stones serve at this site: good, deep" in out
+    places = [out.index(f"{name} ", out.index("stone  design")) for name in ("good", "deep", "flat")]
+    assert places == sorted(places)

@@ -84,10 +84,10 @@ def test_pass(status):
 def test_no_contact_fails_without_any_value():
     row = judged(not_simulated(Status.NO_CONTACT))
     assert only(row) == ("fail", "no_contact")
-    for name in ("rating", "robustness", "stands_under"):
+    for name in ("rating", "shape", "robustness", "stands_under"):
         assert row[name][0] == -1
     for name in OUTCOME_COLUMNS[2:]:
-        if name not in ("rating", "overlap_m", "solidity", "validity", "robustness", "stands_under"):
+        if name not in ("rating", "overlap_m", "solidity", "shape", "validity", "robustness", "stands_under"):
             assert np.isnan(row[name][0]), name
 
 

@@ -19,7 +19,7 @@ vehicle: {{mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN
     ("boulder", "heaviest"),
     [
         ("mass: 24.5 t", True),
-        ("density: 2600 kg/m^3, mass: 20 t", True),
+        ("density: 2600 kg/m^3, mass: 9 t", True),
         ("foot: rounded, density: 2600 kg/m^3", False),
     ],
 )
@@ -38,3 +38,15 @@ def test_the_simulator_judges_weighed_boulders_and_rounded_feet(boulder, heavies
         (refused,) = page.evaluate("page.simulator.rows([{ ...page.design, boulder_mass_kg: 3e4 }])")
         assert refused["reason"] == "boulder is heavier than a solid box of its size and rock"
     assert f"Foot: {sweep.model.foot}" in page.content()
+
+
+def test_the_simulator_refuses_a_boulder_as_taped_in_words(tmp_path, opened):
+    """Its row in the command is the worst of several shapes, which the page does not know."""
+    sweep = load_text(FILE.format(boulder="density: 2600 kg/m^3, mass: 20 t"), Path("stone.yaml"))
+    page = opened(write_explorer(sweep, 0, tmp_path / "stone.html"))
+    (refused,) = page.evaluate("page.simulator.rows([page.design])")
+    assert refused["verdict"] == "error"
+    assert "this page does not know the shapes" in refused["reason"]
+    assert "this page does not know the shapes" in page.inner_text("body")
+    (box,) = page.evaluate("page.simulator.rows([{ ...page.design, boulder_mass_kg: 24500 }])")
+    assert box["verdict"] == "pass"

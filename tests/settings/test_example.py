@@ -155,7 +155,7 @@ def test_a_given_impact_height_takes_the_place_of_equation_9(load_with):
 
 def test_register_of_columns():
     assert [spec.name for spec in COLUMNS] == ["design_id", *INPUT_COLUMNS, *OUTCOME_COLUMNS]
-    assert len(COLUMNS) == 1 + 17 + 21
+    assert len(COLUMNS) == 1 + 17 + 22
     assert list(BY_NAME) == [spec.name for spec in (*COLUMNS, *OPTIONAL_INPUTS, *TO_BUILD)]
     assert all(spec.meaning for spec in COLUMNS)
     endings = {"m": "_m", "kg": "_kg", "deg": "_deg", "s": "_s", "kN": "_kN", "m/s": "_m_s"}

@@ -141,15 +141,16 @@ class Simulator {
     const exposed = inputs.boulder_height_m - inputs.embedment_depth_m;
     const [bumper, hood] = [inputs.bumper_height_m, inputs.hood_height_m];
     const impact = this.data.face ? 0.5 * (Math.min(exposed, hood) + bumper) : inputs.impact_height_m;
-    const { flat_foot, least_solidity, most_solidity, filled, profile } = this.data.boulder;
+    const { flat_foot, least_solidity, least_taped, most_solidity, filled, profile } = this.data.boulder;
     const solidity = solidityOf(inputs, filled);
+    const known_shape = Number(profile.length > 0 || solidity >= least_solidity);
     let refused = 0;
+    if (!known_shape && solidity >= least_taped) refused = this.data.refusals.length - 1;
     if (solidity > most_solidity) refused = 4;
     if (!this.data.face && impact > exposed * (1 + 1e-12) && exposed > bumper) refused = 3;
     if (hood < bumper) refused = 2;
     if (exposed <= 0) refused = 1;
     const [refusal, at] = this.data.refusals[refused];
-    const known_shape = Number(profile.length > 0 || solidity >= least_solidity);
     const reach_m = reachOf(this.outline(inputs), inputs.embedment_depth_m + impact);
     const shape = { solidity, flat_foot, known_shape, reach_m };
     const { angle, least, most } = this.data.rules.families;
