@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import heapq
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +24,7 @@ from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.designs import SIDES
 from boulder_sweep.judge.quantities import EXCAVATED
 from boulder_sweep.judge.validity import FLAGS, SEPARATOR
-from boulder_sweep.settings.fields import EMBEDMENT
+from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -38,6 +39,8 @@ ANSWER = ("fails_at", "passes_at", "found", "passes_within")
 """Columns of an answer, beside its value, which a design does not have."""
 LESS = 0.05
 """Steps of the margin in which the nearest design is asked what it has."""
+Rows = list[dict[str, Any]]
+"""Rows of a table, by column."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +106,7 @@ class Nearest:
     Attributes
     ----------
     rows : list of dict
-        Its rows of the answer, where nothing passes those at the last value tried.
+        Its rows of the answer, where nothing passes those at the last value tried; of a run those of the design.
     design : Design or None
         It at the depth at which it has the most of what was asked for; None where it does not pass even without a
         margin.
@@ -121,6 +124,16 @@ class Nearest:
     margin: float
     robust: bool
     changes: dict[str, Design]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        return {
+            "rows": self.rows,
+            "design": None if self.design is None else self.design.to_dict(),
+            "margin": self.margin,
+            "robust": self.robust,
+            "changes": {name: design.to_dict() for name, design in self.changes.items()},
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +153,8 @@ class Recommendation:
         the grade of the design, and of conditions: soils and vehicles, combined.
     nearest : Nearest or None
         What comes nearest where none qualifies, of depths without a probability.
+    of_run : bool
+        Whether it is one of the designs of a run, whose depths were given; a boulder is then one of these designs.
     """
 
     prefer: str
@@ -150,6 +165,7 @@ class Recommendation:
     alike: int
     conditions: int
     nearest: Nearest | None = None
+    of_run: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data."""
@@ -161,7 +177,43 @@ class Recommendation:
             "qualified": self.qualified,
             "alike": self.alike,
             "conditions": self.conditions,
+            "nearest": None if self.nearest is None else self.nearest.to_dict(),
         }
+
+    @classmethod
+    def of_dict(cls, entries: Mapping[str, Any], checked: Callable[[Rows], Rows]) -> Recommendation:
+        """Return what `to_dict` returned.
+
+        Parameters
+        ----------
+        entries
+            Plain data.
+        checked
+            Returns rows as they are, or raises a ValueError because they are none of the table.
+
+        Raises
+        ------
+        LookupError, TypeError, ValueError
+            An entry is missing, or no recommendation has it.
+        """
+
+        def design(own: Mapping[str, Any]) -> Design:
+            read = Design(checked(own["rows"]))
+            read.to_dict()  # what words take from it is there
+            return read
+
+        def by_name(own: Mapping[str, Any], known: Mapping[str, Any]) -> dict[str, Design]:
+            return {name: (known[name], design(one))[1] for name, one in own.items()}
+
+        best, near = entries["design"], entries["nearest"]
+        nearest = None
+        if near is not None:
+            built = None if near["design"] is None else design(near["design"])
+            margin, robust = float(near["margin"]), bool(near["robust"])
+            nearest = Nearest(checked(near["rows"]), built, margin, robust, by_name(near["changes"], BY_NAME))
+        counts = [int(entries[name]) for name in ("boulders", "qualified", "alike", "conditions")]
+        others, known = by_name(entries["others"], PREFERENCES), {name: name for name in PREFERENCES}
+        return cls(known[entries["prefer"]], None if best is None else design(best), others, *counts, nearest)
 
 
 def recommended(asked: Question | LightestQuestion, table: pa.Table, prefer: str) -> Recommendation | None:
