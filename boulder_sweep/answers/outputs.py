@@ -213,7 +213,7 @@ class AnswerFile:
         try:
             entries = json.loads(self._recommended)
             return None if entries is None else Recommendation.of_dict(entries, self._rows_of)
-        except (LookupError, TypeError, AttributeError, ValueError, OverflowError, pa.ArrowException) as problem:
+        except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError) as problem:
             what = f"{self.path} is damaged; write it again with `sweep {self.kind}`"
             raise self._refusal(f"{what} (its recommendation: {shorten(str(problem))})") from None
 

@@ -80,8 +80,8 @@ def key_words(need: Need) -> str:
     return f"{'largest' if need.key.most else 'least'} {name}"
 
 
-def need_sentences(rows: ResultRows, need: Need) -> tuple[list[Sentence], list[Named]]:
-    """Return the question with how many rows have an answer, why others have none, and the governing answer."""
+def need_sentences(rows: ResultRows, need: Need) -> tuple[list[Sentence], Named]:
+    """Return how many rows have an answer, why others have none, and where nothing is recommended the governing one."""
     answers = need.arrow[need.key.answer].to_numpy()
     has_answer, total = ~np.isnan(answers), len(answers)
     n = int(has_answer.sum())
@@ -94,10 +94,10 @@ def need_sentences(rows: ResultRows, need: Need) -> tuple[list[Sentence], list[N
         if word in NOTHING:
             who = f"{counted(count, 'combination')}" if total > 1 else "The boulder"
             sentences.append((f"{who} {verb(count, 'do', 'does')} {NOTHING[word]}.",))
-    if not n:
-        return sentences, [Named("The last value tried", 0)]
+    if not n or need.recommendation is not None:
+        return sentences, Named("The last value tried", 0)
     sentence, named = _governing(rows, need, answers)
-    return [sentence, *sentences] if total == 1 else [sentences[0], sentence, *sentences[1:]], [named]
+    return [sentence, *sentences] if total == 1 else [sentences[0], sentence, *sentences[1:]], named
 
 
 def _terms(need: Need, rows: ResultRows) -> str:
@@ -186,7 +186,7 @@ def answers_table(rows: ResultRows) -> AnswerTable | None:
     columns += _answer_columns(file.kind, answers)
     kept = table.slice(0, MOST_LINES).to_pylist()
     more = len(table) > MOST_LINES
-    left = f"the first {MOST_LINES:,} of {len(table):,} answers; `sweep export` writes them all" if more else ""
+    left = f"the first {MOST_LINES:,} of {len(table):,} answers" if more else ""
     lines = tuple(tuple(_cell(row, name, unit, open_) for _, name, unit in columns) for row in kept)
     return AnswerTable(tuple(head for head, _, _ in columns), lines, left)
 

@@ -184,31 +184,34 @@ class ResultRows:
             values = self.axes[name][index]
         return float(values.min()), float(values.max())
 
-    def everywhere(self, holds: np.ndarray, kinds: Sequence[str]) -> np.ndarray:
-        """Return which designs hold whatever is varied of some conditions.
+    def over(self, values: np.ndarray, kinds: Sequence[str], ufunc: np.ufunc) -> np.ndarray:
+        """Return for every row what a ufunc makes of all rows that differ from it in nothing but some conditions.
 
         Parameters
         ----------
-        holds : ndarray of bool, shape ``self.shape``
-            Whether a design holds in its own row.
+        values : ndarray, shape ``self.shape``
+            A value of every row.
         kinds
             Conditions of `CONDITIONS`.
+        ufunc
+            Takes two values: the least, the greatest, the sum.
 
         Returns
         -------
-        ndarray of bool, shape ``self.shape``
-            Whether all rows hold that differ from a row in nothing else.
+        ndarray, shape ``self.shape``
+            The same in all of these rows.
         """
         over = [name for name in self.varying() if condition_of(name) in kinds]
         if not over:
-            return holds
+            return values
         if self.axes:
             along = tuple(list(self.axes).index(name) for name in over)
-            return np.broadcast_to(holds.all(axis=along, keepdims=True), self.shape)
+            return np.broadcast_to(ufunc.reduce(values, axis=along, keepdims=True), self.shape)
         boulders = self.boulders(over)
-        held = np.ones(boulders.max() + 1, bool)
-        np.logical_and.at(held, boulders, holds)
-        return held[boulders]
+        _, first, index = np.unique(boulders, return_index=True, return_inverse=True)
+        made, others = values[first], np.setdiff1d(np.arange(len(values)), first)
+        ufunc.at(made, index[others], values[others])
+        return made[index]
 
     def siblings(self, number: int, kinds: Sequence[str]) -> np.ndarray:
         """Return the rows, in ascending order, that differ from one in nothing but some conditions."""
