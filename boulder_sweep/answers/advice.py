@@ -244,8 +244,8 @@ class _Words:
         given = self.need.sweep.plan.given
         ends = {}
         for name in ("vehicle_mass_kg", "impact_speed_m_s"):
-            values = given[name].values
-            text = quantity_text(BY_NAME[name].unit, self.units, values.min(), values.max(), digits=",.4g")
+            values, digits = given[name].values, ",.0f" if name == "vehicle_mass_kg" else ".4g"
+            text = quantity_text(BY_NAME[name].unit, self.units, values.min(), values.max(), digits=digits)
             ends[name] = text.replace(" ", NO_BREAK_SPACE)
         return f"a truck of {ends['vehicle_mass_kg']} at {ends['impact_speed_m_s']}"
 

@@ -16,7 +16,7 @@ from bokeh.resources import INLINE
 from boulder_kernels import Control, Readings
 from boulder_sweep.report.contents import held_at, page_data, reading_words, table_data, thinned
 from boulder_sweep.report.export import setting_lines
-from boulder_sweep.report.figures import curves, sketch_of, verdict_map
+from boulder_sweep.report.figures import curves, verdict_map
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import shown_settings
 from boulder_sweep.text import script_data
@@ -25,6 +25,7 @@ from boulder_sweep.views.wording import LAW_WORDS, ground_words
 if TYPE_CHECKING:
     from boulder_sweep.report.asked import AnswerTable, Sentence
     from boulder_sweep.report.rows import ResultRows
+    from boulder_sweep.report.sheet import Sheet
 
 ASSETS = Path(__file__).with_name("assets")
 SCRIPTS = ("kernel", "verdict", "simulator", "texts", "plots", "scene", "maps", "controls", "page")
@@ -49,6 +50,7 @@ def assembled(
     control: Control,
     readings: Readings,
     start: Mapping[str, float],
+    sheet: Sheet | None = None,
     sentences: Sequence[Sentence] = (),
     answers: AnswerTable | None = None,
     rows: ResultRows | None = None,
@@ -68,8 +70,10 @@ def assembled(
         How its designs are simulated.
     start
         The design with which the simulator starts, by the input columns of the table.
+    sheet
+        The first page, of a result.
     sentences
-        The answer in words.
+        What else there is to say of it.
     answers
         The answers one by one, of a file of them.
     rows
@@ -81,7 +85,7 @@ def assembled(
     notes
         Notes on these particular results.
     heading
-        Project, client, author and date, as far as given.
+        Project, client and so on, as far as given.
     units
         Units shown first, ``si`` or ``us``.
 
@@ -116,6 +120,9 @@ def assembled(
     )
     return environment.get_template("page.html").render(
         title=data["title"],
+        units=units,
+        footer=_css_text(" · ".join([*dict.fromkeys([heading.get("project", data["title"]), data["title"]]), *_origin(facts)])),
+        sheet=sheet,
         sentences=sentences,
         answers=answers,
         panels=panels,
@@ -127,7 +134,6 @@ def assembled(
         facts=facts,
         notes=notes,
         heading=heading,
-        sketch=sketch_of(chosen[0]["inputs"], settings) if chosen else None,
         settings=settings,
         lines=setting_lines(shown_settings(settings, units)),
         readings=reading_words(settings),
@@ -142,6 +148,18 @@ def assembled(
         library=library,
         policy=_policy(library, script),
     )
+
+
+def _origin(facts: Sequence[tuple[str, str]]) -> list[str]:
+    """Return what a footer says of the origin of the results."""
+    known = dict(facts)
+    words = (f"boulder-sweep {known[name]}" for name in known if name == "version of boulder-sweep")
+    return [*words, *(f"settings {text[:12]}" for name, text in facts if name == "hash of the settings")]
+
+
+def _css_text(text: str) -> str:
+    """Return a text as a string of a style sheet, within HTML."""
+    return "".join(one if one.isalnum() or one in " .,·-" else f"\\{ord(one):x} " for one in text)
 
 
 def _policy(*scripts: str) -> str:

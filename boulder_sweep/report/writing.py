@@ -9,6 +9,7 @@ import subprocess
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from boulder_sweep.report.answers import answer_of
 from boulder_sweep.report.asked import Named, answers_table
 from boulder_sweep.report.build import kernel
 from boulder_sweep.report.rows import MOST_ELEMENTS, inputs_of, read_rows
+from boulder_sweep.report.sheet import sheet_of
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import FOOT_WORDS, SolverSettings
 from boulder_sweep.settings.shown_units import check_system, quantity_text
@@ -81,13 +83,14 @@ def write_report(
     page
         The file, ``.html``, ``.htm`` or ``.pdf``; replaced if it exists. A PDF is printed by a Chromium on the machine.
     designs
-        Rows to be shown in full; by default those named in the answer.
+        Rows to be shown in full; by default the one that is recommended.
     units
         Units shown first, ``si`` or ``us``; the reader can switch.
     command
         Command that regenerates the page.
     heading
-        Project, client, author and date; an entry that is not given is that of the settings file.
+        Whom and what it is for; an entry that is not given is that of the settings file. The date of a PDF is today's
+        where none is given.
 
     Returns
     -------
@@ -107,28 +110,30 @@ def write_report(
     check_system(units)
     for key, text in heading.given().items():
         if wrong := wrong_with(text):
-            raise ReportError(f"--{key}: {wrong}")
+            raise ReportError(f"--{key.replace('_', '-')}: {wrong}")
     assembled = _page_maker()
     rows = read_rows(location_of(out))
     target = checked_page(page)
     if rows.finished.rows_done == 0:
         raise ReportError(f"{out} holds no finished designs yet")
     answer = answer_of(rows)
-    named = [Named(f"Design {number}", number) for number in designs] or list(answer.named) or [Named("Design 0", 0)]
     try:
-        chosen = [_shown(one, rows.row(one.number)) for one in named]
+        chosen = [_shown(Named(f"Design {number}", number), rows.row(number)) for number in designs]
     except IndexError as missing:
         raise ReportError(str(missing)) from missing
+    chosen = chosen or [_shown(answer.named, answer.row)]
     identity = rows.finished.identity
     notes = _notes_on_rules(rows.finished.judged_by)
     settings, control = identity["settings"], Control(**identity["control"])
     readings = Readings(**identity["readings"])
+    today = {"date": date.today().isoformat()} if target.suffix.lower() == ".pdf" else {}
     text = assembled(
-        heading=Heading(**{**settings.get(SECTION, {}), **heading.given()}).given(),
+        heading=Heading(**{**today, **settings.get(SECTION, {}), **heading.given()}).given(),
         settings=settings,
         control=control,
         readings=readings,
         start=chosen[0]["inputs"],
+        sheet=sheet_of(rows, answer, units),
         sentences=answer.sentences,
         answers=answers_table(rows),
         rows=rows,

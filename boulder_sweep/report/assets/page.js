@@ -11,8 +11,8 @@ const PAUSE = 150;
 const LONGEST_BLOCK_MS = 100;
 /** Screens on which legends stand below their figures; the style of the page has the same. */
 const NARROW = "(max-width: 46rem)";
-/** Width that is printed [px]: that of a sheet of A4 between its margins, less a tenth; so most pages hold what belongs together. */
-const PAPER = 612;
+/** Width and height of what is printed on a page [px]: the lesser ones of A4 and Letter between their margins, a little less. */
+const PAPER = { width: 676, height: 930 };
 
 /** The whole page: what the reader does, and what is simulated and shown for it. */
 class Page {
@@ -266,6 +266,7 @@ class Page {
 
   /** Show everything anew, in other units or colours. */
   refresh() {
+    document.documentElement.dataset.units = this.units.system;
     this.plots.recolour();
     for (const place of document.querySelectorAll(".quantity")) {
       const { value, unit } = /** @type {HTMLElement} */ (place).dataset;
@@ -372,7 +373,10 @@ class Page {
       for (const one of opened) one.open = true;
       const width = byId("live").clientWidth;
       document.documentElement.style.setProperty("--screen", `${width}px`);
-      document.documentElement.style.setProperty("--paper", String(Math.min(PAPER / width, 1)));
+      const size = Math.min(PAPER.width / width, 1);
+      document.documentElement.style.setProperty("--paper", String(size));
+      const above = document.querySelector("header")?.offsetHeight ?? 0;
+      document.documentElement.style.setProperty("--sheet", `${PAPER.height / size - above}px`);
       this.printing = true;
       this.paint();
     });

@@ -1,0 +1,247 @@
+"""The first page of a report, which can be signed: question, recommendation, drawing, limits, inputs, what is assumed.
+
+Sentences that hold units are made in both systems; numbers are `Measure`, which the page shows in either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from boulder_kernels.rules import ISLAND_SLIDE
+from boulder_sweep.answers.advice import advice, question
+from boulder_sweep.answers.recommendation import Design
+from boulder_sweep.columns import BOULDER_MASS, TO_BUILD
+from boulder_sweep.designs import SIDES
+from boulder_sweep.judge.robustness import meaning_of
+from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
+from boulder_sweep.report.answers import Answer
+from boulder_sweep.report.asked import AnswerTable, Measure
+from boulder_sweep.report.figures import Sketch, sketch_of
+from boulder_sweep.report.rows import DEPTH, ResultRows, inputs_of, label_of
+from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.settings.shown_units import SYSTEMS, quantity_text
+from boulder_sweep.settings.sweep import derived_words
+from boulder_sweep.text import counted
+from boulder_sweep.views.wording import ground_words
+
+SOIL = {
+    "friction_angle_deg": "friction angle φ′",
+    "soil_density_kg_m3": "density ρ",
+    "subgrade_reaction_MN_m3": "subgrade reaction β",
+    "strain_rate_factor": "strain rate factor",
+}
+VEHICLE = {
+    "vehicle_mass_kg": "mass",
+    "impact_speed_m_s": "speed",
+    "vehicle_spring_N_m": "spring of the front",
+    "vehicle_damper_N_s_m": "damper of the front",
+    "bumper_height_m": "bumper above ground",
+    "hood_height_m": "hood above ground",
+    "bed_offset_m": "bumper to cargo bed",
+}
+MOST_CASES = 40
+"""Most cases of soil and vehicle that are listed."""
+Cell = str | Measure
+
+
+class Words(NamedTuple):
+    """Sentences in one system of units."""
+
+    question: str
+    recommendation: tuple[str, ...]
+    """What to build; where nothing qualifies, what comes nearest."""
+    others: tuple[str, ...]
+    untested: str
+    sources: tuple[str, ...]
+    """Where inputs come from that were not given as they are."""
+    ground: str
+
+
+class Sheet(NamedTuple):
+    """What the first page shows."""
+
+    words: dict[str, Words]
+    """By system of units."""
+    qualifies: bool
+    title: str
+    sketch: Sketch
+    governs: str
+    """The case that the numbers are of; empty where there is one."""
+    checks: tuple[tuple[str, Cell, Cell, str], ...]
+    """Name, computed, allowed, and how much of it is used."""
+    build: tuple[tuple[str, Cell], ...]
+    soil: tuple[tuple[str, Cell, str], ...]
+    """Name, value, source,"""
+    vehicle: tuple[tuple[str, Cell, str], ...]
+    """and the same."""
+    grade: tuple[str, str]
+    """Of the recommended design in all cases, and what it means."""
+    cases: AnswerTable | None
+    """It in every soil and before every vehicle."""
+
+
+def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
+    """Return the first page of a result.
+
+    Parameters
+    ----------
+    rows, answer
+        The result, and what it says.
+    units
+        Units shown first, ``si`` or ``us``.
+    """
+    found, row, settings = answer.need.recommendation, answer.row, rows.settings
+    near = None if found is None or found.nearest is None else found.nearest.design
+    design = (found.design if found is not None and found.design is not None else near) or Design([row])
+    qualifies = found is not None and found.design is not None
+    several = [name for name in (*SOIL, *VEHICLE) if len({one[name] for one in design.rows}) > 1]
+    named = [name for name in answer.need.sweep.plan.labels if name in row]
+    case = [str(row[name]) for name in named] or [f"{label_of(name)} {_text(name, row[name], units)}" for name in several]
+    grade = design.grade
+    worst = next(one for one in design.rows if one["robustness"] == grade)
+    return Sheet(
+        words={system: _words(answer, settings, system) for system in SYSTEMS},
+        qualifies=qualifies,
+        title=answer.named.title,
+        sketch=sketch_of(inputs_of(row), settings, units),
+        governs=f"{' and '.join(case)}, the worst of {counted(len(design.rows), 'case')}" if case else "",
+        checks=_checks(row, settings["criterion"], answer.need),
+        build=_build(rows, row),
+        soil=_inputs(design.rows, SOIL, settings),
+        vehicle=_inputs(design.rows, VEHICLE, settings),
+        grade=(grade, meaning_of(worst) or "") if grade else ("", ""),
+        cases=_cases(design.rows, [*named, *several]) if len(design.rows) > 1 else None,
+    )
+
+
+def _words(answer: Answer, settings: Mapping[str, Any], units: str) -> Words:
+    """Return the sentences."""
+    found, said = answer.need.recommendation, advice(answer.need, units)
+    derived = tuple(f"{line[:1].upper()}{line[1:]}." for line in derived_words(settings.get("derived", {}), units))
+    ground = ground_words(settings, units) or "dry, level, the same at every depth, without cohesion"
+    asked = question(answer.need, units)
+    if found is None or found.design is None:
+        lines = said or [asked_words(answer)]
+        return Words(asked, tuple(lines), (), "", derived, ground)
+    return Words(asked, (said[0],), tuple(said[1:-1]), said[-1], derived, ground)
+
+
+def asked_words(answer: Answer) -> str:
+    """Return the first sentence of an answer that recommends nothing, its numbers in the units of the table."""
+    first = answer.sentences[0] if answer.sentences else ("Nothing is recommended.",)
+    return "".join(part if isinstance(part, str) else f"{part.value:.4g} {part.unit}" for part in first)
+
+
+def _text(name: str, value: float, units: str) -> str:
+    """Return the value of an input with its unit."""
+    return quantity_text(BY_NAME[name].unit, units, value).replace(" deg", "°")
+
+
+def _checks(row: Mapping[str, Any], criterion: Mapping[str, Any], need: Any) -> tuple[tuple[str, Cell, Cell, str], ...]:
+    """Return loads and limits of the row that governs."""
+
+    def measure(name: str, unit: str) -> Cell:
+        return "–" if row[name] is None else Measure(float(row[name]), unit)
+
+    def used(value: float | None, allowed: float) -> str:
+        return "–" if value is None else f"{100.0 * max(value, 0.0) / allowed:.0f} %"
+
+    rotation, rating, overlap = criterion["max_rotation_deg"], criterion["rating"], criterion["min_overlap_m"]
+    limit, slides = PENETRATION_LIMITS_M[rating], row["max_displacement_m"]
+    shallow = row[DEPTH] < 0.35 * row["boulder_height_m"]
+    lines: list[tuple[str, Cell, Cell, str]] = [
+        ("rotation", measure("max_rotation_deg", "deg"), Measure(rotation, "deg"), used(row["max_rotation_deg"], rotation)),
+        (
+            "displacement",
+            measure("max_displacement_m", "m"),
+            Measure(ISLAND_SLIDE, "m") if shallow else "no limit",
+            used(slides, ISLAND_SLIDE) if shallow else "–",
+        ),
+        (f"penetration, {rating}", measure("penetration_m", "m"), Measure(limit, "m"), used(row["penetration_m"], limit)),
+        (
+            "overlap with bumper, at least",
+            measure("overlap_m", "m"),
+            Measure(overlap, "m"),
+            used(overlap, row["overlap_m"]) if row["overlap_m"] else "–",
+        ),
+        ("peak force of the truck", measure("peak_force_kN", "kN"), "–", "–"),
+        ("at a height of", measure("impact_height_m", "m"), "–", "–"),
+    ]
+    if "p_pass" in row:
+        least = "–" if need.probability is None else f"≥ {100.0 * need.probability:.4g} %"
+        lines.insert(0, ("probability of passing", f"{row['p_pass']:.1%}", least, "–"))
+    return tuple(lines)
+
+
+def _build(rows: ResultRows, row: Mapping[str, Any]) -> tuple[tuple[str, Cell], ...]:
+    """Return the boulder and what it takes to build."""
+    built = [(spec.name, spec.unit) for spec in TO_BUILD]
+    mass = row.get(BOULDER_MASS) or float(rows.mass().flat[0])
+    words = dict(zip(dict(built), ("height above ground", "excavation", "backfill"), strict=True))
+    return (
+        ("length L, along the travel", Measure(row[SIDES[0]], "m")),
+        ("width W, across", Measure(row[SIDES[1]], "m")),
+        ("height H", Measure(row[SIDES[2]], "m")),
+        ("embedment d", Measure(row[DEPTH], "m")),
+        ("mass", Measure(float(mass), "kg")),
+        ("density of rock", Measure(row["boulder_density_kg_m3"], "kg/m^3")),
+        *((words[name], Measure(float(row[name]), unit)) for name, unit in built if name in row),
+    )
+
+
+def _inputs(
+    cases: Sequence[Mapping[str, Any]], names: Mapping[str, str], settings: Mapping[str, Any]
+) -> tuple[tuple[str, Cell, str], ...]:
+    """Return inputs with their values in all cases, and where they come from."""
+    lines = []
+    for name, words in names.items():
+        values, field = sorted({float(one[name]) for one in cases}), BY_NAME[name]
+        if name == "strain_rate_factor" and values == [1.0]:
+            continue
+        for value in dict.fromkeys((values[0], values[-1])):
+            first = value == values[0]
+            shown = f"{words}{', least' if first else ', largest'}" if len(values) > 1 else words
+            lines.append((shown, Measure(value, field.unit), _source(name, values, settings) if first else ""))
+    return tuple(lines)
+
+
+def _source(name: str, values: Sequence[float], settings: Mapping[str, Any]) -> str:
+    """Return where the value of an input comes from, in few words."""
+    derived = settings.get("derived", {})
+    read = {"density_low_kg_m3": "soil_density_kg_m3"}
+    of_soil = {read.get(key, key) for data in derived.get("soil", []) for key in data}
+    spread = settings.get("distributions", {}).get(name)
+    if name in of_soil:
+        source = "field readings"
+    elif name == "impact_speed_m_s" and "approach" in derived:
+        source = "approach"
+    elif BY_NAME[name].default is not None and values == [BY_NAME[name].default]:
+        source = "default"
+    else:
+        source = "given"
+    return source if spread is None else f"{source}, uncertain ({_spread(spread)})"
+
+
+def _spread(own: Mapping[str, Any]) -> str:
+    """Return how an input is spread."""
+    if own.get("cov") is not None:
+        return f"{own['kind']}, cov {own['cov']:.0%}"
+    return str(own.get("kind", "one for each"))
+
+
+def _cases(cases: Sequence[Mapping[str, Any]], names: Sequence[str]) -> AnswerTable:
+    """Return a design in all its cases as a table."""
+    outcomes = [("max_rotation_deg", "rotation", "deg"), ("penetration_m", "penetration", "m")]
+    heads = [label_of(name) for name in names] + [head for _, head, _ in outcomes]
+    chance = "p_pass" in cases[0]
+    heads += ["P(pass)"] if chance else ["margin", "second opinion"]
+    lines = []
+    for row in cases[:MOST_CASES]:
+        line: list[Cell] = [row[n] if isinstance(row[n], str) else Measure(row[n], BY_NAME[n].unit) for n in names]
+        line += ["–" if row[name] is None else Measure(row[name], unit) for name, _, unit in outcomes]
+        margin = "–" if row["margin"] is None else f"{row['margin']:.1%}"
+        line += [f"{row['p_pass']:.1%}"] if chance else [margin, row["robustness"] or row["reason"] or "–"]
+        lines.append(tuple(line))
+    left = f"the first {MOST_CASES} of {len(cases):,} cases" if len(cases) > MOST_CASES else ""
+    return AnswerTable(tuple(heads), tuple(lines), left)
