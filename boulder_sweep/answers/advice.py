@@ -375,7 +375,11 @@ class _Words:
             deep = f"{self.length(row[DEPTH], '.3f')} deep"
             never = f"passes at no depth{self.here(row)}; {deep}"
             if self.found.of_run:
-                never = f"fails in {len(failing):,} of {len(nearest.rows):,} cases {deep}" if len(nearest.rows) > 1 else f"fails {deep}"
+                never = (
+                    f"fails in {len(failing):,} of {len(nearest.rows):,} cases {deep}"
+                    if len(nearest.rows) > 1
+                    else f"fails {deep}"
+                )
             text = f"Nearest: {who} ({self.mass(row)}), which {never}: {why}."
         changes = []
         for name, one in nearest.changes.items():

@@ -211,9 +211,15 @@ class Recommendation:
             built = None if near["design"] is None else design(near["design"])
             margin, robust = float(near["margin"]), bool(near["robust"])
             nearest = Nearest(checked(near["rows"]), built, margin, robust, by_name(near["changes"], BY_NAME))
-        counts = [int(entries[name]) for name in ("boulders", "qualified", "alike", "conditions")]
-        others, known = by_name(entries["others"], PREFERENCES), {name: name for name in PREFERENCES}
-        return cls(known[entries["prefer"]], None if best is None else design(best), others, *counts, nearest)
+        boulders, qualified, alike, conditions = (
+            int(entries[name]) for name in ("boulders", "qualified", "alike", "conditions")
+        )
+        prefer, others = (
+            {name: name for name in PREFERENCES}[entries["prefer"]],
+            by_name(entries["others"], PREFERENCES),
+        )
+        chosen = None if best is None else design(best)
+        return cls(prefer, chosen, others, boulders, qualified, alike, conditions, nearest)
 
 
 def recommended(asked: Question | LightestQuestion, table: pa.Table, prefer: str) -> Recommendation | None:

@@ -183,7 +183,7 @@ class _Designs:
         return Recommendation("mass", best, others, *counts, nearest, of_run=True)
 
     def _nearest(self) -> Nearest:
-        """Return the design that passes in the most of its rows, of these a robust one, then the one with most margin."""
+        """Return the design that passes in the most of its rows, then a robust one, then the one with most margin."""
         over = self.rows.over
         share = over(self.passing.astype(float), self.kinds, np.add) / self.members
         rank = over(np.where(self.passing, self.rank, 0), self.kinds, np.maximum)

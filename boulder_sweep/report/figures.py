@@ -37,9 +37,9 @@ PARTS = {
     "soil_drag": ("soil, dragged", "#7FCFB5"),
 }
 """Energies in stacking order: word and colour."""
-LEFT, RIGHT = 4.9, 3.4
+LEFT, RIGHT = 5.3, 4.3
 """How much is drawn before and behind the boulder [m]: room for constants of the soil there, and dimensions here."""
-PLAN = 1.7, 2.6
+PLAN = 1.7, 2.3
 """Room before and behind the boulder in the plan [m]: for the arrow of the truck, and for the width."""
 BARS = {"si": (2.0, "2 m"), "us": (1.524, "5 ft")}
 """Length of the scale bar [m], and how it is called."""
@@ -238,7 +238,7 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any], units: s
     first, last = float(front.min()), float(back.max())
     beside = last + 0.35
     low = -depth / 2 if abs((ground.water_table_m or 0.0) - depth) < 2 * LINE else -depth + 0.12  # beside its words
-    far = last + 2.0
+    far = last + 2.6
     ground_ends = last + RIGHT
     # As high as the ground line lies in the elevation, so that the two are read together.
     wide, middle = ground_ends + PLAN[0] + length, (above + 0.6 - depth) / 2
@@ -246,12 +246,30 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any], units: s
         Dimension(beside, 0.0, beside, above, "above", above, beside + 0.12, above / 2 - 0.1, "start"),
         Dimension(beside, -depth, beside, 0.0, "d =", depth, beside + 0.12, low, "start"),
         Dimension(far, -depth, far, above, "H =", height, far + 0.12, max(above / 2 - 0.1, 0.2), "start"),
-        Dimension(first, above + 0.2, last, above + 0.2, "L =", length, first, above + 0.3, "start"),
+        Dimension(first, above + 0.2, last, above + 0.2, "L =", length, first + 0.15, above + 0.3, "start"),
         Dimension(-3.0, 0.0, -3.0, bumper, "bumper", bumper, -3.12, 0.12, "end"),
-        Dimension(wide - length, middle + width / 2 + 0.2, wide, middle + width / 2 + 0.2, "L =", length, wide - length,
-                  middle + width / 2 + 0.3, "start"),
-        Dimension(wide + 0.35, middle - width / 2, wide + 0.35, middle + width / 2, "W =", width, wide + 0.47,
-                  middle - 0.1, "start"),
+        Dimension(
+            wide - length,
+            middle + width / 2 + 0.2,
+            wide,
+            middle + width / 2 + 0.2,
+            "L =",
+            length,
+            wide - length + 0.15,
+            middle + width / 2 + 0.3,
+            "start",
+        ),
+        Dimension(
+            wide + 0.35,
+            middle - width / 2,
+            wide + 0.35,
+            middle + width / 2,
+            "W =",
+            width,
+            wide + 0.47,
+            middle - 0.1,
+            "start",
+        ),
     )
     tops = [0.0, *(layer.from_m for layer in ground.layers)]
     soils = [

@@ -121,7 +121,9 @@ def assembled(
     return environment.get_template("page.html").render(
         title=data["title"],
         units=units,
-        footer=_css_text(" · ".join([*dict.fromkeys([heading.get("project", data["title"]), data["title"]]), *_origin(facts)])),
+        footer=_css_text(
+            " · ".join([*dict.fromkeys([heading.get("project", data["title"]), data["title"]]), *_origin(facts)])
+        ),
         sheet=sheet,
         sentences=sentences,
         answers=answers,

@@ -12,7 +12,6 @@ from boulder_kernels.rules import ISLAND_SLIDE
 from boulder_sweep.answers.advice import advice, question
 from boulder_sweep.answers.recommendation import Design
 from boulder_sweep.columns import BOULDER_MASS, TO_BUILD
-from boulder_sweep.designs import SIDES
 from boulder_sweep.judge.robustness import meaning_of
 from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
 from boulder_sweep.report.answers import Answer
@@ -21,8 +20,6 @@ from boulder_sweep.report.figures import Sketch, sketch_of
 from boulder_sweep.report.rows import DEPTH, ResultRows, inputs_of, label_of
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.shown_units import SYSTEMS, quantity_text
-from boulder_sweep.settings.sweep import derived_words
-from boulder_sweep.text import counted
 from boulder_sweep.views.wording import ground_words
 
 SOIL = {
@@ -40,6 +37,8 @@ VEHICLE = {
     "hood_height_m": "hood above ground",
     "bed_offset_m": "bumper to cargo bed",
 }
+OPEN_IN_WORDS = "no study says what a second opinion is worth here; the design is judged by its margin alone"
+"""What a design without a grade is."""
 MOST_CASES = 40
 """Most cases of soil and vehicle that are listed."""
 Cell = str | Measure
@@ -53,9 +52,9 @@ class Words(NamedTuple):
     """What to build; where nothing qualifies, what comes nearest."""
     others: tuple[str, ...]
     untested: str
-    sources: tuple[str, ...]
-    """Where inputs come from that were not given as they are."""
     ground: str
+    governs: str
+    """The case that the numbers are of; empty where there is one."""
 
 
 class Sheet(NamedTuple):
@@ -66,8 +65,6 @@ class Sheet(NamedTuple):
     qualifies: bool
     title: str
     sketch: Sketch
-    governs: str
-    """The case that the numbers are of; empty where there is one."""
     checks: tuple[tuple[str, Cell, Cell, str], ...]
     """Name, computed, allowed, and how much of it is used."""
     build: tuple[tuple[str, Cell], ...]
@@ -97,34 +94,32 @@ def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
     qualifies = found is not None and found.design is not None
     several = [name for name in (*SOIL, *VEHICLE) if len({one[name] for one in design.rows}) > 1]
     named = [name for name in answer.need.sweep.plan.labels if name in row]
-    case = [str(row[name]) for name in named] or [f"{label_of(name)} {_text(name, row[name], units)}" for name in several]
     grade = design.grade
     worst = next(one for one in design.rows if one["robustness"] == grade)
+    means = OPEN_IN_WORDS if grade == "open" else meaning_of(worst) or ""
     return Sheet(
-        words={system: _words(answer, settings, system) for system in SYSTEMS},
+        words={system: _words(answer, design, named or several, settings, system) for system in SYSTEMS},
         qualifies=qualifies,
         title=answer.named.title,
         sketch=sketch_of(inputs_of(row), settings, units),
-        governs=f"{' and '.join(case)}, the worst of {counted(len(design.rows), 'case')}" if case else "",
         checks=_checks(row, settings["criterion"], answer.need),
         build=_build(rows, row),
         soil=_inputs(design.rows, SOIL, settings),
         vehicle=_inputs(design.rows, VEHICLE, settings),
-        grade=(grade, meaning_of(worst) or "") if grade else ("", ""),
+        grade=(grade or "", means),
         cases=_cases(design.rows, [*named, *several]) if len(design.rows) > 1 else None,
     )
 
 
-def _words(answer: Answer, settings: Mapping[str, Any], units: str) -> Words:
-    """Return the sentences."""
-    found, said = answer.need.recommendation, advice(answer.need, units)
-    derived = tuple(f"{line[:1].upper()}{line[1:]}." for line in derived_words(settings.get("derived", {}), units))
+def _words(answer: Answer, design: Design, names: Sequence[str], settings: Mapping[str, Any], units: str) -> Words:
+    """Return the sentences; the names are those of the inputs that tell cases apart."""
+    found, said, asked = answer.need.recommendation, advice(answer.need, units), question(answer.need, units)
     ground = ground_words(settings, units) or "dry, level, the same at every depth, without cohesion"
-    asked = question(answer.need, units)
+    case = ", ".join(_named(name, answer.row[name], units) for name in names)
+    governs = f"in the worst of {len(design.rows):,} cases: {case}" if case else ""
     if found is None or found.design is None:
-        lines = said or [asked_words(answer)]
-        return Words(asked, tuple(lines), (), "", derived, ground)
-    return Words(asked, (said[0],), tuple(said[1:-1]), said[-1], derived, ground)
+        return Words(asked, tuple(said) or (asked_words(answer),), (), "", ground, governs)
+    return Words(asked, (said[0],), tuple(said[1:-1]), said[-1], ground, governs)
 
 
 def asked_words(answer: Answer) -> str:
@@ -133,9 +128,12 @@ def asked_words(answer: Answer) -> str:
     return "".join(part if isinstance(part, str) else f"{part.value:.4g} {part.unit}" for part in first)
 
 
-def _text(name: str, value: float, units: str) -> str:
-    """Return the value of an input with its unit."""
-    return quantity_text(BY_NAME[name].unit, units, value).replace(" deg", "°")
+def _named(name: str, value: str | float, units: str) -> str:
+    """Return an input with its value: the name of a set, or words and a number with its unit."""
+    if isinstance(value, str):
+        return value
+    text = quantity_text(BY_NAME[name].unit, units, value).replace(" deg", "°").replace("^3", "³")
+    return f"{(SOIL | VEHICLE)[name]} {text}"
 
 
 def _checks(row: Mapping[str, Any], criterion: Mapping[str, Any], need: Any) -> tuple[tuple[str, Cell, Cell, str], ...]:
@@ -151,22 +149,32 @@ def _checks(row: Mapping[str, Any], criterion: Mapping[str, Any], need: Any) -> 
     limit, slides = PENETRATION_LIMITS_M[rating], row["max_displacement_m"]
     shallow = row[DEPTH] < 0.35 * row["boulder_height_m"]
     lines: list[tuple[str, Cell, Cell, str]] = [
-        ("rotation", measure("max_rotation_deg", "deg"), Measure(rotation, "deg"), used(row["max_rotation_deg"], rotation)),
+        (
+            "rotation",
+            measure("max_rotation_deg", "deg"),
+            Measure(rotation, "deg"),
+            used(row["max_rotation_deg"], rotation),
+        ),
         (
             "displacement",
             measure("max_displacement_m", "m"),
             Measure(ISLAND_SLIDE, "m") if shallow else "no limit",
             used(slides, ISLAND_SLIDE) if shallow else "–",
         ),
-        (f"penetration, {rating}", measure("penetration_m", "m"), Measure(limit, "m"), used(row["penetration_m"], limit)),
         (
-            "overlap with bumper, at least",
+            f"penetration of cargo bed, {rating}",
+            measure("penetration_m", "m"),
+            Measure(limit, "m"),
+            used(row["penetration_m"], limit),
+        ),
+        (
+            "overlap, at least",
             measure("overlap_m", "m"),
             Measure(overlap, "m"),
             used(overlap, row["overlap_m"]) if row["overlap_m"] else "–",
         ),
         ("peak force of the truck", measure("peak_force_kN", "kN"), "–", "–"),
-        ("at a height of", measure("impact_height_m", "m"), "–", "–"),
+        ("acting at a height of", measure("impact_height_m", "m"), "–", "–"),
     ]
     if "p_pass" in row:
         least = "–" if need.probability is None else f"≥ {100.0 * need.probability:.4g} %"
@@ -175,18 +183,13 @@ def _checks(row: Mapping[str, Any], criterion: Mapping[str, Any], need: Any) -> 
 
 
 def _build(rows: ResultRows, row: Mapping[str, Any]) -> tuple[tuple[str, Cell], ...]:
-    """Return the boulder and what it takes to build."""
-    built = [(spec.name, spec.unit) for spec in TO_BUILD]
+    """Return what the drawing does not say of the boulder, and what it takes to build."""
+    built = zip(("excavation", "backfill"), TO_BUILD[1:], strict=True)
     mass = row.get(BOULDER_MASS) or float(rows.mass().flat[0])
-    words = dict(zip(dict(built), ("height above ground", "excavation", "backfill"), strict=True))
     return (
-        ("length L, along the travel", Measure(row[SIDES[0]], "m")),
-        ("width W, across", Measure(row[SIDES[1]], "m")),
-        ("height H", Measure(row[SIDES[2]], "m")),
-        ("embedment d", Measure(row[DEPTH], "m")),
         ("mass", Measure(float(mass), "kg")),
         ("density of rock", Measure(row["boulder_density_kg_m3"], "kg/m^3")),
-        *((words[name], Measure(float(row[name]), unit)) for name, unit in built if name in row),
+        *((words, Measure(float(row[spec.name]), spec.unit)) for words, spec in built if spec.name in row),
     )
 
 
@@ -220,14 +223,14 @@ def _source(name: str, values: Sequence[float], settings: Mapping[str, Any]) -> 
         source = "default"
     else:
         source = "given"
-    return source if spread is None else f"{source}, uncertain ({_spread(spread)})"
+    return source if spread is None else f"{source}; {_spread(spread)}"
 
 
 def _spread(own: Mapping[str, Any]) -> str:
     """Return how an input is spread."""
     if own.get("cov") is not None:
-        return f"{own['kind']}, cov {own['cov']:.0%}"
-    return str(own.get("kind", "one for each"))
+        return f"cov {100.0 * own['cov']:.0f} %"
+    return f"sd {own['sd']:.3g}" if own.get("sd") is not None else str(own.get("kind", "uncertain"))
 
 
 def _cases(cases: Sequence[Mapping[str, Any]], names: Sequence[str]) -> AnswerTable:

@@ -243,11 +243,14 @@ def _notes_on_rules(judged_by: str) -> list[str]:
 
 def _general_notes(settings: Mapping[str, Any], control: Control, units: str) -> list[str]:
     """Return notes on how these designs are simulated, in the units asked for."""
-    notes = [f"{FOOT_WORDS[settings['model']['foot']].capitalize()}."]
+    notes = [f"{FOOT_WORDS[settings['model']['foot']].replace(' (boulder.foot)', '').capitalize()}."]
     if settings["model"].get("rock_assumed"):
         rock = quantity_text("kg/m^3", units, ROCK_KG_M3)
         notes.append(f"The density of the rock was not given: {rock} is assumed, and no pass is robust.")
-    notes += [f"{words}." for words in derived_words(settings.get("derived", {}), units)]
+    notes += [
+        f"Source of {words.replace('vehicle.speed', 'vehicle speed')}."
+        for words in derived_words(settings.get("derived", {}), units)
+    ]
     if taken := [_taken(name, how, settings["inputs"], units) for name, how in settings.get("taken_at", {}).items()]:
         judged = (
             "; every row of the table is judged at the means and at the other ends, too, and has the worst verdict, "

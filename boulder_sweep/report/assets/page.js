@@ -11,8 +11,10 @@ const PAUSE = 150;
 const LONGEST_BLOCK_MS = 100;
 /** Screens on which legends stand below their figures; the style of the page has the same. */
 const NARROW = "(max-width: 46rem)";
-/** Width and height of what is printed on a page [px]: the lesser ones of A4 and Letter between their margins, a little less. */
-const PAPER = { width: 676, height: 930 };
+/** Width that is printed on a page [px], and heights of A4 and Letter between their margins; a little less than there is. */
+const PAPER = { width: 676, si: 994, us: 928 };
+/** Least size of what is written beside a figure on paper [px]: 8 pt. */
+const LEAST_PX = 10.7;
 
 /** The whole page: what the reader does, and what is simulated and shown for it. */
 class Page {
@@ -376,13 +378,15 @@ class Page {
       const size = Math.min(PAPER.width / width, 1);
       document.documentElement.style.setProperty("--paper", String(size));
       const above = document.querySelector("header")?.offsetHeight ?? 0;
-      document.documentElement.style.setProperty("--sheet", `${PAPER.height / size - above}px`);
+      document.documentElement.style.setProperty("--sheet", `${PAPER[/** @type {"si" | "us"} */ (data.units)] / size - above}px`);
       this.printing = true;
+      this.plots.write(LEAST_PX / size);
       this.paint();
     });
     window.addEventListener("afterprint", () => {
       for (const one of opened) one.open = false;
       this.printing = false;
+      this.plots.write(WRITTEN);
       this.paint();
     });
     for (const button of document.querySelectorAll(".load")) {
