@@ -114,14 +114,18 @@ class _Designs:
     """
 
     def __init__(self, rows: ResultRows, passing: np.ndarray, asked: Need) -> None:
-        self.rows, self.passing = rows, passing
+        self.rows, self.passing, self.computed = rows, passing, ~rows.having(NOT_YET)
         self.kinds = tuple(kind for kind in CONDITIONS if kind in {condition_of(name) for name in rows.varying()})
         ranks = np.array([RANKS[grade or None] for grade in rows.robustness])
         self.rank = ranks[rows.codes].reshape(rows.shape)
         chances, every = rows.chances(), np.arange(len(rows.codes))
         has = np.nan_to_num(rows.margins(every), nan=-1.0) if chances is None else chances
         self.has, self.asked = has.reshape(rows.shape), asked
-        self.members = self.rows.over(np.ones(rows.shape, np.int64), self.kinds, np.add)
+        self.members = rows.over(np.ones(rows.shape, np.int64), self.kinds, np.add)
+        self.worst = rows.over(self.rank, self.kinds, np.maximum)
+        self.first = rows.over(every.reshape(rows.shape), self.kinds, np.minimum).ravel() == every
+        self.graded = chances is not None or "second_opinion" in rows.settings["model"]
+        self.tried: dict[int, Design] = {}
 
     def _count(self, held: np.ndarray) -> int:
         """Return the number of designs among rows of which a design has all or none."""
@@ -130,6 +134,8 @@ class _Designs:
     def _order(self, held: np.ndarray, prefer: str) -> list[int]:
         """Return the first rows of designs, the least by a preference first."""
         numbers = np.flatnonzero(held)
+        if not len(numbers):
+            return []
         columns = self.rows.inputs | {DEPTH: self.rows.depth()}
         design = {name: np.broadcast_to(columns[name], self.rows.shape).ravel()[numbers] for name in NEEDED}
         least = quantities_by(design, self.rows.settings) | {DEPTH: design[DEPTH]}
@@ -139,29 +145,31 @@ class _Designs:
         dug.flat[numbers] = least[EXCAVATED.name]
         least[EXCAVATED.name] = self.rows.over(dug, self.kinds, np.maximum).ravel()[numbers]
         columns_of = [least[PREFERENCES[name]] for name in (prefer, *PREFERENCES)]
-        return numbers[np.lexsort([numbers, *(np.round(values, 9) for values in reversed(columns_of))])].tolist()
+        order = np.lexsort([numbers, *(np.round(values, 9) for values in reversed(columns_of))])
+        return numbers[order][self.first[numbers[order]]].tolist()
 
     def _design(self, number: int) -> Design:
         """Return a design with all its rows, second opinions asked of those of which the run asked none."""
         read = []
-        for each in self.rows.siblings(number, self.kinds).tolist():
+        numbers = self.rows.siblings(number, self.kinds)
+        for each in numbers[self.computed.ravel()[numbers]].tolist():
             row = {**self.rows.row(each), **self.rows.to_build(each)}
             read.append({**row, "robustness": self.rows.grade(row)})
         return Design(read)
 
     def _best(self, held: np.ndarray, prefer: str) -> Design | None:
-        """Return the design of best grade that is the least by a preference; of open ones, a few are asked."""
-        tried: dict[int, Design] = {}
-        for rank in sorted({*RANKS.values()}):
-            graded = held & (self.rows.over(self.rank, self.kinds, np.maximum) == rank)
-            for number in self._order(graded, prefer) if graded.any() else ():
-                first = int(self.rows.siblings(number, self.kinds)[0])
-                if first not in tried:
-                    tried[first] = self._design(first)
-                if RANKS[tried[first].grade] <= rank or len(tried) >= MOST_ASKED:
-                    break
-            if tried:
-                return min(tried.values(), key=lambda design: RANKS[design.grade])  # the first of its grade
+        """Return the design of best grade that is the least by a preference.
+
+        Where the run asked for no second opinions, some designs are asked: one that is open may be robust.
+        """
+        robust, open_ = RANKS["robust"], RANKS["open"]
+        steps = [(self.worst <= open_, robust), (self.worst == robust, robust), (self.worst <= open_, open_)]
+        for among, rank in (*steps[self.graded :], (held, RANKS["sensitive"])):
+            for number in self._order(held & among, prefer)[:MOST_ASKED]:
+                if number not in self.tried:
+                    self.tried[number] = self._design(number)
+                if RANKS[self.tried[number].grade] <= rank:
+                    return self.tried[number]
         return None
 
     def recommended(self) -> Recommendation:
@@ -176,8 +184,11 @@ class _Designs:
             for name, design in found.items()
             if best is not None and design is not None and design.grade == best.grade and design.sizes != best.sizes
         }
-        worst = rows.over(self.rank, self.kinds, np.maximum)
-        alike = 0 if best is None else self._count(held & (worst <= RANKS[best.grade]))
+        alike = 0
+        if best is not None:
+            rank = RANKS[best.grade]
+            alike = self._count(held & (self.worst <= (rank if self.graded else max(rank, RANKS["open"]))))
+            alike -= sum(not self.graded and RANKS[design.grade] > rank for design in self.tried.values())
         counts = (self._count(np.ones(rows.shape, bool)), self._count(held), alike, int(self.members.max()))
         nearest = self._nearest() if best is None and asked.probability is None else None
         return Recommendation("mass", best, others, *counts, nearest, of_run=True)
@@ -188,7 +199,8 @@ class _Designs:
         share = over(self.passing.astype(float), self.kinds, np.add) / self.members
         rank = over(np.where(self.passing, self.rank, 0), self.kinds, np.maximum)
         has = over(self.has, self.kinds, np.minimum)
-        design = self._design(int(np.lexsort([-has.ravel(), rank.ravel(), -share.ravel()])[0]))
+        keys = (-has, rank, -share, ~self.computed)
+        design = self._design(int(np.lexsort([key.ravel() for key in keys])[0]))
         read = [{**row, "passes_at": row[DEPTH] if row["verdict"] == "pass" else None} for row in design.rows]
         passes = all(row["passes_at"] is not None for row in read)
         return Nearest(read, design if passes else None, design.margin if passes else 0.0, False, {})
