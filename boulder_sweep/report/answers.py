@@ -153,8 +153,8 @@ class _Designs:
         read = []
         numbers = self.rows.siblings(number, self.kinds)
         for each in numbers[self.computed.ravel()[numbers]].tolist():
-            row = {**self.rows.row(each), **self.rows.to_build(each)}
-            read.append({**row, "robustness": self.rows.grade(row)})
+            row = self.rows.row(each)
+            read.append({**row, **self.rows.to_build(each), "robustness": self.rows.grade(row)})
         return Design(read)
 
     def _best(self, held: np.ndarray, prefer: str) -> Design | None:

@@ -39,6 +39,8 @@ VEHICLE = {
 }
 OPEN_IN_WORDS = "no study says what a second opinion is worth here; the design is judged by its margin alone"
 """What a design without a grade is."""
+NOT_ASKED = "not asked", "second opinions are not asked of designs that are drawn at random"
+"""The same of a design with a probability."""
 MOST_CASES = 40
 """Most cases of soil and vehicle that are listed."""
 Cell = str | Measure
@@ -106,7 +108,7 @@ def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
         build=_build(rows, row),
         soil=_inputs(design.rows, SOIL, settings),
         vehicle=_inputs(design.rows, VEHICLE, settings),
-        grade=(grade or "", means),
+        grade=NOT_ASKED if "p_pass" in row else (grade or "", means),
         cases=_cases(design.rows, [*named, *several]) if len(design.rows) > 1 else None,
     )
 

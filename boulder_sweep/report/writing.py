@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from boulder_kernels import Control, Readings
+from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.accuracy import accuracy_of, control_of, readings_of
@@ -121,7 +122,8 @@ def write_report(
         chosen = [_shown(Named(f"Design {number}", number), rows.row(number)) for number in designs]
     except IndexError as missing:
         raise ReportError(str(missing)) from missing
-    chosen = chosen or [_shown(answer.named, answer.row)]
+    given = {k: value for k, value in answer.row.items() if k != BOULDER_MASS or k in rows.settings["inputs"]}
+    chosen = chosen or [_shown(answer.named, given)]
     identity = rows.finished.identity
     notes = _notes_on_rules(rows.finished.judged_by)
     settings, control = identity["settings"], Control(**identity["control"])

@@ -27,7 +27,17 @@ def test_the_map_is_that_of_the_recommended_design_in_its_worst_soil(report, res
 def test_the_section_has_its_dimensions_layers_and_water_in_the_units_chosen(tmp_path, opened):
     page = opened(reported(SITE, tmp_path, [f"soil.layers=[{LAYER}]", "soil.water_table=0.8 m"]))
     words = " ".join(page.locator(".section svg text").all_text_contents())
-    for said in ("d = 2.04", "above 1.36", "H = 3.4", "W = 1.68", "L = 1.65", "bumper 0.5", "water table 0.8", "φ′ 36", "β 40"):
+    for said in (
+        "d = 2.04",
+        "above 1.36",
+        "H = 3.4",
+        "W = 1.68",
+        "L = 1.65",
+        "bumper 0.5",
+        "water table 0.8",
+        "φ′ 36",
+        "β 40",
+    ):
         assert said in words
     sides = page.locator(".section .boulder").get_attribute("points").split()
     corners = np.array([[float(number) for number in side.split(",")] for side in sides])
