@@ -24,7 +24,7 @@ from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.designs import SIDES
 from boulder_sweep.judge.quantities import EXCAVATED
 from boulder_sweep.judge.validity import FLAGS, SEPARATOR
-from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT
+from boulder_sweep.settings.fields import EMBEDMENT
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -39,6 +39,8 @@ ANSWER = ("fails_at", "passes_at", "found", "passes_within")
 """Columns of an answer, beside its value, which a design does not have."""
 LESS = 0.05
 """Steps of the margin in which the nearest design is asked what it has."""
+CHANGES = ("impact_speed_m_s", "friction_angle_deg", HEIGHT)
+"""Inputs by which the nearest design might qualify."""
 Rows = list[dict[str, Any]]
 """Rows of a table, by column."""
 
@@ -202,15 +204,17 @@ class Recommendation:
             read.to_dict()  # what words take from it is there
             return read
 
-        def by_name(own: Mapping[str, Any], known: Mapping[str, Any]) -> dict[str, Design]:
-            return {name: (known[name], design(one))[1] for name, one in own.items()}
+        def by_name(own: Mapping[str, Any], known: tuple[str, ...]) -> dict[str, Design]:
+            if own.keys() - {*known}:
+                raise ValueError(f"{', '.join(own)}: none but {', '.join(known)} are known")
+            return {name: design(own[name]) for name in known if name in own}  # JSON keeps no order
 
         best, near = entries["design"], entries["nearest"]
         nearest = None
         if near is not None:
             built = None if near["design"] is None else design(near["design"])
             margin, robust = float(near["margin"]), bool(near["robust"])
-            nearest = Nearest(checked(near["rows"]), built, margin, robust, by_name(near["changes"], BY_NAME))
+            nearest = Nearest(checked(near["rows"]), built, margin, robust, by_name(near["changes"], CHANGES))
         boulders, qualified, alike, conditions = (
             int(entries[name]) for name in ("boulders", "qualified", "alike", "conditions")
         )
