@@ -220,7 +220,7 @@ class Recommendation:
         )
         prefer, others = (
             {name: name for name in PREFERENCES}[entries["prefer"]],
-            by_name(entries["others"], PREFERENCES),
+            by_name(entries["others"], (*PREFERENCES,)),
         )
         chosen = None if best is None else design(best)
         return cls(prefer, chosen, others, boulders, qualified, alike, conditions, nearest)

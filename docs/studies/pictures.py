@@ -106,11 +106,13 @@ def photograph(page: Path, picture: Path) -> None:
         tab.evaluate("dispatchEvent(new Event('beforeprint'))")
         tab.emulate_media(media="print")
         tab.evaluate(f"document.body.style.paddingTop = '{2 * MARGIN}px'")
-        sides = [tab.locator(place).bounding_box() for place in ("header", ".sheet")]
-        left, top = sides[0]["x"], sides[0]["y"]
-        width, height = sides[1]["width"], sides[1]["y"] + sides[1]["height"] - top
-        clip = {"x": left - MARGIN, "y": top - MARGIN, "width": width + 2 * MARGIN, "height": height + 2 * MARGIN}
-        tab.screenshot(path=picture, full_page=True, clip=clip)
+        code = """(margin) => {
+          const places = ["header", ".sheet"].map((place) => document.querySelector(place));
+          const [head, sheet] = places.map((place) => place.getBoundingClientRect());
+          const [x, y] = [head.left - margin, head.top - margin];
+          return { x, y, width: sheet.width + 2 * margin, height: sheet.bottom + margin - y };
+        }"""
+        tab.screenshot(path=picture, full_page=True, clip=tab.evaluate(code, MARGIN))
         opened.close()
 
 
