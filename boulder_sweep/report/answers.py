@@ -19,7 +19,6 @@ from boulder_sweep.answers.recommendation import PREFERENCES, RANKS, Design, Nea
 from boulder_sweep.columns import BOULDER_MASS, GRADES
 from boulder_sweep.judge.quantities import EXCAVATED, NEEDED, quantities_by
 from boulder_sweep.judge.robustness import IN_WORDS, MEANINGS, SENSITIVE_IN_WORDS
-from boulder_sweep.judge.validity import BY_FLAG
 from boulder_sweep.report.asked import Named, Sentence, capacity_sentences, listed, need_sentences, share, verb
 from boulder_sweep.report.rows import CONDITIONS, DEPTH, NOT_YET, ResultRows, condition_of, inputs_of
 from boulder_sweep.text import counted
@@ -66,8 +65,8 @@ def answer_of(rows: ResultRows) -> Answer:
         sentences, named = _counts(rows, n), Named("Design 0", 0)
     else:
         sentences, named = need_sentences(rows, need)
-        if len(rows.codes) > 1 and n:
-            sentences += [*([_grades(rows, n)] if need.probability is None else []), *_flagged(rows, n)]
+        if len(rows.codes) > 1 and n and need.probability is None:
+            sentences.append(_grades(rows, n))
     if shown is None:
         return Answer(need, rows.row(named.number), tuple(sentences), named)
     row = worst_of(shown.rows if isinstance(shown, Design) else shown)
@@ -226,19 +225,7 @@ def _counts(rows: ResultRows, n: int) -> list[Sentence]:
     ]
     if others:
         sentences.append((f"Of the others, {'; '.join(others)}.",))
-    return [*sentences, *_flagged(rows, n)]
-
-
-def _flagged(rows: ResultRows, n: int) -> list[Sentence]:
-    """Say how many of the n passes lie outside what the model was tested on."""
-    flagged = n - rows.flags.get("", 0)
-    if flagged:
-        commonest = sorted(((count, name) for name, count in rows.flags.items() if name), reverse=True)
-        most = "; ".join(f"{count:,} with {_meaning(name)}" for count, name in commonest[:3])
-        lie = verb(flagged, "lie", "lies")
-        often = ", most often:" if len(commonest) > 3 else ":"
-        return [(f"{flagged:,} of those that pass {lie} outside what the model was tested on{often} {most}.",)]
-    return []
+    return sentences
 
 
 def _grades(rows: ResultRows, n: int) -> Sentence:
@@ -272,11 +259,6 @@ def _uncertain(rows: ResultRows) -> list[Sentence]:
     first = f"{n:,} of {len(chances):,} designs {verb(n, 'pass', 'passes')} with a probability of {SAFE:.0%} or more"
     best = int(chances.argmax())
     return [(f"{first}." if n else f"{first}; the largest is {chances[best]:.1%} (design {best:,}).",)]
-
-
-def _meaning(flag: str) -> str:
-    """What a flag says; its name where other rules have set it."""
-    return BY_FLAG[flag].meaning if flag in BY_FLAG else flag
 
 
 VERBS = {

@@ -55,7 +55,7 @@ def assembled(
     answers: AnswerTable | None = None,
     rows: ResultRows | None = None,
     chosen: Sequence[Mapping[str, Any]] = (),
-    facts: Sequence[tuple[str, str]] = (),
+    facts: Sequence[tuple[str, str]],
     notes: Sequence[str] = (),
     heading: Mapping[str, str] = NOTHING,
     units: str = "si",
@@ -109,6 +109,8 @@ def assembled(
     data = page_data(settings=settings, control=control, readings=readings, start=start, chosen=chosen, units=units)
     data["rows"] = table
     data["bokeh"] = {"docs": docs, "items": [{**item.to_json(), "roots": elements} for item in items]}
+    known = dict(facts)
+    origin = (f"boulder-sweep {known['version of boulder-sweep']}", f"settings {known['hash of the settings'][:12]}")
     script = "\n".join((ASSETS / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS)
     library = "\n".join(INLINE.clone(components=["bokeh"]).js_raw)
     environment = jinja2.Environment(
@@ -121,9 +123,7 @@ def assembled(
     return environment.get_template("page.html").render(
         title=data["title"],
         units=units,
-        footer=_css_text(
-            " · ".join([*dict.fromkeys([heading.get("project", data["title"]), data["title"]]), *_origin(facts)])
-        ),
+        footer=_css_text(" · ".join(filter(None, (heading.get("project"), data["title"], *origin)))),
         sheet=sheet,
         sentences=sentences,
         answers=answers,
@@ -150,13 +150,6 @@ def assembled(
         library=library,
         policy=_policy(library, script),
     )
-
-
-def _origin(facts: Sequence[tuple[str, str]]) -> list[str]:
-    """Return what a footer says of the origin of the results."""
-    known = dict(facts)
-    words = (f"boulder-sweep {known[name]}" for name in known if name == "version of boulder-sweep")
-    return [*words, *(f"settings {text[:12]}" for name, text in facts if name == "hash of the settings")]
 
 
 def _css_text(text: str) -> str:

@@ -22,7 +22,6 @@ from boulder_sweep.impact.recomputing import one_design
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.quantities import NEEDED, quantities_by
-from boulder_sweep.judge.validity import flag_counts
 from boulder_sweep.locations import Location
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.shape import Shape
@@ -86,8 +85,6 @@ class ResultRows:
         were asked, ``pass: robust``; the last is for rows not computed yet.
     codes : ndarray of uint8, shape (rows,)
         Index of the name of every row.
-    flags : dict of str to int
-        Designs that pass, by validity flags; under ``""`` those without.
     grades : dict of str to int
         Designs that pass, by their robustness. Empty for a table that does not have it.
     axes : dict of str to ndarray
@@ -106,7 +103,6 @@ class ResultRows:
     finished: FinishedRows | AnswerFile
     names: tuple[str, ...]
     codes: np.ndarray
-    flags: dict[str, int]
     grades: dict[str, int]
     axes: dict[str, np.ndarray]
     sets: dict[str, NamedSets]
@@ -316,12 +312,10 @@ def read_rows(folder: Location) -> ResultRows:
     codes = np.full(finished.rows, 255, np.uint8)
     columns = {name: np.full(finished.rows, np.nan) for name in stored}
     names: list[tuple[str, str]] = []
-    flags: Counter[str] = Counter()
     grades: Counter[str] = Counter()
     asked = bool(settings["model"].get("second_opinion")) or kind_of(finished) in (NEED, CAPACITY)
-    for table in finished.tables(["design_id", "verdict", "reason", "validity", "robustness", *stored]):
-        flags.update(_of_passes(table, "validity"))
-        grades.update(_of_passes(table, "robustness"))
+    for table in finished.tables(["design_id", "verdict", "reason", "robustness", *stored]):
+        grades.update(_grades_of(table))
         rows = table.column("design_id").to_numpy()
         codes[rows] = _codes(table, names, asked=asked)
         for name in stored:
@@ -336,9 +330,8 @@ def read_rows(folder: Location) -> ResultRows:
     for index, (axis, values) in enumerate(axes.items()):
         for name, along in (sets[axis].inputs if axis in sets else {axis: values}).items():
             inputs[name] = along.reshape([-1 if k == index else 1 for k in range(len(axes))])
-    by_flag = flag_counts(flags.items()) if flags else {}
     words, robustness = zip(*names, (NOT_YET, ""), strict=True)
-    return ResultRows(folder, finished, words, codes, by_flag, dict(grades), axes, sets, inputs, robustness)
+    return ResultRows(folder, finished, words, codes, dict(grades), axes, sets, inputs, robustness)
 
 
 def _check_whole(file: AnswerFile, path: Location) -> None:
@@ -397,11 +390,11 @@ def _axes(
             yield name, _column(columns, name)[: step * length : step]
 
 
-def _of_passes(table: Any, name: str) -> dict[str, int]:
-    """Return the number of passing designs of a part for each word of a column."""
+def _grades_of(table: Any) -> dict[str, int]:
+    """Return the number of passing designs of a part for each grade."""
     import pyarrow.compute as pc
 
-    words = table.column(name).filter(pc.equal(table.column("verdict").cast("string"), "pass"))
+    words = table.column("robustness").filter(pc.equal(table.column("verdict").cast("string"), "pass"))
     return {one["values"] or "": one["counts"] for one in pc.value_counts(words.cast("string")).to_pylist()}
 
 

@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from boulder_kernels.rules import ISLAND_SLIDE
+from boulder_kernels.rules import ISLAND_RATIO, ISLAND_SLIDE
 from boulder_sweep.answers.advice import advice, question
+from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.recommendation import Design
 from boulder_sweep.columns import BOULDER_MASS, TO_BUILD
 from boulder_sweep.judge.robustness import meaning_of
@@ -119,65 +120,48 @@ def _words(answer: Answer, design: Design, names: Sequence[str], settings: Mappi
     ground = ground_words(settings, units) or "dry, level, the same at every depth, without cohesion"
     case = ", ".join(_named(name, answer.row[name], units) for name in names)
     governs = f"in the worst of {len(design.rows):,} cases: {case}" if case else ""
+    if found is None:  # the worst answer, or why there is none
+        said = ["".join(p if isinstance(p, str) else _measured(p, units) for p in answer.sentences[0])]
     if found is None or found.design is None:
-        return Words(asked, tuple(said) or (asked_words(answer),), (), "", ground, governs)
+        return Words(asked, tuple(said), (), "", ground, governs)
     return Words(asked, (said[0],), tuple(said[1:-1]), said[-1], ground, governs)
 
 
-def asked_words(answer: Answer) -> str:
-    """Return the first sentence of an answer that recommends nothing, its numbers in the units of the table."""
-    first = answer.sentences[0] if answer.sentences else ("Nothing is recommended.",)
-    return "".join(part if isinstance(part, str) else f"{part.value:.4g} {part.unit}" for part in first)
+def _measured(part: Measure, units: str) -> str:
+    """Return a number with its unit."""
+    return quantity_text(part.unit, units, part.value).replace(" deg", "°").replace("^3", "³")
 
 
 def _named(name: str, value: str | float, units: str) -> str:
     """Return an input with its value: the name of a set, or words and a number with its unit."""
     if isinstance(value, str):
         return value
-    text = quantity_text(BY_NAME[name].unit, units, value).replace(" deg", "°").replace("^3", "³")
-    return f"{(SOIL | VEHICLE)[name]} {text}"
+    return f"{(SOIL | VEHICLE)[name]} {_measured(Measure(value, BY_NAME[name].unit), units)}"
 
 
-def _checks(row: Mapping[str, Any], criterion: Mapping[str, Any], need: Any) -> tuple[tuple[str, Cell, Cell, str], ...]:
-    """Return loads and limits of the row that governs."""
-
-    def measure(name: str, unit: str) -> Cell:
-        return "–" if row[name] is None else Measure(float(row[name]), unit)
-
-    def used(value: float | None, allowed: float) -> str:
-        return "–" if value is None else f"{100.0 * max(value, 0.0) / allowed:.0f} %"
-
-    rotation, rating, overlap = criterion["max_rotation_deg"], criterion["rating"], criterion["min_overlap_m"]
-    limit, slides = PENETRATION_LIMITS_M[rating], row["max_displacement_m"]
-    shallow = row[DEPTH] < 0.35 * row["boulder_height_m"]
-    lines: list[tuple[str, Cell, Cell, str]] = [
-        (
-            "rotation",
-            measure("max_rotation_deg", "deg"),
-            Measure(rotation, "deg"),
-            used(row["max_rotation_deg"], rotation),
-        ),
-        (
-            "displacement",
-            measure("max_displacement_m", "m"),
-            Measure(ISLAND_SLIDE, "m") if shallow else "no limit",
-            used(slides, ISLAND_SLIDE) if shallow else "–",
-        ),
-        (
-            f"penetration of cargo bed, {rating}",
-            measure("penetration_m", "m"),
-            Measure(limit, "m"),
-            used(row["penetration_m"], limit),
-        ),
-        (
-            "overlap, at least",
-            measure("overlap_m", "m"),
-            Measure(overlap, "m"),
-            used(overlap, row["overlap_m"]) if row["overlap_m"] else "–",
-        ),
-        ("peak force of the truck", measure("peak_force_kN", "kN"), "–", "–"),
-        ("acting at a height of", measure("impact_height_m", "m"), "–", "–"),
+def _checks(
+    row: Mapping[str, Any], criterion: Mapping[str, Any], need: Need
+) -> tuple[tuple[str, Cell, Cell, str], ...]:
+    """Return loads and limits of the row that governs; a boulder that is hardly buried may not slide far."""
+    slides = ISLAND_SLIDE if row[DEPTH] < ISLAND_RATIO * row["boulder_height_m"] else None
+    limit, overlap = PENETRATION_LIMITS_M[criterion["rating"]], criterion["min_overlap_m"]
+    of: list[tuple[str, str, str, float | None]] = [
+        ("rotation", "max_rotation_deg", "deg", criterion["max_rotation_deg"]),
+        ("displacement", "max_displacement_m", "m", slides),
+        (f"penetration of cargo bed, {criterion['rating']}", "penetration_m", "m", limit),
+        ("overlap, at least", "overlap_m", "m", overlap),
+        ("peak force of the truck", "peak_force_kN", "kN", None),
+        ("acting at a height of", "impact_height_m", "m", None),
     ]
+    lines: list[tuple[str, Cell, Cell, str]] = []
+    for words, name, unit, allowed in of:
+        value = row[name]
+        used = "–"
+        if value and allowed:
+            used = f"{100.0 * max(allowed / value if name == 'overlap_m' else value / allowed, 0.0):.0f} %"
+        none = "no limit" if name == "max_displacement_m" else "–"
+        computed: Cell = "–" if value is None else Measure(value, unit)
+        lines.append((words, computed, none if allowed is None else Measure(allowed, unit), used))
     if "p_pass" in row:
         least = "–" if need.probability is None else f"≥ {100.0 * need.probability:.4g} %"
         lines.insert(0, ("probability of passing", f"{row['p_pass']:.1%}", least, "–"))

@@ -99,8 +99,6 @@ def check_answer(page, table):
     others = re.search(r"^Of the others, (.*)\.$", said, re.MULTILINE)
     found = [int(count) for count in re.findall(r"(?:^|; )(\d+) ", others[1])] if others else []
     assert sorted(found) == sorted(table[~passing].groupby(["verdict", "reason"]).size().tolist())
-    flagged = re.search(r"^(\d+) of those that pass lies? outside", said, re.MULTILINE)
-    assert int(flagged[1] if flagged else 0) == (passing & (table.validity.astype(object) != "")).sum()
 
 
 def check_map(page, table):
