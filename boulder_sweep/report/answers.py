@@ -19,7 +19,7 @@ from boulder_sweep.answers.recommendation import PREFERENCES, RANKS, Design, Nea
 from boulder_sweep.columns import BOULDER_MASS, GRADES
 from boulder_sweep.judge.quantities import EXCAVATED, NEEDED, quantities_by
 from boulder_sweep.judge.robustness import IN_WORDS, MEANINGS, SENSITIVE_IN_WORDS
-from boulder_sweep.report.asked import Named, Sentence, capacity_sentences, listed, need_sentences, share, verb
+from boulder_sweep.report.asked import Named, Sentence, listed, need_sentences, share, verb
 from boulder_sweep.report.rows import CONDITIONS, DEPTH, NOT_YET, ResultRows, condition_of, inputs_of
 from boulder_sweep.text import counted
 from boulder_sweep.views.wording import REASON_WORDS
@@ -208,9 +208,9 @@ class _Designs:
 def _counts(rows: ResultRows, n: int) -> list[Sentence]:
     """Say how many of the rows of a run pass, and why the others do not."""
     counts, total = rows.counts(), len(rows.codes)
-    sentences = _uncertain(rows)
     if total == 1:
-        return [*sentences, *(capacity_sentences(rows.row(0)) if rows.kind == CAPACITY else [])]
+        return []
+    sentences = _uncertain(rows)
     means = ", at the means of their uncertain inputs" if sentences else ""
     sentences.append((f"{n:,} of {total:,} designs {verb(n, 'pass', 'passes')} ({share(n, total)}){means}.",))
     if n and rows.grades and not means:
@@ -245,16 +245,6 @@ def _uncertain(rows: ResultRows) -> list[Sentence]:
     chances = rows.chances()
     if chances is None:
         return []
-    if len(chances) == 1:
-        row = rows.row(0)
-        driver = row["p_pass_driver"]
-        most = f", decided most by {driver.replace('.', ' ').replace('_', ' ')}" if driver else ""
-        interval = f"{row['p_pass_low']:.1%} to {row['p_pass_high']:.1%}"
-        chance = f"The probability of passing is {row['p_pass']:.1%} ({interval}){most}."
-        if row["p_undecided"]:
-            why = REASON_WORDS[row["p_undecided_reason"]]
-            chance += f" {row['p_undecided']:.1%} of the designs drawn are undecided ({why})."
-        return [(chance,)]
     n = int((chances >= SAFE).sum())
     first = f"{n:,} of {len(chances):,} designs {verb(n, 'pass', 'passes')} with a probability of {SAFE:.0%} or more"
     best = int(chances.argmax())

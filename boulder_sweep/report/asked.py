@@ -102,25 +102,10 @@ def need_sentences(rows: ResultRows, need: Need) -> tuple[list[Sentence], Named]
     return [worst, *sentences], Named("The answer that is worst", number)
 
 
-def capacity_sentences(row: dict[str, Any]) -> list[Sentence]:
-    """Return what a single design withstands."""
-    asked = {
-        "speed": ("withstands_speed_m_s", "m/s"),
-        "mass of the truck": ("withstands_mass_kg", "kg"),
-        "friction angle": ("withstands_friction_angle_deg", "deg"),
-    }
-    parts: list[str | Measure] = []
-    for name, (column, unit) in asked.items():
-        value = row[column]
-        parts += ["; " if parts else "", f"{name} "]
-        parts += ["none of those tried"] if value is None else [Measure(value, unit)]
-    return [("All else unchanged, the worst up to which it passes throughout: ", *parts, ".")]
-
-
 def answers_table(rows: ResultRows) -> AnswerTable | None:
     """Return the answers as a table; None for the result of a run, and where the sentences say it all."""
     file = rows.finished
-    if not isinstance(file, AnswerFile) or len(rows.codes) == 1:
+    if not isinstance(file, AnswerFile) or (len(rows.codes) == 1 and file.kind == NEED):
         return None
     answers = file.answers()
     table = file.table

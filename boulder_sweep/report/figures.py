@@ -238,51 +238,32 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any], units: s
     first, last = float(front.min()), float(back.max())
     beside = last + 0.35
     low = -depth / 2 if abs((ground.water_table_m or 0.0) - depth) < 2 * LINE else -depth + 0.12  # beside its words
-    far = last + 2.6
-    ground_ends = last + RIGHT
-    # As high as the ground line lies in the elevation, so that the two are read together.
-    wide, middle = ground_ends + PLAN[0] + length, (above + 0.6 - depth) / 2
+    ends = last + RIGHT
+    # The plan lies as high as the middle of the elevation, so that the two are read together.
+    wide, middle = ends + PLAN[0] + length, (above + 0.6 - depth) / 2
+    upper, lower = middle + width / 2, middle - width / 2
+
+    def across(left: float, right: float, y: float, name: str) -> Dimension:
+        return Dimension(left, y + 0.2, right, y + 0.2, name, right - left, left + 0.15, y + 0.3, "start")
+
+    def upright(x: float, low: float, high: float, name: str, at: float) -> Dimension:
+        return Dimension(x, low, x, high, name, high - low, x + 0.12, at, "start")
+
     dimensions = (
-        Dimension(beside, 0.0, beside, above, "above", above, beside + 0.12, above / 2 - 0.1, "start"),
-        Dimension(beside, -depth, beside, 0.0, "d =", depth, beside + 0.12, low, "start"),
-        Dimension(far, -depth, far, above, "H =", height, far + 0.12, max(above / 2 - 0.1, 0.2), "start"),
-        Dimension(first, above + 0.2, last, above + 0.2, "L =", length, first + 0.15, above + 0.3, "start"),
+        upright(beside, 0.0, above, "above", above / 2 - 0.1),
+        upright(beside, -depth, 0.0, "d =", low),
+        upright(last + 2.6, -depth, above, "H =", max(above / 2 - 0.1, 0.2)),
+        across(first, last, above, "L =")._replace(value=length),  # the sides may lean
         Dimension(-3.0, 0.0, -3.0, bumper, "bumper", bumper, -3.12, 0.12, "end"),
-        Dimension(
-            wide - length,
-            middle + width / 2 + 0.2,
-            wide,
-            middle + width / 2 + 0.2,
-            "L =",
-            length,
-            wide - length + 0.15,
-            middle + width / 2 + 0.3,
-            "start",
-        ),
-        Dimension(
-            wide + 0.35,
-            middle - width / 2,
-            wide + 0.35,
-            middle + width / 2,
-            "W =",
-            width,
-            wide + 0.47,
-            middle - 0.1,
-            "start",
-        ),
+        across(wide - length, wide, upper, "L ="),
+        upright(wide + 0.35, lower, upper, "W =", middle - 0.1),
     )
     tops = [0.0, *(layer.from_m for layer in ground.layers)]
-    soils = [
-        (
-            inputs["friction_angle_deg"],
-            inputs["soil_density_kg_m3"],
-            inputs["subgrade_reaction_MN_m3"],
-            ground.cohesion_kPa,
-        ),
-        *(
-            (layer.friction_angle_deg, layer.density_kg_m3, layer.subgrade_reaction_MN_m3, layer.cohesion_kPa)
-            for layer in ground.layers
-        ),
+    names = ("friction_angle_deg", "soil_density_kg_m3", "subgrade_reaction_MN_m3")
+    soils = [(*(inputs[name] for name in names), ground.cohesion_kPa)]
+    soils += [
+        (layer.friction_angle_deg, layer.density_kg_m3, layer.subgrade_reaction_MN_m3, layer.cohesion_kPa)
+        for layer in ground.layers
     ]
     # The ground is drawn as deep as its deepest boundary within two heights of the boulder.
     known = [*tops, ground.water_table_m or 0.0]
@@ -315,13 +296,13 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any], units: s
         hood=hood,
         roof=roof,
         left=-LEFT,
-        ground=ground_ends,
+        ground=ends,
         right=wide + PLAN[1],
         top=max(above + 0.6, roof) + SKY,
         bottom=bottom,
         dimensions=dimensions,
         strata=tuple(strata),
         water=ground.water_table_m,
-        plan=(wide - length, middle + width / 2, length, width),
+        plan=(wide - length, upper, length, width),
         bar=BARS[units],
     )

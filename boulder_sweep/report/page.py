@@ -133,6 +133,7 @@ def assembled(
         chosen=data["chosen"],
         thinned=kept.words if kept is not None else None,
         mapped=mapped,
+        said=rows is None or sheet is None or not mapped or _is_listed(rows, sheet, answers),
         facts=facts,
         notes=notes,
         heading=heading,
@@ -150,6 +151,13 @@ def assembled(
         library=library,
         policy=_policy(library, script),
     )
+
+
+def _is_listed(rows: ResultRows, sheet: Sheet, answers: AnswerTable | None) -> bool:
+    """Whether every row of a result is in a table, so that a map of them says nothing on paper."""
+    if answers is not None:
+        return not answers.left_out
+    return sheet.cases is not None and len(sheet.cases.rows) == len(rows.codes)
 
 
 def _css_text(text: str) -> str:

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 
 RATIO, DEPTH = "embedment_ratio", "embedment_depth_m"
 SIZES = ("boulder_length_m", "boulder_width_m", "boulder_height_m", "boulder_density_kg_m3")
-CONDITIONS = {"soil": "in every soil", "vehicle": "against every vehicle", "speed": "at every speed"}
-"""What a boulder must withstand as it is, in the words of a sentence; not the designer's choice."""
+CONDITIONS = ("soil", "vehicle", "speed")
+"""What a boulder must withstand as it is; not the designer's choice."""
 NOT_YET = "not computed yet"
 MOST_ELEMENTS = 5000
 """Most soil elements that the page simulates with; the paper has as many."""
@@ -168,17 +168,6 @@ class ResultRows:
         if self.axes:
             return tuple(name for name, values in self.axes.items() if len(values) > 1)
         return tuple(name for name, column in self.inputs.items() if column.ndim and (column != column[0]).any())
-
-    def ends(self, name: str, numbers: np.ndarray) -> tuple[str | float, str | float]:
-        """Return the least and the greatest value of designs on an axis or in a column; the name of a named set."""
-        if not self.axes:
-            values = self.inputs[name][numbers]
-        else:
-            index = np.unravel_index(numbers, self.shape)[list(self.axes).index(name)]
-            if name in self.sets:
-                return self.sets[name].names[int(index.min())], self.sets[name].names[int(index.max())]
-            values = self.axes[name][index]
-        return float(values.min()), float(values.max())
 
     def over(self, values: np.ndarray, kinds: Sequence[str], ufunc: np.ufunc) -> np.ndarray:
         """Return for every row what a ufunc makes of all rows that differ from it in nothing but some conditions.

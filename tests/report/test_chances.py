@@ -16,6 +16,7 @@ from boulder_sweep.answers.outputs import AnswerFile
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report
 from boulder_sweep.report.answers import answer_of
+from boulder_sweep.report.asked import answers_table
 from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import load_text
 from boulder_sweep.store.provenance import sha256_of
@@ -75,11 +76,12 @@ def test_one_design_has_its_interval_and_what_decides(tmp_path: Path) -> None:
     found = boulder_sweep.uncertainty(one, half_width=0.1)
     found.write(tmp_path / "one.parquet")
     row = found.frame.iloc[0]
-    (first,) = answer_of(read_rows(tmp_path / "one.parquet")).sentences[0]
-    assert first == (
-        f"The probability of passing is {row.p_pass:.1%} ({row.p_pass_low:.1%} to {row.p_pass_high:.1%}), "
-        "decided most by soil friction angle."
-    )
+    table = answers_table(read_rows(tmp_path / "one.parquet"))
+    assert table is not None
+    shown = dict(zip(table.heads, table.rows[0], strict=True))
+    chances = {"P(pass)": row.p_pass, "from": row.p_pass_low, "to": row.p_pass_high}
+    assert {name: shown[name] for name in chances} == {name: f"{chance:.1%}" for name, chance in chances.items()}
+    assert shown["decided by"] == "soil.friction_angle"
 
 
 def test_no_design_may_be_safe(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
+import openpyxl
 import pyarrow.parquet as pq
 import pytest
 
@@ -122,6 +123,23 @@ def test_what_does_not_qualify_is_not_recommended(files: dict[str, Path]) -> Non
         assert not found.qualifies
         assert found.title == "Nearest design, which does not qualify"
         assert "does not pass" in found.words["si"].recommendation[0]
+
+
+@pytest.mark.parametrize(("name", "printed"), [("depth", False), ("grid", True)])
+def test_a_map_is_printed_only_where_no_table_says_the_same(
+    files: dict[str, Path], result: Path, name: str, printed: bool, tmp_path: Path, opened: Any
+) -> None:
+    page = opened(write_report(files.get(name, result), tmp_path / "page.html"))
+    assert page.is_visible("#figure-sweep-map")
+    page.emulate_media(media="print")
+    assert page.is_visible("#figure-sweep-map") == printed
+
+
+def test_a_spreadsheet_says_what_is_recommended(needs: dict[str, Need], files: dict[str, Path], tmp_path: Path) -> None:
+    boulder_sweep.export(files["depth"], tmp_path / "depth.xlsx", units="us")
+    sheets = openpyxl.load_workbook(tmp_path / "depth.xlsx").worksheets
+    said = advice(needs["depth"], "us")
+    assert [row[0] for row in sheets[1].iter_rows(max_row=len(said), values_only=True)] == said
 
 
 OTHERS = (None, True, -1, 0, 1.5, 1e300, "", "x", [], ["x"], {}, {"a": 1}, "gone")
