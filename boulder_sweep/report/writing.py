@@ -38,7 +38,7 @@ from boulder_sweep.text import counted, printable, why
 from boulder_sweep.views.wording import name_of, value_text
 
 KINDS = (".html", ".htm", ".pdf")
-PACKAGES = ("boulder-sweep", "numba", "llvmlite", "numpy", "pyarrow", "python")
+PACKAGES = ("numba", "llvmlite", "numpy", "pyarrow", "python")
 BROWSERS = (
     *("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge", "microsoft-edge"),
     "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
@@ -280,7 +280,8 @@ def _taken(name: str, how: str, inputs: Mapping[str, Any], units: str) -> str:
 def _facts(identity: Mapping[str, Any], command: str, out: str = "") -> list[tuple[str, str]]:
     """Return the origin of the results, and how to reproduce them."""
     used = identity["versions"]
-    facts = [(f"version of {name}", used[name]) for name in PACKAGES if name in used]
+    facts = [("version of boulder-sweep", used.get("boulder-sweep", "unknown"))]
+    facts.append(("other versions", ", ".join(f"{name} {used[name]}" for name in PACKAGES if name in used)))
     facts += [(f"hash of the {what}", identity[f"{what}_sha256"]) for what in ("settings", "kernels")]
     return [*facts, *((name, printable(text)) for name, text in (("table", out), ("command", command)) if text)]
 
