@@ -375,11 +375,8 @@ class _Words:
             deep = f"{self.length(row[DEPTH], '.3f')} deep"
             never = f"passes at no depth{self.here(row)}; {deep}"
             if self.found.of_run:
-                never = (
-                    f"fails in {len(failing):,} of {len(nearest.rows):,} cases {deep}"
-                    if len(nearest.rows) > 1
-                    else f"fails {deep}"
-                )
+                some = f" in {len(failing):,} of {len(nearest.rows):,} cases" if len(nearest.rows) > 1 else ""
+                never = f"fails{some} {deep}"
             text = f"Nearest: {who} ({self.mass(row)}), which {never}: {why}."
         changes = []
         for name, one in nearest.changes.items():

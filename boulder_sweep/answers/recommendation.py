@@ -218,10 +218,9 @@ class Recommendation:
         boulders, qualified, alike, conditions = (
             int(entries[name]) for name in ("boulders", "qualified", "alike", "conditions")
         )
-        prefer, others = (
-            {name: name for name in PREFERENCES}[entries["prefer"]],
-            by_name(entries["others"], (*PREFERENCES,)),
-        )
+        prefer, others = entries["prefer"], by_name(entries["others"], (*PREFERENCES,))
+        if prefer not in PREFERENCES:
+            raise ValueError(f"{prefer} cannot be preferred")
         chosen = None if best is None else design(best)
         return cls(prefer, chosen, others, boulders, qualified, alike, conditions, nearest)
 
