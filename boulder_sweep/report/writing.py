@@ -62,8 +62,11 @@ WATCHED = 'exec 3<&0; (read _ <&3; kill -9 0) & exec "$@" 3<&- </dev/null'
 """Runs a browser that ends with this process, even if that is killed: its end of a pipe is then closed."""
 _LAST_WORDS = 300
 """Characters of what a browser said last that are shown."""
-SETTLED_MS = 30_000
-"""Time of the page that passes before it is printed; the browser skips it while nothing happens."""
+SETTLED_MS = (30_000, 120_000, 480_000)
+"""Time of the page that passes before it is printed; the browser skips it while nothing happens, on a busy machine also
+while the simulator is still being compiled. A page that was not ready is printed again, later."""
+UNREADY = "unready"
+"""Title of a page to be printed until its script has filled it; the title stands in the PDF."""
 
 
 def write_report(
@@ -334,7 +337,8 @@ def printed(html: str) -> bytes:
     program = browser()
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         page, target = Path(folder, "page.html"), Path(folder, "page.pdf")
-        page.write_text(html, encoding="utf-8")
+        head, _, rest = html.partition("<title>")
+        page.write_text(f"{head}<title>{UNREADY}{rest[rest.find('</title>') :]}" if rest else html, encoding="utf-8")
         # As root, as in a container, Chromium does not start with its sandbox.
         as_root = hasattr(os, "geteuid") and os.geteuid() == 0
         words = [
@@ -349,16 +353,20 @@ def printed(html: str) -> bytes:
             *(["--no-sandbox"] if as_root else []),
             f"--user-data-dir={Path(folder, 'profile')}",
             "--no-pdf-header-footer",
-            f"--virtual-time-budget={SETTLED_MS}",
             "--window-size=1200,900",
             f"--print-to-pdf={target}",
             page.as_uri(),
         ]
-        code, said = _ended(program, words, Path(folder, "said"))
-        if not target.exists() or not target.stat().st_size:
-            shown = f": {said}" if said else ""
-            raise ReportError(f"{program} did not print the page (it ended with code {code}{shown}); {HELP}")
-        return target.read_bytes()
+        for settled in SETTLED_MS:
+            budget = f"--virtual-time-budget={settled}"
+            code, said = _ended(program, [*words[:-1], budget, words[-1]], Path(folder, "said"))
+            if not target.exists() or not target.stat().st_size:
+                shown = f": {said}" if said else ""
+                raise ReportError(f"{program} did not print the page (it ended with code {code}{shown}); {HELP}")
+            content = target.read_bytes()
+            if f"/Title ({UNREADY})".encode() not in content:
+                return content
+    raise ReportError(f"the page was not ready when {program} printed it; {HELP}")
 
 
 def _ended(program: str, words: Sequence[str], said: Path) -> tuple[int, str]:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import boulder_sweep
-from boulder_sweep.report import write_report
+from boulder_sweep.errors import ReportError
+from boulder_sweep.report import write_report, writing
 from boulder_sweep.settings.sweep import Heading
 from tests.report.conftest import SITE, reported
 
@@ -70,3 +71,12 @@ def test_the_page_is_printed_to_a_pdf(result, tmp_path, chromium):
     file = write_report(result, tmp_path / "page.pdf", heading=Heading(client="City"))
     assert file.read_bytes().startswith(b"%PDF")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["page.pdf"]
+
+
+def test_a_page_that_is_not_ready_is_not_printed(monkeypatch, chromium):
+    """As on a busy machine: nothing has filled it, and nothing has changed its title."""
+    monkeypatch.setattr(writing, "SETTLED_MS", (100, 200))
+    with pytest.raises(ReportError, match=r"the page was not ready when .* printed it; write the page as \.html"):
+        writing.printed("<html><head><title>site</title></head><body>empty</body></html>")
+    ready = "<title>site</title><script>document.title = 'site'</script>"
+    assert writing.printed(f"<html><head>{ready}</head><body>filled</body></html>").startswith(b"%PDF")

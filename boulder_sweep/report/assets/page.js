@@ -450,6 +450,7 @@ async function main() {
   page.paint();
   page.refresh();
   Object.assign(window, { page });
+  document.title = `${data.title}: boulder-sweep`;
   document.documentElement.dataset.ready = "yes";
 }
 
