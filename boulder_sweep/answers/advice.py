@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 MODELS = "under the weakest of three soil models"
 """What second opinions are, in the words of an answer."""
+NOT_ASKED = "no second opinion was asked for"
+"""Why designs of a run may have no grade."""
 ALONG = dict(zip(SIDES, ("long", "wide", "high"), strict=True))
 BETTER = {"mass": "lighter", "depth": "shallower", "excavation": "less to dig"}
 """What a design is that is the best by a preference, beside the one that is recommended."""
@@ -88,8 +90,14 @@ def advice(need: Need, units: str = "si") -> list[str]:
     words = _Words(need, found, units)
     if found.design is None:
         return [words.none(), *([words.nearest(found.nearest)] if found.nearest else [])]
-    will_not_do = words.will_not_do() if need.key.name in EMBEDMENT else []
+    will_not_do = words.will_not_do() if need.key.name in EMBEDMENT and not found.of_run else []
     return [words.recommendation(found.design), *words.others(found.design), *will_not_do, words.tested(found.design)]
+
+
+def question(need: Need, units: str = "si") -> str:
+    """Return what was asked, as a question: of which boulder, before which truck, by which limits."""
+    words = _Words(need, need.recommendation or Recommendation("mass", None, {}, 1, 0, 0, 1), units)
+    return words.question()
 
 
 def next_questions(need: Need, again: Again, units: str = "si") -> list[tuple[str, str]]:
@@ -154,6 +162,7 @@ class _Words:
         self.told_apart = [name for name in SIDES if name in several or name == need.key.name or by_mass]
         self.rocks = "boulder_density_kg_m3" in several
         self.conditions = [name for name in several if name not in OF_A_DESIGN]
+        self.kind = "designs" if found.of_run else "boulders"
 
     def value(self, name: str, value: float, digits: str = ".4g") -> str:
         """Return the value of an input with its unit."""
@@ -212,6 +221,43 @@ class _Words:
         values = [f"{BY_NAME[name].key.replace('_', ' ')} {self.value(name, row[name])}" for name in self.conditions]
         return f" at {listed(tuple(labels or values))}" if self.found.conditions > 1 else ""
 
+    def question(self) -> str:
+        """Return what was asked."""
+        need, found = self.need, self.found
+        stops = f"{self.truck()}{self.everywhere()}{self.terms()}"
+        if need.key.most or need.key.name not in OF_A_DESIGN:
+            words = f"{'largest' if need.key.most else 'least'} {BY_NAME[need.key.name].path.replace('.', ' ')}"
+            return f"What is the {words.replace('_', ' ')} at which the boulder stops {stops}?"
+        if found.of_run:
+            which = f"Which of {found.boulders:,} boulders and depths" if found.boulders > 1 else "Does the boulder"
+            return f"{which} {'stops' if found.boulders > 1 else 'stop'} {stops}?"
+        if need.key.name == BOULDER_MASS:
+            return f"Which is the lightest boulder that stops {stops}?"
+        if need.key.name not in EMBEDMENT:
+            return f"How {ALONG.get(need.key.name, 'dense')} must the boulder be to stop {stops}?"
+        if found.boulders == 1:
+            return f"How deep must the boulder be buried to stop {stops}?"
+        return f"Which of {found.boulders:,} boulders, buried how deep, stops {stops}?"
+
+    def truck(self) -> str:
+        """Return the vehicles and their speeds."""
+        given = self.need.sweep.plan.given
+        ends = {}
+        for name in ("vehicle_mass_kg", "impact_speed_m_s"):
+            values, digits = given[name].values, ",.0f" if name == "vehicle_mass_kg" else ".4g"
+            text = quantity_text(BY_NAME[name].unit, self.units, values.min(), values.max(), digits=digits)
+            ends[name] = text.replace(" ", NO_BREAK_SPACE)
+        return f"a truck of {ends['vehicle_mass_kg']} at {ends['impact_speed_m_s']}"
+
+    def terms(self) -> str:
+        """Return what is asked for beside passing."""
+        need = self.need
+        how = f", with {percent(need.least_margin)} to spare" if need.least_margin else ""
+        how += f" {MODELS}" if need.robust else ""
+        if need.probability is not None:
+            how += f", with a probability of {100.0 * need.probability:.4g}{NO_BREAK_SPACE}%"
+        return how
+
     def recommendation(self, design: Design) -> str:
         """Return what to build, and why it is this one."""
         row, margin = design.rows[0], self.need.least_margin
@@ -230,14 +276,14 @@ class _Words:
         if self.need.key.name == BOULDER_MASS or found.boulders == 1:
             return ""
         if found.qualified == 1:
-            return f" No other of the {found.boulders:,} boulders qualifies."
+            return f" No other of the {found.boulders:,} {self.kind} qualifies."
         if found.alike == found.qualified:
-            return f" It is {best} of {found.qualified:,} boulders that qualify."
+            return f" It is {best} of {found.qualified:,} {self.kind} that qualify."
         worse = found.qualified - found.alike
         are = f"{worse:,} {'is' if worse == 1 else 'are'} not robust" if design.grade == "robust" else ""
         are = are or f"a second opinion overturns {worse:,}"
         one = "it is the other" if found.alike == 1 else f"it is {best} of the others"
-        return f" Of {found.qualified:,} boulders that qualify, {are}; {one}."
+        return f" Of {found.qualified:,} {self.kind} that qualify, {are}; {one}."
 
     def opinions(self, design: Design) -> str:
         """Return what second opinions say of a design."""
@@ -254,6 +300,8 @@ class _Words:
         outside = [BY_FLAG[name].meaning for name in Design(rows).flags if name in UNSTUDIED]
         if not can_be_asked(self.need.sweep):
             return f"Not graded: {MEANINGS['open']}."
+        if not outside:
+            return f"Not graded: {NOT_ASKED}."
         some = f" in {len(rows)} of {len(design.rows)} cases" if len(rows) < len(design.rows) else ""
         return f"Not graded{some}: no study of second opinions covers {listed(tuple(outside))}."
 
@@ -302,10 +350,8 @@ class _Words:
 
     def none(self) -> str:
         """Return that nothing qualifies."""
-        need, who = (
-            self.need,
-            "No boulder of the file passes" if self.found.boulders > 1 else "The boulder does not pass",
-        )
+        need, of = self.need, "design of the run" if self.found.of_run else "boulder of the file"
+        who = f"No {of} passes" if self.found.boulders > 1 else "The boulder does not pass"
         how = f" with {percent(need.least_margin)} to spare" if need.least_margin else ""
         how += f" {MODELS}" if need.robust else ""
         if need.probability is not None:
@@ -327,7 +373,11 @@ class _Words:
         else:
             why = (row["reason"] or row["verdict"]).replace("_", " ")
             deep = f"{self.length(row[DEPTH], '.3f')} deep"
-            text = f"Nearest: {who} ({self.mass(row)}), which passes at no depth{self.here(row)}; {deep}: {why}."
+            never = f"passes at no depth{self.here(row)}; {deep}"
+            if self.found.of_run:
+                some = f" in {len(failing):,} of {len(nearest.rows):,} cases" if len(nearest.rows) > 1 else ""
+                never = f"fails{some} {deep}"
+            text = f"Nearest: {who} ({self.mass(row)}), which {never}: {why}."
         changes = []
         for name, one in nearest.changes.items():
             at_most = name == "impact_speed_m_s"

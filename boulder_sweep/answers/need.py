@@ -38,6 +38,7 @@ from boulder_sweep.locations import Location
 from boulder_sweep.runner.pool import Pool, call
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.fields import EMBEDMENT
+from boulder_sweep.store.provenance import file_metadata
 from boulder_sweep.text import ProgressCallback
 
 if TYPE_CHECKING:
@@ -63,8 +64,8 @@ class Need(Result):
     robust : bool
         Whether only a pass counts that stands under every second opinion with the margin.
     recommendation : Recommendation or None
-        The design to build, and why; None where the question is not about a least size, mass or embedment, none was
-        wanted, or the answers were read from a file.
+        The design to build, and why; None where the question is not about a least size, mass or embedment, or none was
+        wanted. The file of the answers has it, too.
     """
 
     key: Key
@@ -134,6 +135,8 @@ class Need(Result):
         draw("answer_charts", "draw_design_chart", self, path, units=units)
 
 
+RECOMMENDATION = "recommendation"
+"""Entry of the metadata of a file of answers."""
 MARGIN = 0.25
 """Margin that is asked for where none is named."""
 
@@ -174,6 +177,9 @@ class Asked:
         question |= {"robust": True} if judges.robust else {}
         table = joined_tables(tables, asked.sweep, judges, "boulder_sweep.need", question)
         best = None if self.prefer is None else recommended(asked, table, self.prefer)
+        if best is not None:
+            metadata = table.schema.metadata | file_metadata({RECOMMENDATION: best.to_dict()})
+            table = table.replace_schema_metadata(metadata)
         return Need(asked.sweep, table, key, judges.least_margin, simulated, chance, judges.robust, best)
 
 

@@ -15,7 +15,8 @@ import pyarrow as pa
 from boulder_kernels import Control
 from boulder_sweep.answers.keys import key_of
 from boulder_sweep.answers.lightest import DEPTH
-from boulder_sweep.answers.need import Need
+from boulder_sweep.answers.need import RECOMMENDATION, Need
+from boulder_sweep.answers.recommendation import ANSWER, Recommendation
 from boulder_sweep.answers.trials import Open
 from boulder_sweep.columns import BOULDER_MASS, COLUMNS, DESIGN_ID, GRADES, RATINGS, VERDICTS
 from boulder_sweep.columns import BY_NAME as COLUMN_OF
@@ -117,6 +118,7 @@ class AnswerFile:
             self.question: dict[str, Any] = json.loads(identity.pop("question", "{}"))
         except ValueError as problem:
             raise refusal(f"{path} is damaged; write it again ({problem})") from problem
+        self._recommended = str(identity.pop(RECOMMENDATION, "null"))
         self.identity = {key: value for key, value in identity.items() if key not in OF_ONE_FILE}
         names = set(self.table.column_names)
         self.kind = next((kind for kind, marks in MARKS.items() if names >= set(marks)), "")
@@ -135,7 +137,7 @@ class AnswerFile:
         if self.kind and len(self.table) > designs:
             what = f"it has {len(self.table):,} rows for {counted(designs, 'design')}"
             raise self._refusal(f"{self.path} is damaged: {what}")
-        if self.kind and (wrong := next(self._wrong_columns(), "")):
+        if self.kind and (wrong := next(self._wrong_columns(self.table), "")):
             raise self._refusal(f"{self.path} is damaged: {wrong}; write it again with `sweep {self.kind}`")
         try:
             if self.kind in _QUESTIONS:
@@ -145,10 +147,10 @@ class AnswerFile:
         except ValueError as problem:
             raise self._refusal(f"{self.path} is damaged ({problem}); write it again") from None
 
-    def _wrong_columns(self) -> Iterator[str]:
+    def _wrong_columns(self, table: pa.Table) -> Iterator[str]:
         """Yield what is wrong with the columns by which answers are described: inputs, and words of a known list."""
-        for name in self.table.column_names:
-            column, admitted = self.table[name], _ADMITTED.get(name)
+        for name in table.column_names:
+            column, admitted = table[name], _ADMITTED.get(name)
             needed = name == DESIGN_ID.name or (self.kind != NEED and (admitted or name == "verdict"))
             if needed and column.null_count:
                 yield f"column {name} has empty cells"
@@ -203,7 +205,28 @@ class AnswerFile:
         sense, _, name = asked["asked"].partition("_")
         word = BY_NAME[name].key if name == BOULDER_MASS else name
         key = key_of(word, most=sense == "most")
-        return Need(sweep, self.table, key, asked["margin"], 0, asked.get("probability"), asked.get("robust", False))
+        chance, robust = asked.get("probability"), asked.get("robust", False)
+        return Need(sweep, self.table, key, asked["margin"], 0, chance, robust, self._recommendation())
+
+    def _recommendation(self) -> Recommendation | None:
+        """Return what was recommended; None where nothing was."""
+        try:
+            entries = json.loads(self._recommended)
+            return None if entries is None else Recommendation.of_dict(entries, self._rows_of)
+        except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError) as problem:
+            what = f"{self.path} is damaged; write it again with `sweep {self.kind}`"
+            raise self._refusal(f"{what} (its recommendation: {shorten(str(problem))})") from None
+
+    def _rows_of(self, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """Return rows of a recommendation, whose columns are those of the table but for the answer, or refuse them."""
+        fields = {field.name: field for field in self.table.schema}
+        for row in rows:
+            if fields.keys() - row.keys() - {self.question["asked"], *ANSWER} or row.keys() - fields.keys():
+                raise ValueError("it has other columns than the answers")
+        table = pa.Table.from_pylist(rows, pa.schema([fields[name] for name in rows[0]]))
+        if wrong := next(self._wrong_columns(table), ""):
+            raise ValueError(wrong)
+        return table.to_pylist()
 
     def _chances(self, sweep: Sweep) -> Uncertainty:
         """Return probabilities with the samples that lie beside them."""

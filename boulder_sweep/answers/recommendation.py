@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import heapq
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -38,6 +39,10 @@ ANSWER = ("fails_at", "passes_at", "found", "passes_within")
 """Columns of an answer, beside its value, which a design does not have."""
 LESS = 0.05
 """Steps of the margin in which the nearest design is asked what it has."""
+CHANGES = ("impact_speed_m_s", "friction_angle_deg", HEIGHT)
+"""Inputs by which the nearest design might qualify."""
+Rows = list[dict[str, Any]]
+"""Rows of a table, by column."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +108,7 @@ class Nearest:
     Attributes
     ----------
     rows : list of dict
-        Its rows of the answer, where nothing passes those at the last value tried.
+        Its rows of the answer, where nothing passes those at the last value tried; of a run those of the design.
     design : Design or None
         It at the depth at which it has the most of what was asked for; None where it does not pass even without a
         margin.
@@ -121,6 +126,16 @@ class Nearest:
     margin: float
     robust: bool
     changes: dict[str, Design]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        return {
+            "rows": self.rows,
+            "design": None if self.design is None else self.design.to_dict(),
+            "margin": self.margin,
+            "robust": self.robust,
+            "changes": {name: design.to_dict() for name, design in self.changes.items()},
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +155,8 @@ class Recommendation:
         the grade of the design, and of conditions: soils and vehicles, combined.
     nearest : Nearest or None
         What comes nearest where none qualifies, of depths without a probability.
+    of_run : bool
+        Whether it is one of the designs of a run, whose depths were given; a boulder is then one of these designs.
     """
 
     prefer: str
@@ -150,6 +167,7 @@ class Recommendation:
     alike: int
     conditions: int
     nearest: Nearest | None = None
+    of_run: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data."""
@@ -161,7 +179,50 @@ class Recommendation:
             "qualified": self.qualified,
             "alike": self.alike,
             "conditions": self.conditions,
+            "nearest": None if self.nearest is None else self.nearest.to_dict(),
         }
+
+    @classmethod
+    def of_dict(cls, entries: Mapping[str, Any], checked: Callable[[Rows], Rows]) -> Recommendation:
+        """Return what `to_dict` returned.
+
+        Parameters
+        ----------
+        entries
+            Plain data.
+        checked
+            Returns rows as they are, or raises a ValueError because they are none of the table.
+
+        Raises
+        ------
+        LookupError, TypeError, ValueError
+            An entry is missing, or no recommendation has it.
+        """
+
+        def design(own: Mapping[str, Any]) -> Design:
+            read = Design(checked(own["rows"]))
+            read.to_dict()  # what words take from it is there
+            return read
+
+        def by_name(own: Mapping[str, Any], known: tuple[str, ...]) -> dict[str, Design]:
+            if own.keys() - {*known}:
+                raise ValueError(f"{', '.join(own)}: none but {', '.join(known)} are known")
+            return {name: design(own[name]) for name in known if name in own}  # JSON keeps no order
+
+        best, near = entries["design"], entries["nearest"]
+        nearest = None
+        if near is not None:
+            built = None if near["design"] is None else design(near["design"])
+            margin, robust = float(near["margin"]), bool(near["robust"])
+            nearest = Nearest(checked(near["rows"]), built, margin, robust, by_name(near["changes"], CHANGES))
+        boulders, qualified, alike, conditions = (
+            int(entries[name]) for name in ("boulders", "qualified", "alike", "conditions")
+        )
+        prefer, others = entries["prefer"], by_name(entries["others"], (*PREFERENCES,))
+        if prefer not in PREFERENCES:
+            raise ValueError(f"{prefer} cannot be preferred")
+        chosen = None if best is None else design(best)
+        return cls(prefer, chosen, others, boulders, qualified, alike, conditions, nearest)
 
 
 def recommended(asked: Question | LightestQuestion, table: pa.Table, prefer: str) -> Recommendation | None:

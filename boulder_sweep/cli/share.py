@@ -187,12 +187,15 @@ Examples:
     type=click.IntRange(min=0),
     multiple=True,
     metavar="N",
-    help="Show this design in full (may be repeated) [default: the lightest and the shallowest that pass].",
+    help="Show this design in full (may be repeated) [default: the one that is recommended].",
 )
 @click.option("--project", metavar="TEXT", help="Heading of the report; wins over report.project in the file.")
-@click.option("--client", metavar="TEXT", help="The same of the client.")
-@click.option("--author", metavar="TEXT", help="The same of the author.")
-@click.option("--date", metavar="TEXT", help="The same of the date.")
+@click.option("--client", metavar="TEXT", help="The same of the client,")
+@click.option("--site", metavar="TEXT", help="the site,")
+@click.option("--date", metavar="TEXT", help="the date; a PDF has today's where none is given,")
+@click.option("--revision", metavar="TEXT", help="the revision,")
+@click.option("--author", metavar="TEXT", help="who made it,")
+@click.option("--checked-by", metavar="TEXT", help="and who checked it.")
 @units_option
 def report(out: str, page: str | None, designs: tuple[int, ...], units: str | None, **heading: str | None) -> int:
     """Write the result in OUT as one HTML file: the answer, the map, and the simulator, which runs in the page.
@@ -209,7 +212,7 @@ def report(out: str, page: str | None, designs: tuple[int, ...], units: str | No
     given = {key: text for key, text in heading.items() if text is not None}
     for key, text in given.items():
         if wrong := wrong_with(text):
-            raise click.UsageError(f"--{key} {wrong}")
+            raise click.UsageError(f"--{key.replace('_', '-')} {wrong}")
     folder = location_of(out)
     target = checked_page(page) if page else beside(location_of(out.removesuffix(".parquet")), ".html")
     written = write_report(folder, target, designs=designs, units=units, command=_command(), heading=Heading(**given))

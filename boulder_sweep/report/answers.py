@@ -1,69 +1,219 @@
-"""What a result says, in sentences: what passes, the least depth and the least mass with their margin."""
+"""What a result says: the design that it recommends, and in sentences how many others pass and why the rest do not.
+
+A run is answered by the rules of `sweep need`: of its designs that hold under all conditions with a margin, the robust
+ones come first, then the lightest.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from itertools import combinations
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+import pyarrow as pa
 
-from boulder_sweep.answers.outputs import CAPACITY, NEED
-from boulder_sweep.columns import GRADES, TO_BUILD
-from boulder_sweep.judge.robustness import IN_WORDS, MEANINGS, SENSITIVE_IN_WORDS, meaning_of
-from boulder_sweep.judge.validity import BY_FLAG, SEPARATOR
-from boulder_sweep.report.asked import (
-    Measure,
-    Named,
-    Sentence,
-    capacity_sentences,
-    listed,
-    need_sentences,
-    share,
-    verb,
-)
-from boulder_sweep.report.rows import CONDITIONS, NOT_YET, ResultRows, condition_of, label_of
-from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.answers.keys import key_of
+from boulder_sweep.answers.need import MARGIN, Need
+from boulder_sweep.answers.outputs import CAPACITY, NEED, asked_sweep
+from boulder_sweep.answers.recommendation import PREFERENCES, RANKS, Design, Nearest, Recommendation
+from boulder_sweep.columns import BOULDER_MASS, GRADES
+from boulder_sweep.judge.quantities import EXCAVATED, NEEDED, quantities_by
+from boulder_sweep.judge.robustness import IN_WORDS, MEANINGS, SENSITIVE_IN_WORDS
+from boulder_sweep.report.asked import Named, Sentence, listed, need_sentences, share, verb
+from boulder_sweep.report.rows import CONDITIONS, DEPTH, NOT_YET, ResultRows, condition_of, inputs_of
 from boulder_sweep.text import counted
 from boulder_sweep.views.wording import REASON_WORDS
 
-if TYPE_CHECKING:
-    from boulder_sweep.answers.need import Need
-
 SAFE = 0.95
 """Probability of passing from which on a design is called safe here."""
+MOST_ASKED = 20
+"""Most designs of which second opinions are asked for a recommendation."""
+RECOMMENDED, NEAREST = "Recommended design", "Nearest design, which does not qualify"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Answer:
-    """What the page says first.
+    """What the page says of a result.
 
     Attributes
     ----------
+    need : Need
+        The question with its recommendation; of a run, as if it had been asked which of its designs to build.
+    row : dict
+        The design that is recommended under the conditions that are worst for it; the nearest one where none is.
     sentences
-        The most important first.
+        What else there is to say, the most important first.
     named
-        The designs that they speak of.
+        What the row is.
     """
 
+    need: Need
+    row: dict[str, Any]
     sentences: tuple[Sentence, ...]
-    named: tuple[Named, ...]
+    named: Named
 
 
 def answer_of(rows: ResultRows) -> Answer:
-    """Describe the result of a sweep in sentences."""
-    counts, total = rows.counts(), len(rows.codes)
+    """Describe a result."""
     passing = rows.having("pass")
     n = int(passing.sum())
-    if rows.need is not None:
-        return _of_answers(rows, rows.need, n)
-    uncertain = _uncertain(rows)
+    need = rows.need or _as_need(rows, passing)
+    found = need.recommendation
+    near = None if found is None or found.nearest is None else found.nearest.design or found.nearest.rows
+    shown = near if found is None or found.design is None else found.design
+    if rows.need is None:
+        sentences, named = _counts(rows, n), Named("Design 0", 0)
+    else:
+        sentences, named = need_sentences(rows, need)
+        if len(rows.codes) > 1 and n and need.probability is None:
+            sentences.append(_grades(rows, n))
+    if shown is None:
+        return Answer(need, rows.row(named.number), tuple(sentences), named)
+    row = worst_of(shown.rows if isinstance(shown, Design) else shown)
+    title = NEAREST if shown is near else RECOMMENDED
+    return Answer(need, row, tuple(sentences), Named(title, _number_of(rows, need, row)))
+
+
+def worst_of(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the row with the least probability or margin; one that does not pass before all others."""
+    name = "p_pass" if "p_pass" in rows[0] else "margin"
+    return min(rows, key=lambda row: -2.0 if row[name] is None else row[name])
+
+
+def _number_of(rows: ResultRows, need: Need, row: dict[str, Any]) -> int:
+    """Return the number of a row; of an answer, that under its conditions, whatever its own depth is."""
+    if rows.need is None:
+        return int(row["design_id"])
+    own = [name for name in inputs_of(row) if name not in (*need.derived, need.key.name)]
+    answers = need.arrow.select(own).to_pylist()
+    return next((k for k, other in enumerate(answers) if all(other[name] == row[name] for name in own)), 0)
+
+
+def _as_need(rows: ResultRows, passing: np.ndarray) -> Need:
+    """Return the result of a run as the answer to which of its designs to build."""
+    chances, columns = rows.chances(), {k: v for k, v in rows.inputs.items() if v.shape == rows.codes.shape}
+    sweep = asked_sweep(rows.finished.identity, pa.table(columns))
+    asked = Need(sweep, pa.table({}), key_of("embedment_depth"), MARGIN, 0)
+    if chances is not None:
+        asked = replace(asked, least_margin=0.0, probability=SAFE)
+    return replace(asked, recommendation=_Designs(rows, passing, asked).recommended())
+
+
+class _Designs:
+    """Boulders at their depths in a run, each with a row for every soil, vehicle and speed.
+
+    Parameters
+    ----------
+    rows
+        The run.
+    passing
+        Whether a row passes, in the shape of the grid.
+    asked
+        What is asked of a design.
+    """
+
+    def __init__(self, rows: ResultRows, passing: np.ndarray, asked: Need) -> None:
+        self.rows, self.passing, self.computed = rows, passing, ~rows.having(NOT_YET)
+        self.kinds = tuple(kind for kind in CONDITIONS if kind in {condition_of(name) for name in rows.varying()})
+        ranks = np.array([RANKS[grade or None] for grade in rows.robustness])
+        self.rank = ranks[rows.codes].reshape(rows.shape)
+        chances, every = rows.chances(), np.arange(len(rows.codes))
+        has = np.nan_to_num(rows.margins(every), nan=-1.0) if chances is None else chances
+        self.has, self.asked = has.reshape(rows.shape), asked
+        self.members = rows.over(np.ones(rows.shape, np.int64), self.kinds, np.add)
+        self.worst = rows.over(self.rank, self.kinds, np.maximum)
+        self.first = rows.over(every.reshape(rows.shape), self.kinds, np.minimum).ravel() == every
+        self.graded = chances is not None or "second_opinion" in rows.settings["model"]
+        self.tried: dict[int, Design] = {}
+
+    def _count(self, held: np.ndarray) -> int:
+        """Return the number of designs among rows of which a design has all or none."""
+        return round(float((1.0 / self.members[held]).sum()))
+
+    def _order(self, held: np.ndarray, prefer: str) -> list[int]:
+        """Return the first rows of designs, the least by a preference first."""
+        numbers = np.flatnonzero(held)
+        if not len(numbers):
+            return []
+        columns = self.rows.inputs | {DEPTH: self.rows.depth()}
+        design = {name: np.broadcast_to(columns[name], self.rows.shape).ravel()[numbers] for name in NEEDED}
+        least = quantities_by(design, self.rows.settings) | {DEPTH: design[DEPTH]}
+        least[BOULDER_MASS] = self.rows.mass().ravel()[numbers]
+        # Of a boulder in several soils, what is dug in the one that takes the most.
+        dug = np.full(self.rows.shape, -np.inf)
+        dug.flat[numbers] = least[EXCAVATED.name]
+        least[EXCAVATED.name] = self.rows.over(dug, self.kinds, np.maximum).ravel()[numbers]
+        columns_of = [least[PREFERENCES[name]] for name in (prefer, *PREFERENCES)]
+        order = np.lexsort([numbers, *(np.round(values, 9) for values in reversed(columns_of))])
+        return numbers[order][self.first[numbers[order]]].tolist()
+
+    def _design(self, number: int) -> Design:
+        """Return a design with all its rows, second opinions asked of those of which the run asked none."""
+        read = []
+        numbers = self.rows.siblings(number, self.kinds)
+        for each in numbers[self.computed.ravel()[numbers]].tolist():
+            row = self.rows.row(each)
+            read.append({**row, **self.rows.to_build(each), "robustness": self.rows.grade(row)})
+        return Design(read)
+
+    def _best(self, held: np.ndarray, prefer: str) -> Design | None:
+        """Return the design of best grade that is the least by a preference.
+
+        Where the run asked for no second opinions, some designs are asked: one that is open may be robust.
+        """
+        robust, open_ = RANKS["robust"], RANKS["open"]
+        steps = [(self.worst <= open_, robust), (self.worst == robust, robust), (self.worst <= open_, open_)]
+        for among, rank in (*steps[self.graded :], (held, RANKS["sensitive"])):
+            for number in self._order(held & among, prefer)[:MOST_ASKED]:
+                if number not in self.tried:
+                    self.tried[number] = self._design(number)
+                if RANKS[self.tried[number].grade] <= rank:
+                    return self.tried[number]
+        return None
+
+    def recommended(self) -> Recommendation:
+        """Return the recommendation."""
+        asked, rows = self.asked, self.rows
+        enough = self.has >= (asked.least_margin if asked.probability is None else asked.probability)
+        held = rows.over(enough & (self.passing | (asked.probability is not None)), self.kinds, np.minimum)
+        found = {name: self._best(held, name) for name in PREFERENCES}
+        best = found["mass"]
+        others = {
+            name: design
+            for name, design in found.items()
+            if best is not None and design is not None and design.grade == best.grade and design.sizes != best.sizes
+        }
+        alike = 0
+        if best is not None:
+            rank = RANKS[best.grade]
+            alike = self._count(held & (self.worst <= (rank if self.graded else max(rank, RANKS["open"]))))
+            alike -= sum(not self.graded and RANKS[design.grade] > rank for design in self.tried.values())
+        counts = (self._count(np.ones(rows.shape, bool)), self._count(held), alike, int(self.members.max()))
+        nearest = self._nearest() if best is None and asked.probability is None else None
+        return Recommendation("mass", best, others, *counts, nearest, of_run=True)
+
+    def _nearest(self) -> Nearest:
+        """Return the design that passes in the most of its rows, then a robust one, then the one with most margin."""
+        over = self.rows.over
+        share = over(self.passing.astype(float), self.kinds, np.add) / self.members
+        rank = over(np.where(self.passing, self.rank, 0), self.kinds, np.maximum)
+        has = over(self.has, self.kinds, np.minimum)
+        keys = (-has, rank, -share, ~self.computed)
+        design = self._design(int(np.lexsort([key.ravel() for key in keys])[0]))
+        read = [{**row, "passes_at": row[DEPTH] if row["verdict"] == "pass" else None} for row in design.rows]
+        passes = all(row["passes_at"] is not None for row in read)
+        return Nearest(read, design if passes else None, design.margin if passes else 0.0, False, {})
+
+
+def _counts(rows: ResultRows, n: int) -> list[Sentence]:
+    """Say how many of the rows of a run pass, and why the others do not."""
+    counts, total = rows.counts(), len(rows.codes)
     if total == 1:
-        return _of_one(rows, uncertain)
-    means = ", at the means of their uncertain inputs" if uncertain else ""
-    sentences: list[Sentence] = [*(sentence for sentence, _ in uncertain)]
+        return []
+    sentences = _uncertain(rows)
+    means = ", at the means of their uncertain inputs" if sentences else ""
     sentences.append((f"{n:,} of {total:,} designs {verb(n, 'pass', 'passes')} ({share(n, total)}){means}.",))
-    if n and rows.grades and not uncertain:
+    if n and rows.grades and not means:
         sentences.append(_grades(rows, n))
     if NOT_YET in counts:
         left = f"{counted(counts[NOT_YET], 'design')} {verb(counts[NOT_YET], 'are', 'is')}"
@@ -75,50 +225,7 @@ def answer_of(rows: ResultRows) -> Answer:
     ]
     if others:
         sentences.append((f"Of the others, {'; '.join(others)}.",))
-    sentences += _flagged(rows, n)
-    if n == 0:
-        none = "No design passes at the means." if uncertain else "No design passes."
-        return Answer((*sentences, (none,)), tuple(design for _, design in uncertain if design))
-    withstood = _withstood(rows, passing)
-    least = [_least(rows, withstood, what) for what in ("mass", "depth")]
-    if withstood.kinds != _varied(rows):
-        sentences.append(
-            (
-                f"No boulder passes {_where(rows, _varied(rows))}; "
-                "the least ones below pass only under the conditions named with them.",
-            )
-        )
-    for sentence, _ in least:
-        sentences.append(sentence)
-    named = {design.number: design for _, design in uncertain if design}
-    for _, one in least:
-        known = named.get(one.number)
-        named[one.number] = (
-            one if known is None else Named(f"{known.title}, {one.title[0].lower()}{one.title[1:]}", one.number)
-        )
-    return Answer(tuple(sentences), tuple(named.values()))
-
-
-def _of_answers(rows: ResultRows, need: Need, n: int) -> Answer:
-    """Describe the answers of `sweep need`."""
-    sentences, named = need_sentences(rows, need)
-    if n == 1:
-        sentences += _of_row(rows, rows.row(named[0].number))
-    elif n:
-        sentences += [*([_grades(rows, n)] if need.probability is None else []), *_flagged(rows, n)]
-    return Answer(tuple(sentences), tuple(named))
-
-
-def _flagged(rows: ResultRows, n: int) -> list[Sentence]:
-    """Say how many of the n passes lie outside what the model was tested on."""
-    flagged = n - rows.flags.get("", 0)
-    if flagged:
-        commonest = sorted(((count, name) for name, count in rows.flags.items() if name), reverse=True)
-        most = "; ".join(f"{count:,} with {_meaning(name)}" for count, name in commonest[:3])
-        lie = verb(flagged, "lie", "lies")
-        often = ", most often:" if len(commonest) > 3 else ":"
-        return [(f"{flagged:,} of those that pass {lie} outside what the model was tested on{often} {most}.",)]
-    return []
+    return sentences
 
 
 def _grades(rows: ResultRows, n: int) -> Sentence:
@@ -133,88 +240,15 @@ def _grades(rows: ResultRows, n: int) -> Sentence:
     return (f"Of the {n:,} that {verb(n, 'pass', 'passes')}, {by_grade}.",)
 
 
-def _uncertain(rows: ResultRows) -> list[tuple[Sentence, Named | None]]:
-    """Say how probable it is that designs pass, and name the lightest of the safe ones; nothing of a run."""
+def _uncertain(rows: ResultRows) -> list[Sentence]:
+    """Say how probable it is that designs pass; nothing of a run."""
     chances = rows.chances()
     if chances is None:
         return []
-    if len(chances) == 1:
-        row = rows.row(0)
-        driver = row["p_pass_driver"]
-        most = f", decided most by {driver.replace('.', ' ').replace('_', ' ')}" if driver else ""
-        interval = f"{row['p_pass_low']:.1%} to {row['p_pass_high']:.1%}"
-        chance = f"The probability of passing is {row['p_pass']:.1%} ({interval}){most}."
-        if row["p_undecided"]:
-            why = REASON_WORDS[row["p_undecided_reason"]]
-            chance += f" {row['p_undecided']:.1%} of the designs drawn are undecided ({why})."
-        return [((chance,), Named("The design", 0))]
-    safe = chances >= SAFE
-    n = int(safe.sum())
+    n = int((chances >= SAFE).sum())
     first = f"{n:,} of {len(chances):,} designs {verb(n, 'pass', 'passes')} with a probability of {SAFE:.0%} or more"
-    if not safe.any():
-        best = int(chances.argmax())
-        largest = f"{first}; the largest is {chances[best]:.1%} (design {best:,})."
-        return [((largest,), Named("Design with the largest probability of passing", best))]
-    withstood = _withstood(rows, safe.reshape(rows.shape))
-    mass = np.where(withstood.designs, rows.mass(), np.inf)
-    siblings, kinds = withstood.siblings(rows, int(mass.argmin()))
-    number = int(siblings[chances[siblings].argmin()])
-    lead = f"{first}. The lightest {f'boulder that does so {_where(rows, kinds)}' if kinds else 'of them'}"
-    sentence = _describe(rows, number, siblings, kinds, lead, f", P(pass) = {chances[number]:.1%}")
-    title = f"Lightest boulder that passes with a probability of {SAFE:.0%}"
-    return [(sentence, Named(f"{title} {_where(rows, kinds)}".rstrip(), number))]
-
-
-def _of_one(rows: ResultRows, uncertain: list[tuple[Sentence, Named | None]]) -> Answer:
-    """Describe the result of a single design."""
-    row, name = rows.row(0), rows.names[rows.codes[0]]
-    margin = "" if row["margin"] is None else f", with a margin of {row['margin']:.1%}"
-    verdict = f"{_in_words(name, 1)}{margin}{', at the means of its uncertain inputs' if uncertain else ''}"
-    sentences: list[Sentence] = [*(sentence for sentence, _ in uncertain)]
-    sentences.append((f"The design {verdict}: ", *_sizes(rows, 0), " deep.", *_to_build(rows, 0)))
-    if rows.kind == CAPACITY:
-        sentences += capacity_sentences(row)
-    sentences += _of_row(rows, row)
-    return Answer(tuple(sentences), (Named("The design", 0),))
-
-
-def _of_row(rows: ResultRows, row: dict[str, Any]) -> list[Sentence]:
-    """Say how firm the verdict of a design is, and where it lies outside what the model was tested on."""
-    sentences: list[Sentence] = []
-    grade = rows.grade(row)
-    meaning = meaning_of({**row, "robustness": grade})
-    if meaning is not None:
-        sentences.append((f"It is {grade}: {meaning}.",))
-    flags = [flag for flag in (row["validity"] or "").split(SEPARATOR) if flag]
-    if flags:
-        sentences.append((f"It lies outside what the model was tested on: {'; '.join(map(_meaning, flags))}.",))
-    return sentences
-
-
-def _sizes(rows: ResultRows, number: int) -> Sentence:
-    """Say how heavy a boulder is and how deep it stands."""
-    mass, depth = (float(values.flat[number]) for values in (rows.mass(), rows.depth()))
-    return Measure(mass, "kg"), " of rock, ", Measure(depth, "m")
-
-
-def _to_build(rows: ResultRows, number: int) -> Sentence:
-    """Say what a design takes to build beside its mass, as a sentence that follows another."""
-    quantities = rows.to_build(number)
-    above, excavated, backfilled = (Measure(quantities[spec.name], spec.unit) for spec in TO_BUILD)
-    return (
-        " It stands ",
-        above,
-        " above ground and takes ",
-        excavated,
-        " of excavation and ",
-        backfilled,
-        " of backfill.",
-    )
-
-
-def _meaning(flag: str) -> str:
-    """What a flag says; its name where other rules have set it."""
-    return BY_FLAG[flag].meaning if flag in BY_FLAG else flag
+    best = int(chances.argmax())
+    return [(f"{first}." if n else f"{first}; the largest is {chances[best]:.1%} (design {best:,}).",)]
 
 
 VERBS = {
@@ -231,106 +265,3 @@ def _in_words(name: str, count: int) -> str:
     verdict, _, reason = name.partition(": ")
     does = verb(count, *VERBS[verdict])
     return f"{does} ({REASON_WORDS.get(reason, reason)})" if reason and verdict != "pass" else does
-
-
-class Withstood(NamedTuple):
-    """Designs of boulders that hold under as many of the conditions of a result as any boulder does."""
-
-    designs: np.ndarray
-    """Whether a row is one of them, in the shape of the grid."""
-    kinds: tuple[str, ...]
-    """The conditions under all of which they hold."""
-
-    def siblings(self, rows: ResultRows, number: int) -> tuple[np.ndarray, tuple[str, ...]]:
-        """Return the rows of a boulder under these conditions, and the conditions; none where it has a single row."""
-        siblings = rows.siblings(number, self.kinds)
-        return siblings, self.kinds if len(siblings) > 1 else ()
-
-
-def _varied(rows: ResultRows) -> tuple[str, ...]:
-    """Conditions that vary."""
-    kinds = {condition_of(name) for name in rows.varying()}
-    return tuple(kind for kind in CONDITIONS if kind in kinds)
-
-
-def _withstood(rows: ResultRows, holds: np.ndarray) -> Withstood:
-    """Find the boulders that hold under all conditions, or else under as many as possible; soils count first."""
-    varied = _varied(rows)
-    # The rows of a list need not have every combination.
-    sizes = range(len(varied), -1, -1) if rows.axes else (len(varied), 0)
-    for kinds in (kinds for size in sizes for kinds in combinations(varied, size)):
-        designs = rows.everywhere(holds, kinds)
-        if designs.any():
-            break
-    return Withstood(designs, kinds)
-
-
-def _where(rows: ResultRows, kinds: tuple[str, ...]) -> str:
-    """Say under which conditions; empty without any."""
-    if not kinds:
-        return ""
-    if not rows.axes:
-        return "in every row of the list that has it"
-    words = [CONDITIONS[kind] for kind in kinds]
-    return f"{listed(words)} of the sweep"
-
-
-def _worst(rows: ResultRows, kinds: tuple[str, ...]) -> str:
-    """Say of which row a margin is."""
-    if not kinds:
-        return ""
-    if not rows.axes:
-        return " in the row that is worst for it"
-    if len(kinds) > 1:
-        return f" in the combination of {listed(kinds)} that is worst for it"
-    before = {"soil": "in", "vehicle": "against", "speed": "at"}[kinds[0]]
-    return f" {before} the {kinds[0]} that is worst for it"
-
-
-def _beyond(rows: ResultRows, siblings: np.ndarray, kinds: tuple[str, ...]) -> Sentence:
-    """Name the conditions of a boulder where the sweep has others, under which it need not hold."""
-    said: list[str | Measure] = []
-    for name in rows.varying():
-        kind = condition_of(name)
-        if not kind or (rows.axes and kind in kinds):
-            continue
-        if not rows.axes and set(rows.inputs[name][siblings]) == set(rows.inputs[name]):
-            continue
-        said.append(f"{',' if said else ', with'} {label_of(name)} ")
-        unit = BY_NAME[name].unit if name in BY_NAME else ""
-        low, high = (end if isinstance(end, str) else Measure(end, unit) for end in rows.ends(name, siblings))
-        said += [low] if low == high else [low, " to ", high]
-    return tuple(said)
-
-
-def _describe(
-    rows: ResultRows, number: int, siblings: np.ndarray, kinds: tuple[str, ...], lead: str, held: str
-) -> Sentence:
-    """Describe a boulder behind the words that lead to it: conditions, sizes, worst row, what it takes to build."""
-    return (
-        lead,
-        *_beyond(rows, siblings, kinds),
-        ": ",
-        *_sizes(rows, number),
-        f" deep (design {number:,}{held}{_worst(rows, kinds)}).",
-        *_to_build(rows, number),
-    )
-
-
-def _least(rows: ResultRows, withstood: Withstood, what: str) -> tuple[Sentence, Named]:
-    """Find the design of least mass or depth among boulders that pass, in the row that is worst for it."""
-    values, other = (rows.mass(), rows.depth()) if what == "mass" else (rows.depth(), rows.mass())
-    least = np.where(withstood.designs, values, np.inf)
-    # Ties are broken by the other quantity.
-    ties = least <= least.min() * (1.0 + 1e-9)
-    siblings, kinds = withstood.siblings(rows, int(np.argmin(np.where(ties, other, np.inf))))
-    margins = rows.margins(siblings)
-    number = int(siblings[np.argmin(np.where(np.isnan(margins), np.inf, margins))])
-    title = "Lightest boulder that passes" if what == "mass" else "Shallowest embedment that passes"
-    row = rows.row(number)
-    grade = rows.grade(row)
-    held = f", margin {row['margin']:.1%}" if row["margin"] is not None else ""
-    held += f", {grade}" if grade in ("robust", "sensitive") else ""
-    where = _where(rows, kinds)
-    lead = f"The {title[0].lower()}{title[1:]} {where or 'among them'}"
-    return _describe(rows, number, siblings, kinds, lead, held), Named(f"{title} {where}".rstrip(), number)

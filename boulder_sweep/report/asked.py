@@ -1,4 +1,4 @@
-"""What a file of answers says: the question and its governing answer in sentences, and the answers as a table.
+"""What a file of answers says: how many rows have one, in sentences, and the answers as a table.
 
 The parts of sentences, here and in `boulder_sweep.report.answers`, are words and numbers with units.
 """
@@ -16,7 +16,7 @@ from boulder_sweep.answers.outputs import CAPACITY, NEED, UNCERTAINTY, AnswerFil
 from boulder_sweep.answers.search import BLOCKED, NEVER, NOT_MONOTONE, UNKNOWN, WORDS
 from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS
 from boulder_sweep.designs import SIDES
-from boulder_sweep.report.rows import CONDITIONS, DEPTH, RATIO, ResultRows, condition_of, label_of
+from boulder_sweep.report.rows import DEPTH, RATIO, ResultRows, label_of
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.text import counted
 
@@ -80,97 +80,32 @@ def key_words(need: Need) -> str:
     return f"{'largest' if need.key.most else 'least'} {name}"
 
 
-def need_sentences(rows: ResultRows, need: Need) -> tuple[list[Sentence], list[Named]]:
-    """Return the question with how many rows have an answer, why others have none, and the governing answer."""
+def need_sentences(rows: ResultRows, need: Need) -> tuple[list[Sentence], Named]:
+    """Return how many rows have an answer, why others have none, and first, where nothing is recommended, the worst."""
     answers = need.arrow[need.key.answer].to_numpy()
-    has_answer, total = ~np.isnan(answers), len(answers)
-    n = int(has_answer.sum())
+    n, total = int((~np.isnan(answers)).sum()), len(answers)
     sentences: list[Sentence] = []
     if total > 1:
-        asked = f"The {key_words(need)} that passes{_terms(need, rows)}"
-        sentences.append((f"{asked}: {n:,} of {total:,} combinations have one ({share(n, total)}).",))
+        sentences.append((f"{n:,} of {total:,} combinations have an answer ({share(n, total)}).",))
     without = need.arrow.filter(need.arrow["passes_at"].is_null())["found"].to_pylist()
     for word, count in Counter(without).items():
         if word in NOTHING:
             who = f"{counted(count, 'combination')}" if total > 1 else "The boulder"
             sentences.append((f"{who} {verb(count, 'do', 'does')} {NOTHING[word]}.",))
-    if not n:
-        return sentences, [Named("The last value tried", 0)]
-    sentence, named = _governing(rows, need, answers)
-    return [sentence, *sentences] if total == 1 else [sentences[0], sentence, *sentences[1:]], [named]
-
-
-def _terms(need: Need, rows: ResultRows) -> str:
-    """Say what an answer must have besides passing."""
-    assert isinstance(rows.finished, AnswerFile)
-    words = [f"a margin of {need.least_margin:.0%} or more"] if need.least_margin else []
-    words += [f"a probability of {100 * need.probability:.10g} % or more"] if need.probability is not None else []
-    robust = " and is robust" if rows.finished.question.get("robust") else ""
-    return f"{robust}{' with ' if words else ''}{listed(words) if words else ''}"
-
-
-def _governing(rows: ResultRows, need: Need, answers: np.ndarray) -> tuple[Sentence, Named]:
-    """Find the boulder to recommend, and its answer where that is worst.
-
-    The lightest boulder with an answer under every condition of the file, or of those with an answer under most.
-    """
-    open_ = {need.key.name, *need.derived}
-    varying = [name for name in rows.varying() if name not in open_]
-    kinds = tuple(kind for kind in CONDITIONS if kind in {condition_of(name) for name in varying})
-    boulders = rows.boulders([*open_, *(name for name in varying if condition_of(name))])
-    has_answer = ~np.isnan(answers)
-    held = np.bincount(boulders, weights=has_answer)
-    whole = held == np.bincount(boulders)
-    candidates = has_answer & (held == held.max())[boulders]
-    mass = need.arrow[BOULDER_MASS].to_numpy()
-    if need.key.name != BOULDER_MASS:  # which differs from soil to soil
-        lightest = int(np.argmin(np.where(candidates, mass, np.inf)))
-        candidates &= boulders == boulders[lightest]
-    worst = np.where(candidates, answers if need.key.most else -answers, np.inf)
-    number = int(np.argmin(worst))
-    several = int(candidates.sum()) > 1
-    under = listed([CONDITIONS[kind] for kind in kinds]) if kinds else ""
-    if under and not whole[boulders[number]]:
-        under = f"in {int(held.max()):,} of its {int(np.bincount(boulders)[boulders[number]]):,} combinations"
-    row = rows.row(number)
-    sizes: list[str | Measure] = []
-    if need.key.name != BOULDER_MASS:
-        sizes += [", ", Measure(float(mass[number]), "kg"), " of rock"]
-    if need.key.name != DEPTH:
-        sizes += [", ", Measure(row[DEPTH], "m"), " deep"]
-    more = [f"margin {row['margin']:.1%}"] if row["margin"] is not None and need.probability is None else []
-    more += [f"P(pass) = {row['p_pass']:.1%}"] if "p_pass" in row else []
-    more += [row["robustness"]] if row["robustness"] in ("robust", "sensitive") else []
-    asked = Measure(float(answers[number]), need.key.field.unit)
-    where = " where that is worst for it" if several else ""
-    if len(answers) == 1:
-        lead = f"The {key_words(need)} that passes{_terms(need, rows)}: "
-        return (lead, asked, *sizes, f" ({', '.join(more)})."), Named("The answer", number)
-    who = "Lightest boulder with an answer" if need.key.name != BOULDER_MASS else "Governing answer"
-    title = f"{who} {under}".rstrip()
-    end = f"{where} ({', '.join([f'design {number:,}', *more])})."
-    return (f"{title}: ", *sizes[1:], f", {key_words(need)} ", asked, end), Named(title, number)
-
-
-def capacity_sentences(row: dict[str, Any]) -> list[Sentence]:
-    """Return what a single design withstands."""
-    asked = {
-        "speed": ("withstands_speed_m_s", "m/s"),
-        "mass of the truck": ("withstands_mass_kg", "kg"),
-        "friction angle": ("withstands_friction_angle_deg", "deg"),
-    }
-    parts: list[str | Measure] = []
-    for name, (column, unit) in asked.items():
-        value = row[column]
-        parts += ["; " if parts else "", f"{name} "]
-        parts += ["none of those tried"] if value is None else [Measure(value, unit)]
-    return [("All else unchanged, the worst up to which it passes throughout: ", *parts, ".")]
+    if not n or need.recommendation is not None:
+        return sentences, Named("The last value tried", 0)
+    number = int(np.nanargmin(answers if need.key.most else -answers))
+    where, row = f" in the worst of {n:,} combinations" if n > 1 else "", rows.row(number)
+    held = f"P(pass) = {row['p_pass']:.1%}" if "p_pass" in row else f"margin {row['margin']:.1%}"
+    lead = f"The {key_words(need)} that passes{where}: "
+    worst = (lead, Measure(float(answers[number]), need.key.field.unit), f" (design {number:,}, {held}).")
+    return [worst, *sentences], Named("The answer that is worst", number)
 
 
 def answers_table(rows: ResultRows) -> AnswerTable | None:
     """Return the answers as a table; None for the result of a run, and where the sentences say it all."""
     file = rows.finished
-    if not isinstance(file, AnswerFile) or len(rows.codes) == 1:
+    if not isinstance(file, AnswerFile) or (len(rows.codes) == 1 and file.kind == NEED):
         return None
     answers = file.answers()
     table = file.table
@@ -186,7 +121,7 @@ def answers_table(rows: ResultRows) -> AnswerTable | None:
     columns += _answer_columns(file.kind, answers)
     kept = table.slice(0, MOST_LINES).to_pylist()
     more = len(table) > MOST_LINES
-    left = f"the first {MOST_LINES:,} of {len(table):,} answers; `sweep export` writes them all" if more else ""
+    left = f"the first {MOST_LINES:,} of {len(table):,} answers" if more else ""
     lines = tuple(tuple(_cell(row, name, unit, open_) for _, name, unit in columns) for row in kept)
     return AnswerTable(tuple(head for head, _, _ in columns), lines, left)
 

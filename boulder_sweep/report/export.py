@@ -9,7 +9,9 @@ from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from boulder_sweep.answers.outputs import AnswerFile, result_of
+from boulder_sweep.answers.advice import advice
+from boulder_sweep.answers.need import Need
+from boulder_sweep.answers.outputs import NEED, AnswerFile, result_of
 from boulder_sweep.columns import BOULDER_MASS, BY_NAME
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.quantities import NEEDED, QUANTITIES, quantities_by
@@ -88,6 +90,9 @@ def export(out: str | Location, file: str | Path, *, units: str | None = None) -
 def about(finished: Exportable, columns: Iterable[Shown], units: str = "si") -> Iterator[tuple[str, str, str]]:
     """Yield what a reader must know about a table, three texts for each line; settings in ``si`` or ``us`` units."""
     identity: Mapping[str, Any] = finished.identity
+    answers = finished.answers() if isinstance(finished, AnswerFile) and finished.kind == NEED else None
+    for line in advice(answers, units) if isinstance(answers, Need) else ():
+        yield line, "", ""
     yield NOT_A_TEST, "ASTM F2656 rates barriers by crash test.", ""
     yield "rows", f"{finished.rows_done:,} of {finished.rows:,}", ""
     if finished.judged_by:

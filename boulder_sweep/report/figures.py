@@ -37,8 +37,12 @@ PARTS = {
     "soil_drag": ("soil, dragged", "#7FCFB5"),
 }
 """Energies in stacking order: word and colour."""
-LEFT, RIGHT = 5.4, 4.0
+LEFT, RIGHT = 5.3, 4.3
 """How much is drawn before and behind the boulder [m]: room for constants of the soil there, and dimensions here."""
+PLAN = 1.7, 2.3
+"""Room before and behind the boulder in the plan [m]: for the arrow of the truck, and for the width."""
+BARS = {"si": (2.0, "2 m"), "us": (1.524, "5 ft")}
+"""Length of the scale bar [m], and how it is called."""
 SKY, BELOW = 0.5, 0.5
 """Room above what stands, and below the boulder [m]."""
 LINE = 0.34
@@ -192,16 +196,22 @@ class Sketch(NamedTuple):
     hood: float
     roof: float
     left: float
+    ground: float
+    """Where the ground of the elevation ends, and the plan begins,"""
     right: float
+    """and where that ends."""
     top: float
     bottom: float
     dimensions: tuple[Dimension, ...]
     strata: tuple[Stratum, ...]
     water: float | None
+    plan: tuple[float, float, float, float]
+    """The boulder from above: x of its near side and y of its upper one, length and width."""
+    bar: tuple[float, str]
 
 
-def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any]) -> Sketch:
-    """Return the section of a design.
+def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any], units: str = "si") -> Sketch:
+    """Return elevation and plan of a design.
 
     Parameters
     ----------
@@ -209,8 +219,11 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any]) -> Sketc
         Its inputs by the columns of the table.
     settings
         Resolved settings of its sweep, which say how the soil lies.
+    units
+        ``si`` or ``us``, of the scale bar.
     """
-    length, height, depth = (inputs[name] for name in ("boulder_length_m", "boulder_height_m", "embedment_depth_m"))
+    length, width, height = (inputs[f"boulder_{side}_m"] for side in ("length", "width", "height"))
+    depth = inputs["embedment_depth_m"]
     bumper, hood = inputs["bumper_height_m"], inputs["hood_height_m"]
     ground = Ground.of_dict(settings["model"].get("ground", {}))
     above, roof = height - depth, hood + CAB_M
@@ -225,24 +238,32 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any]) -> Sketc
     first, last = float(front.min()), float(back.max())
     beside = last + 0.35
     low = -depth / 2 if abs((ground.water_table_m or 0.0) - depth) < 2 * LINE else -depth + 0.12  # beside its words
+    ends = last + RIGHT
+    # The plan lies as high as the middle of the elevation, so that the two are read together.
+    wide, middle = ends + PLAN[0] + length, (above + 0.6 - depth) / 2
+    upper, lower = middle + width / 2, middle - width / 2
+
+    def across(left: float, right: float, y: float, name: str) -> Dimension:
+        return Dimension(left, y + 0.2, right, y + 0.2, name, right - left, left + 0.15, y + 0.3, "start")
+
+    def upright(x: float, low: float, high: float, name: str, at: float) -> Dimension:
+        return Dimension(x, low, x, high, name, high - low, x + 0.12, at, "start")
+
     dimensions = (
-        Dimension(beside, 0.0, beside, above, "above ground", above, beside + 0.12, above / 2, "start"),
-        Dimension(beside, -depth, beside, 0.0, "embedment", depth, beside + 0.12, low, "start"),
-        Dimension(first, above + 0.2, last, above + 0.2, "length", length, first, above + 0.3, "start"),
+        upright(beside, 0.0, above, "above", above / 2 - 0.1),
+        upright(beside, -depth, 0.0, "d =", low),
+        upright(last + 2.6, -depth, above, "H =", max(above / 2 - 0.1, 0.2)),
+        across(first, last, above, "L =")._replace(value=length),  # the sides may lean
         Dimension(-3.0, 0.0, -3.0, bumper, "bumper", bumper, -3.12, 0.12, "end"),
+        across(wide - length, wide, upper, "L ="),
+        upright(wide + 0.35, lower, upper, "W =", middle - 0.1),
     )
     tops = [0.0, *(layer.from_m for layer in ground.layers)]
-    soils = [
-        (
-            inputs["friction_angle_deg"],
-            inputs["soil_density_kg_m3"],
-            inputs["subgrade_reaction_MN_m3"],
-            ground.cohesion_kPa,
-        ),
-        *(
-            (layer.friction_angle_deg, layer.density_kg_m3, layer.subgrade_reaction_MN_m3, layer.cohesion_kPa)
-            for layer in ground.layers
-        ),
+    names = ("friction_angle_deg", "soil_density_kg_m3", "subgrade_reaction_MN_m3")
+    soils = [(*(inputs[name] for name in names), ground.cohesion_kPa)]
+    soils += [
+        (layer.friction_angle_deg, layer.density_kg_m3, layer.subgrade_reaction_MN_m3, layer.cohesion_kPa)
+        for layer in ground.layers
     ]
     # The ground is drawn as deep as its deepest boundary within two heights of the boulder.
     known = [*tops, ground.water_table_m or 0.0]
@@ -254,12 +275,12 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any]) -> Sketc
         if -top <= bottom:
             break
         under = min(tops[k + 1] if k + 1 < len(tops) else -bottom, -bottom)
-        units = (("φ′", "deg"), ("ρ", "kg/m^3"), ("k", "MN/m^3"), ("c", "kPa"))
+        symbols = (("φ′", "deg"), ("ρ", "kg/m^3"), ("β", "MN/m^3"), ("c", "kPa"))
         named = (
             *((("from", top, "m"),) if ground.layers else ()),
             *(
                 (name, value, unit)
-                for (name, unit), value in zip(units, constants, strict=True)
+                for (name, unit), value in zip(symbols, constants, strict=True)
                 if name != "c" or value
             ),
         )
@@ -275,10 +296,13 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any]) -> Sketc
         hood=hood,
         roof=roof,
         left=-LEFT,
-        right=last + RIGHT,
+        ground=ends,
+        right=wide + PLAN[1],
         top=max(above + 0.6, roof) + SKY,
         bottom=bottom,
         dimensions=dimensions,
         strata=tuple(strata),
         water=ground.water_table_m,
+        plan=(wide - length, upper, length, width),
+        bar=BARS[units],
     )

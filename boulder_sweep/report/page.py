@@ -16,7 +16,7 @@ from bokeh.resources import INLINE
 from boulder_kernels import Control, Readings
 from boulder_sweep.report.contents import held_at, page_data, reading_words, table_data, thinned
 from boulder_sweep.report.export import setting_lines
-from boulder_sweep.report.figures import curves, sketch_of, verdict_map
+from boulder_sweep.report.figures import curves, verdict_map
 from boulder_sweep.report.log_chart import log_charts
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import shown_settings
@@ -26,6 +26,7 @@ from boulder_sweep.views.wording import LAW_WORDS, ground_words
 if TYPE_CHECKING:
     from boulder_sweep.report.asked import AnswerTable, Sentence
     from boulder_sweep.report.rows import ResultRows
+    from boulder_sweep.report.sheet import Sheet
 
 ASSETS = Path(__file__).with_name("assets")
 SCRIPTS = ("kernel", "verdict", "simulator", "texts", "plots", "scene", "maps", "controls", "page")
@@ -50,11 +51,12 @@ def assembled(
     control: Control,
     readings: Readings,
     start: Mapping[str, float],
+    sheet: Sheet | None = None,
     sentences: Sequence[Sentence] = (),
     answers: AnswerTable | None = None,
     rows: ResultRows | None = None,
     chosen: Sequence[Mapping[str, Any]] = (),
-    facts: Sequence[tuple[str, str]] = (),
+    facts: Sequence[tuple[str, str]],
     notes: Sequence[str] = (),
     heading: Mapping[str, str] = NOTHING,
     units: str = "si",
@@ -69,8 +71,10 @@ def assembled(
         How its designs are simulated.
     start
         The design with which the simulator starts, by the input columns of the table.
+    sheet
+        The first page, of a result.
     sentences
-        The answer in words.
+        What else there is to say of it.
     answers
         The answers one by one, of a file of them.
     rows
@@ -82,7 +86,7 @@ def assembled(
     notes
         Notes on these particular results.
     heading
-        Project, client, author and date, as far as given.
+        Project, client and so on, as far as given.
     units
         Units shown first, ``si`` or ``us``.
 
@@ -106,6 +110,8 @@ def assembled(
     data = page_data(settings=settings, control=control, readings=readings, start=start, chosen=chosen, units=units)
     data["rows"] = table
     data["bokeh"] = {"docs": docs, "items": [{**item.to_json(), "roots": elements} for item in items]}
+    known = dict(facts)
+    origin = (f"boulder-sweep {known['version of boulder-sweep']}", f"settings {known['hash of the settings'][:12]}")
     script = "\n".join((ASSETS / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS)
     library = "\n".join(INLINE.clone(components=["bokeh"]).js_raw)
     environment = jinja2.Environment(
@@ -117,6 +123,9 @@ def assembled(
     )
     return environment.get_template("page.html").render(
         title=data["title"],
+        units=units,
+        footer=_css_text(" · ".join(filter(None, (heading.get("project"), data["title"], *origin)))),
+        sheet=sheet,
         sentences=sentences,
         answers=answers,
         panels=panels,
@@ -125,11 +134,11 @@ def assembled(
         chosen=data["chosen"],
         thinned=kept.words if kept is not None else None,
         mapped=mapped,
+        said=rows is None or sheet is None or not mapped or _is_listed(rows, sheet, answers),
         facts=facts,
         notes=notes,
         heading=heading,
         logs=log_charts(settings),
-        sketch=sketch_of(chosen[0]["inputs"], settings) if chosen else None,
         settings=settings,
         lines=setting_lines(shown_settings(settings, units)),
         readings=reading_words(settings),
@@ -144,6 +153,18 @@ def assembled(
         library=library,
         policy=_policy(library, script),
     )
+
+
+def _is_listed(rows: ResultRows, sheet: Sheet, answers: AnswerTable | None) -> bool:
+    """Whether every row of a result is in a table, so that a map of them says nothing on paper."""
+    if answers is not None:
+        return not answers.left_out
+    return sheet.cases is not None and len(sheet.cases.rows) == len(rows.codes)
+
+
+def _css_text(text: str) -> str:
+    """Return a text as a string of a style sheet, within HTML."""
+    return "".join(one if one.isalnum() or one in " .,·-" else f"\\{ord(one):x} " for one in text)
 
 
 def _policy(*scripts: str) -> str:

@@ -22,7 +22,6 @@ from boulder_sweep.impact.recomputing import one_design
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.quantities import NEEDED, quantities_by
-from boulder_sweep.judge.validity import flag_counts
 from boulder_sweep.locations import Location
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.shape import Shape
@@ -34,8 +33,8 @@ if TYPE_CHECKING:
 
 RATIO, DEPTH = "embedment_ratio", "embedment_depth_m"
 SIZES = ("boulder_length_m", "boulder_width_m", "boulder_height_m", "boulder_density_kg_m3")
-CONDITIONS = {"soil": "in every soil", "vehicle": "against every vehicle", "speed": "at every speed"}
-"""What a boulder must withstand as it is, in the words of a sentence; not the designer's choice."""
+CONDITIONS = ("soil", "vehicle", "speed")
+"""What a boulder must withstand as it is; not the designer's choice."""
 NOT_YET = "not computed yet"
 MOST_ELEMENTS = 5000
 """Most soil elements that the page simulates with; the paper has as many."""
@@ -86,8 +85,6 @@ class ResultRows:
         were asked, ``pass: robust``; the last is for rows not computed yet.
     codes : ndarray of uint8, shape (rows,)
         Index of the name of every row.
-    flags : dict of str to int
-        Designs that pass, by validity flags; under ``""`` those without.
     grades : dict of str to int
         Designs that pass, by their robustness. Empty for a table that does not have it.
     axes : dict of str to ndarray
@@ -106,7 +103,6 @@ class ResultRows:
     finished: FinishedRows | AnswerFile
     names: tuple[str, ...]
     codes: np.ndarray
-    flags: dict[str, int]
     grades: dict[str, int]
     axes: dict[str, np.ndarray]
     sets: dict[str, NamedSets]
@@ -173,42 +169,34 @@ class ResultRows:
             return tuple(name for name, values in self.axes.items() if len(values) > 1)
         return tuple(name for name, column in self.inputs.items() if column.ndim and (column != column[0]).any())
 
-    def ends(self, name: str, numbers: np.ndarray) -> tuple[str | float, str | float]:
-        """Return the least and the greatest value of designs on an axis or in a column; the name of a named set."""
-        if not self.axes:
-            values = self.inputs[name][numbers]
-        else:
-            index = np.unravel_index(numbers, self.shape)[list(self.axes).index(name)]
-            if name in self.sets:
-                return self.sets[name].names[int(index.min())], self.sets[name].names[int(index.max())]
-            values = self.axes[name][index]
-        return float(values.min()), float(values.max())
-
-    def everywhere(self, holds: np.ndarray, kinds: Sequence[str]) -> np.ndarray:
-        """Return which designs hold whatever is varied of some conditions.
+    def over(self, values: np.ndarray, kinds: Sequence[str], ufunc: np.ufunc) -> np.ndarray:
+        """Return for every row what a ufunc makes of all rows that differ from it in nothing but some conditions.
 
         Parameters
         ----------
-        holds : ndarray of bool, shape ``self.shape``
-            Whether a design holds in its own row.
+        values : ndarray, shape ``self.shape``
+            A value of every row.
         kinds
             Conditions of `CONDITIONS`.
+        ufunc
+            Takes two values: the least, the greatest, the sum.
 
         Returns
         -------
-        ndarray of bool, shape ``self.shape``
-            Whether all rows hold that differ from a row in nothing else.
+        ndarray, shape ``self.shape``
+            The same in all of these rows.
         """
         over = [name for name in self.varying() if condition_of(name) in kinds]
         if not over:
-            return holds
+            return values
         if self.axes:
             along = tuple(list(self.axes).index(name) for name in over)
-            return np.broadcast_to(holds.all(axis=along, keepdims=True), self.shape)
+            return np.broadcast_to(ufunc.reduce(values, axis=along, keepdims=True), self.shape)
         boulders = self.boulders(over)
-        held = np.ones(boulders.max() + 1, bool)
-        np.logical_and.at(held, boulders, holds)
-        return held[boulders]
+        _, first, index = np.unique(boulders, return_index=True, return_inverse=True)
+        made, others = values[first], np.setdiff1d(np.arange(len(values)), first)
+        ufunc.at(made, index[others], values[others])
+        return made[index]
 
     def siblings(self, number: int, kinds: Sequence[str]) -> np.ndarray:
         """Return the rows, in ascending order, that differ from one in nothing but some conditions."""
@@ -313,12 +301,10 @@ def read_rows(folder: Location) -> ResultRows:
     codes = np.full(finished.rows, 255, np.uint8)
     columns = {name: np.full(finished.rows, np.nan) for name in stored}
     names: list[tuple[str, str]] = []
-    flags: Counter[str] = Counter()
     grades: Counter[str] = Counter()
     asked = bool(settings["model"].get("second_opinion")) or kind_of(finished) in (NEED, CAPACITY)
-    for table in finished.tables(["design_id", "verdict", "reason", "validity", "robustness", *stored]):
-        flags.update(_of_passes(table, "validity"))
-        grades.update(_of_passes(table, "robustness"))
+    for table in finished.tables(["design_id", "verdict", "reason", "robustness", *stored]):
+        grades.update(_grades_of(table))
         rows = table.column("design_id").to_numpy()
         codes[rows] = _codes(table, names, asked=asked)
         for name in stored:
@@ -333,9 +319,8 @@ def read_rows(folder: Location) -> ResultRows:
     for index, (axis, values) in enumerate(axes.items()):
         for name, along in (sets[axis].inputs if axis in sets else {axis: values}).items():
             inputs[name] = along.reshape([-1 if k == index else 1 for k in range(len(axes))])
-    by_flag = flag_counts(flags.items()) if flags else {}
     words, robustness = zip(*names, (NOT_YET, ""), strict=True)
-    return ResultRows(folder, finished, words, codes, by_flag, dict(grades), axes, sets, inputs, robustness)
+    return ResultRows(folder, finished, words, codes, dict(grades), axes, sets, inputs, robustness)
 
 
 def _check_whole(file: AnswerFile, path: Location) -> None:
@@ -394,11 +379,11 @@ def _axes(
             yield name, _column(columns, name)[: step * length : step]
 
 
-def _of_passes(table: Any, name: str) -> dict[str, int]:
-    """Return the number of passing designs of a part for each word of a column."""
+def _grades_of(table: Any) -> dict[str, int]:
+    """Return the number of passing designs of a part for each grade."""
     import pyarrow.compute as pc
 
-    words = table.column(name).filter(pc.equal(table.column("verdict").cast("string"), "pass"))
+    words = table.column("robustness").filter(pc.equal(table.column("verdict").cast("string"), "pass"))
     return {one["values"] or "": one["counts"] for one in pc.value_counts(words.cast("string")).to_pylist()}
 
 

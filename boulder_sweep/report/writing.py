@@ -9,10 +9,12 @@ import subprocess
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from datetime import date
 from pathlib import Path
 from typing import Any
 
 from boulder_kernels import Control, Readings
+from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.accuracy import accuracy_of, control_of, readings_of
@@ -22,6 +24,7 @@ from boulder_sweep.report.answers import answer_of
 from boulder_sweep.report.asked import Named, answers_table
 from boulder_sweep.report.build import kernel
 from boulder_sweep.report.rows import MOST_ELEMENTS, inputs_of, read_rows
+from boulder_sweep.report.sheet import sheet_of
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import FOOT_WORDS, SolverSettings
 from boulder_sweep.settings.shown_units import check_system, quantity_text
@@ -35,7 +38,7 @@ from boulder_sweep.text import counted, install, printable, why
 from boulder_sweep.views.wording import name_of, value_text
 
 KINDS = (".html", ".htm", ".pdf")
-PACKAGES = ("boulder-sweep", "numba", "llvmlite", "numpy", "pyarrow", "python")
+PACKAGES = ("numba", "llvmlite", "numpy", "pyarrow", "python")
 BROWSERS = (
     *("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge", "microsoft-edge"),
     "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
@@ -59,8 +62,11 @@ WATCHED = 'exec 3<&0; (read _ <&3; kill -9 0) & exec "$@" 3<&- </dev/null'
 """Runs a browser that ends with this process, even if that is killed: its end of a pipe is then closed."""
 _LAST_WORDS = 300
 """Characters of what a browser said last that are shown."""
-SETTLED_MS = 30_000
-"""Time of the page that passes before it is printed; the browser skips it while nothing happens."""
+SETTLED_MS = (30_000, 120_000, 480_000)
+"""Time of the page that passes before it is printed; the browser skips it while nothing happens, on a busy machine also
+while the simulator is still being compiled. A page that was not ready is printed again, later."""
+UNREADY = "unready"
+"""Title of a page to be printed until its script has filled it; the title stands in the PDF."""
 
 
 def write_report(
@@ -81,13 +87,14 @@ def write_report(
     page
         The file, ``.html``, ``.htm`` or ``.pdf``; replaced if it exists. A PDF is printed by a Chromium on the machine.
     designs
-        Rows to be shown in full; by default those named in the answer.
+        Rows to be shown in full; by default the one that is recommended.
     units
         Units shown first, ``si`` or ``us``, by default those of the settings file; the reader can switch.
     command
         Command that regenerates the page.
     heading
-        Project, client, author and date; an entry that is not given is that of the settings file.
+        Whom and what it is for; an entry that is not given is that of the settings file. The date of a PDF is today's
+        where none is given.
 
     Returns
     -------
@@ -108,29 +115,32 @@ def write_report(
         check_system(units)
     for key, text in heading.given().items():
         if wrong := wrong_with(text):
-            raise ReportError(f"--{key}: {wrong}")
+            raise ReportError(f"--{key.replace('_', '-')}: {wrong}")
     assembled = _page_maker()
     rows = read_rows(location_of(out))
     target = checked_page(page)
     if rows.finished.rows_done == 0:
         raise ReportError(f"{out} holds no finished designs yet")
     answer = answer_of(rows)
-    named = [Named(f"Design {number}", number) for number in designs] or list(answer.named) or [Named("Design 0", 0)]
     try:
-        chosen = [_shown(one, rows.row(one.number)) for one in named]
+        chosen = [_shown(Named(f"Design {number}", number), rows.row(number)) for number in designs]
     except IndexError as missing:
         raise ReportError(str(missing)) from missing
+    given = {k: value for k, value in answer.row.items() if k != BOULDER_MASS or k in rows.settings["inputs"]}
+    chosen = chosen or [_shown(answer.named, given)]
     identity = rows.finished.identity
     notes = _notes_on_rules(rows.finished.judged_by)
     settings, control = identity["settings"], Control(**identity["control"])
     units = units or units_in(settings)
     readings = Readings(**identity["readings"])
+    today = {"date": date.today().isoformat()} if target.suffix.lower() == ".pdf" else {}
     text = assembled(
-        heading=Heading(**{**settings.get(SECTION, {}), **heading.given()}).given(),
+        heading=Heading(**{**today, **settings.get(SECTION, {}), **heading.given()}).given(),
         settings=settings,
         control=control,
         readings=readings,
         start=chosen[0]["inputs"],
+        sheet=sheet_of(rows, answer, units),
         sentences=answer.sentences,
         answers=answers_table(rows),
         rows=rows,
@@ -241,11 +251,14 @@ def _notes_on_rules(judged_by: str) -> list[str]:
 
 def _general_notes(settings: Mapping[str, Any], control: Control, units: str) -> list[str]:
     """Return notes on how these designs are simulated, in the units asked for."""
-    notes = [f"{FOOT_WORDS[settings['model']['foot']].capitalize()}."]
+    notes = [f"{FOOT_WORDS[settings['model']['foot']].replace(' (boulder.foot)', '').capitalize()}."]
     if settings["model"].get("rock_assumed"):
         rock = quantity_text("kg/m^3", units, ROCK_KG_M3)
         notes.append(f"The density of the rock was not given: {rock} is assumed, and no pass is robust.")
-    notes += [f"{words}." for words in derived_words(settings.get("derived", {}), units)]
+    notes += [
+        f"Source of {words.replace('vehicle.speed', 'vehicle speed')}."
+        for words in derived_words(settings.get("derived", {}), units)
+    ]
     if taken := [_taken(name, how, settings["inputs"], units) for name, how in settings.get("taken_at", {}).items()]:
         judged = (
             "; every row of the table is judged at the means and at the other ends, too, and has the worst verdict, "
@@ -273,7 +286,8 @@ def _taken(name: str, how: str, inputs: Mapping[str, Any], units: str) -> str:
 def _facts(identity: Mapping[str, Any], command: str, out: str = "") -> list[tuple[str, str]]:
     """Return the origin of the results, and how to reproduce them."""
     used = identity["versions"]
-    facts = [(f"version of {name}", used[name]) for name in PACKAGES if name in used]
+    facts = [("version of boulder-sweep", used.get("boulder-sweep", "unknown"))]
+    facts.append(("other versions", ", ".join(f"{name} {used[name]}" for name in PACKAGES if name in used)))
     facts += [(f"hash of the {what}", identity[f"{what}_sha256"]) for what in ("settings", "kernels")]
     return [*facts, *((name, printable(text)) for name, text in (("table", out), ("command", command)) if text)]
 
@@ -326,7 +340,8 @@ def printed(html: str) -> bytes:
     program = browser()
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         page, target = Path(folder, "page.html"), Path(folder, "page.pdf")
-        page.write_text(html, encoding="utf-8")
+        head, _, rest = html.partition("<title>")
+        page.write_text(f"{head}<title>{UNREADY}{rest[rest.find('</title>') :]}" if rest else html, encoding="utf-8")
         # As root, as in a container, Chromium does not start with its sandbox.
         as_root = hasattr(os, "geteuid") and os.geteuid() == 0
         words = [
@@ -341,16 +356,20 @@ def printed(html: str) -> bytes:
             *(["--no-sandbox"] if as_root else []),
             f"--user-data-dir={Path(folder, 'profile')}",
             "--no-pdf-header-footer",
-            f"--virtual-time-budget={SETTLED_MS}",
             "--window-size=1200,900",
             f"--print-to-pdf={target}",
             page.as_uri(),
         ]
-        code, said = _ended(program, words, Path(folder, "said"))
-        if not target.exists() or not target.stat().st_size:
-            shown = f": {said}" if said else ""
-            raise ReportError(f"{program} did not print the page (it ended with code {code}{shown}); {HELP}")
-        return target.read_bytes()
+        for settled in SETTLED_MS:
+            budget = f"--virtual-time-budget={settled}"
+            code, said = _ended(program, [*words[:-1], budget, words[-1]], Path(folder, "said"))
+            if not target.exists() or not target.stat().st_size:
+                shown = f": {said}" if said else ""
+                raise ReportError(f"{program} did not print the page (it ended with code {code}{shown}); {HELP}")
+            content = target.read_bytes()
+            if f"/Title ({UNREADY})".encode() not in content:
+                return content
+    raise ReportError(f"the page was not ready when {program} printed it; {HELP}")
 
 
 def _ended(program: str, words: Sequence[str], said: Path) -> tuple[int, str]:

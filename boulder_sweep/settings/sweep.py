@@ -41,15 +41,18 @@ MOST_CHARACTERS = 200
 
 
 class Heading(NamedTuple):
-    """The heading of a report: whom and what it is for. An entry that is not given is empty.
+    """The heading of a report: whom and what it is for, and who answers for it. An entry that is not given is empty.
 
     Nothing that is computed depends on it.
     """
 
     project: str = ""
     client: str = ""
-    author: str = ""
+    site: str = ""
     date: str = ""
+    revision: str = ""
+    author: str = ""
+    checked_by: str = ""
 
     def given(self) -> dict[str, str]:
         """Return the entries that are given, in order."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from pathlib import Path
 
 from PIL import Image
+from playwright.sync_api import sync_playwright
 
 from boulder_sweep import load, need, read, run
 from boulder_sweep.crash_tests.cases import crash_test
@@ -13,7 +15,10 @@ from boulder_sweep.crash_tests.fitting import fit_pulse
 from boulder_sweep.crash_tests.measured import read_pulse
 from boulder_sweep.crash_tests.validation import validate
 from boulder_sweep.impact.simulation import simulate
+from boulder_sweep.report import write_report
+from boulder_sweep.report.writing import browser
 from boulder_sweep.settings.loader import SECOND_OPINION
+from boulder_sweep.settings.sweep import Heading
 from boulder_sweep.views.crash_curves import FIGURES, draw_convergence, draw_crash_test, draw_rigid_wall
 from boulder_sweep.views.verdict_map import draw_verdict_map
 from boulder_sweep.views.wording import terms_line
@@ -26,6 +31,10 @@ from docs.studies.stones import example_stone
 
 FOLDER = Path("docs/images")
 STILL_AT_S = 0.06
+BOREHOLE = "configs/borehole.yaml"
+HEADING = Heading("Main Street", "City of Springfield", "North gate", "2026-11-28", "A", "C. Day", "E. Fox")
+MARGIN = 20
+"""Beside a photographed sheet [px]."""
 
 
 def draw_all(root: Path) -> list[Path]:
@@ -70,10 +79,36 @@ def draw_all(root: Path) -> list[Path]:
         run(sweep, Path(scratch) / "grid.sweep")
         table, terms = read(Path(scratch) / "grid.sweep"), terms_line(sweep.resolved())
         draw_verdict_map(table, named("m30_sizing.png"), title=sweep.name, terms=terms)
+        need(load(root / SITE)).write(Path(scratch) / "site.parquet")
+        need(load(root / BOREHOLE), probability=0.95).write(Path(scratch) / "borehole.parquet")
+        for name, units in (("site.parquet", "si"), ("grid.sweep", "si"), ("borehole.parquet", "us")):
+            page = write_report(Path(scratch) / name, Path(scratch) / "page.html", units=units, heading=HEADING)
+            photograph(page, named(f"report_{name.partition('.')[0]}.png"))
     drawn += draw_sites(root, folder)
     for path in drawn:
         reduce_colours(path)
     return sorted(drawn)
+
+
+def photograph(page: Path, picture: Path) -> None:
+    """Take a picture of the first sheet of a page as it is printed, but for the footer."""
+    sandbox = [] if getattr(os, "geteuid", lambda: 1)() else ["--no-sandbox"]
+    with sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=browser(), args=sandbox)
+        tab = opened.new_page(viewport={"width": 1200, "height": 900}, device_scale_factor=1.5, color_scheme="light")
+        tab.goto(page.resolve().as_uri())
+        tab.wait_for_selector("html[data-ready]", state="attached")
+        tab.evaluate("dispatchEvent(new Event('beforeprint'))")
+        tab.emulate_media(media="print")
+        tab.evaluate(f"document.body.style.paddingTop = '{2 * MARGIN}px'")
+        code = """(margin) => {
+          const places = ["header", ".sheet"].map((place) => document.querySelector(place));
+          const [head, sheet] = places.map((place) => place.getBoundingClientRect());
+          const [x, y] = [head.left - margin, head.top - margin];
+          return { x, y, width: sheet.width + 2 * margin, height: sheet.bottom + margin - y };
+        }"""
+        tab.screenshot(path=picture, full_page=True, clip=tab.evaluate(code, MARGIN))
+        opened.close()
 
 
 def reduce_colours(path: Path) -> None:

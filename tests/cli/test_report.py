@@ -137,7 +137,7 @@ def test_the_heading_is_that_of_the_file_unless_an_option_says_otherwise(sweep, 
     assert heading_of("small-grid.html") == [("project", "Main Street"), ("client", "City"), ("date", "2026-11-25")]
     assert sweep("report", "small-grid.sweep", "--client", "A & B", "--author", "C. Day")[0] == 0
     assert heading_of("small-grid.html") == [
-        *(("project", "Main Street"), ("client", "A &amp; B"), ("author", "C. Day"), ("date", "2026-11-25"))
+        *(("project", "Main Street"), ("client", "A &amp; B"), ("date", "2026-11-25"), ("author", "C. Day")),
     ]
 
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import boulder_sweep
-from boulder_sweep.report import write_report
+from boulder_sweep.errors import ReportError
+from boulder_sweep.report import write_report, writing
 from boulder_sweep.settings.sweep import Heading
 from tests.report.conftest import SITE, reported
 
@@ -16,7 +17,7 @@ def test_the_map_is_that_of_the_recommended_design_in_its_worst_soil(report, res
     table = boulder_sweep.read(result)
     table["embedment_ratio"] = table.embedment_depth_m / table.boulder_height_m
     first = page.evaluate("page.data.chosen[0]")
-    assert first["title"] == "Lightest boulder that passes in every soil of the sweep"
+    assert first["title"] == "Recommended design"
     values, held = page.evaluate("page.data.rows.values"), page.evaluate("page.held")
     for name in values:
         assert values[name][held[name]] == pytest.approx(table[name][first["number"]], rel=1e-12)
@@ -27,14 +28,26 @@ def test_the_map_is_that_of_the_recommended_design_in_its_worst_soil(report, res
 def test_the_section_has_its_dimensions_layers_and_water_in_the_units_chosen(tmp_path, opened):
     page = opened(reported(SITE, tmp_path, [f"soil.layers=[{LAYER}]", "soil.water_table=0.8 m"]))
     words = " ".join(page.locator(".section svg text").all_text_contents())
-    for said in ("embedment 2.04", "above ground 1.36", "bumper 0.5", "length 1.65", "water table 0.8", "36", "40"):
+    for said in (
+        "d = 2.04",
+        "above 1.36",
+        "H = 3.4",
+        "W = 1.68",
+        "L = 1.65",
+        "bumper 0.5",
+        "water table 0.8",
+        "φ′ 36",
+        "β 40",
+    ):
         assert said in words
     sides = page.locator(".section .boulder").get_attribute("points").split()
     corners = np.array([[float(number) for number in side.split(",")] for side in sides])
     np.testing.assert_allclose(np.ptp(corners, axis=0), [1.65, 3.4])
-    assert page.locator(".section rect").count() == 2
+    assert page.locator(".section rect:is(.soil, .wedge)").count() == 3  # two layers, and the plan
+    plan = {side: float(page.locator(".section .rock").get_attribute(side)) for side in ("width", "height")}
+    assert plan == pytest.approx({"width": 1.65, "height": 1.68})
     page.select_option("#units", "us")
-    assert "length 5.41" in " ".join(page.locator(".section svg text").all_text_contents())
+    assert "L = 5.41" in " ".join(page.locator(".section svg text").all_text_contents())
 
 
 def test_all_of_a_report_in_us_units_is_in_them_and_says_what_uncertain_inputs_were_taken_at(tmp_path):
@@ -58,3 +71,12 @@ def test_the_page_is_printed_to_a_pdf(result, tmp_path, chromium):
     file = write_report(result, tmp_path / "page.pdf", heading=Heading(client="City"))
     assert file.read_bytes().startswith(b"%PDF")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["page.pdf"]
+
+
+def test_a_page_that_is_not_ready_is_not_printed(monkeypatch, chromium):
+    """As on a busy machine: nothing has filled it, and nothing has changed its title."""
+    monkeypatch.setattr(writing, "SETTLED_MS", (100, 200))
+    with pytest.raises(ReportError, match=r"the page was not ready when .* printed it; write the page as \.html"):
+        writing.printed("<html><head><title>site</title></head><body>empty</body></html>")
+    ready = "<title>site</title><script>document.title = 'site'</script>"
+    assert writing.printed(f"<html><head>{ready}</head><body>filled</body></html>").startswith(b"%PDF")

@@ -136,5 +136,5 @@ def test_the_section_is_that_of_the_stone_and_its_water_ends_at_the_faces():
     reaches = np.array([-0.75, -0.9, -0.8, 0.5, 0.8, 0.75])
     np.testing.assert_allclose(xs, STRUCK + reaches)
     assert drawn.at_water == pytest.approx(STRUCK + np.interp(1.23, [0, 1.6], [0.75, 0.8]))
-    length = next(one for one in drawn.dimensions if one.name == "length")
+    length = next(one for one in drawn.dimensions if one.name == "L =")
     assert (length.x1 - length.x0, length.value) == pytest.approx((1.7, 1.7))

@@ -262,7 +262,11 @@ def test_an_override_replaces_an_entry(tmp_path):
 @pytest.mark.parametrize(
     ("block", "column", "words"),
     [
-        ("report: City", 9, "report: must be a block of keys: project, client, author, date"),
+        (
+            "report: City",
+            9,
+            "report: must be a block of keys: project, client, site, date, revision, author, checked_by",
+        ),
         ("report: {cleint: City}", 10, "report.cleint: is not a key of report"),
         ("report: {client: [a, b]}", 18, "report.client: must be one line of text, not a list or a block"),
         ("report: {client: ''}", 18, "report.client: is empty; write one line of text, or leave it out"),

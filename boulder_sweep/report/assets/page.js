@@ -11,8 +11,10 @@ const PAUSE = 150;
 const LONGEST_BLOCK_MS = 100;
 /** Screens on which legends stand below their figures; the style of the page has the same. */
 const NARROW = "(max-width: 46rem)";
-/** Width that is printed [px]: that of a sheet of A4 between its margins, less a tenth; so most pages hold what belongs together. */
-const PAPER = 612;
+/** Width that is printed on a page [px], and heights of A4 and Letter between their margins; a little less than there is. */
+const PAPER = { width: 676, si: 994, us: 928 };
+/** Least size of what is written beside a figure on paper [px]: 8 pt. */
+const LEAST_PX = 10.7;
 
 /** The whole page: what the reader does, and what is simulated and shown for it. */
 class Page {
@@ -266,6 +268,7 @@ class Page {
 
   /** Show everything anew, in other units or colours. */
   refresh() {
+    document.documentElement.dataset.units = this.units.system;
     this.plots.recolour();
     for (const place of document.querySelectorAll(".quantity")) {
       const { value, unit } = /** @type {HTMLElement} */ (place).dataset;
@@ -372,13 +375,18 @@ class Page {
       for (const one of opened) one.open = true;
       const width = byId("live").clientWidth;
       document.documentElement.style.setProperty("--screen", `${width}px`);
-      document.documentElement.style.setProperty("--paper", String(Math.min(PAPER / width, 1)));
+      const size = Math.min(PAPER.width / width, 1);
+      document.documentElement.style.setProperty("--paper", String(size));
+      const above = document.querySelector("header")?.offsetHeight ?? 0;
+      document.documentElement.style.setProperty("--sheet", `${PAPER[/** @type {"si" | "us"} */ (data.units)] / size - above}px`);
       this.printing = true;
+      this.plots.write(LEAST_PX / size);
       this.paint();
     });
     window.addEventListener("afterprint", () => {
       for (const one of opened) one.open = false;
       this.printing = false;
+      this.plots.write(WRITTEN);
       this.paint();
     });
     for (const button of document.querySelectorAll(".load")) {
@@ -442,6 +450,7 @@ async function main() {
   page.paint();
   page.refresh();
   Object.assign(window, { page });
+  document.title = `${data.title}: boulder-sweep`;
   document.documentElement.dataset.ready = "yes";
 }
 

@@ -4,6 +4,9 @@
 /** Heights of curves and of the line of a legend, of maps and of strips [px]. */
 const [HEIGHT, LEGEND_LINE, MAP_HEIGHT, STRIP_HEIGHT] = [240, 20, 420, 170];
 
+/** Size of what is written beside figures on the screen [px]. */
+const WRITTEN = 13;
+
 /** @param {Iterable<number>} times @returns {number[]} so rounded that the axis ends at 1, not a last bit before it */
 function rounded(times) {
   return [...times].map((t) => Number(t.toPrecision(12)));
@@ -63,6 +66,15 @@ class Plots {
         if (part.type !== "Legend") continue;
         part.label_text_color = text;
         part.background_fill_color = part.border_line_color = null;
+      }
+    }
+  }
+
+  /** Write beside axes in a size. @param {number} pixels */
+  write(pixels) {
+    for (const figure of this.document.roots()) {
+      for (const axis of [...figure.left, ...figure.below].filter((part) => part.type !== "Legend")) {
+        axis.axis_label_text_font_size = axis.major_label_text_font_size = `${pixels}px`;
       }
     }
   }

@@ -1,0 +1,236 @@
+"""The first page of a report, which can be signed: question, recommendation, drawing, limits, inputs, what is assumed.
+
+Sentences that hold units are made in both systems; numbers are `Measure`, which the page shows in either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from boulder_kernels.rules import ISLAND_RATIO, ISLAND_SLIDE
+from boulder_sweep.answers.advice import advice, question
+from boulder_sweep.answers.need import Need
+from boulder_sweep.answers.recommendation import Design
+from boulder_sweep.columns import BOULDER_MASS, TO_BUILD
+from boulder_sweep.judge.robustness import meaning_of
+from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
+from boulder_sweep.report.answers import Answer
+from boulder_sweep.report.asked import AnswerTable, Measure
+from boulder_sweep.report.figures import Sketch, sketch_of
+from boulder_sweep.report.rows import DEPTH, ResultRows, inputs_of, label_of
+from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.settings.shown_units import SYSTEMS, quantity_text
+from boulder_sweep.views.wording import ground_words
+
+SOIL = {
+    "friction_angle_deg": "friction angle φ′",
+    "soil_density_kg_m3": "density ρ",
+    "subgrade_reaction_MN_m3": "subgrade reaction β",
+    "strain_rate_factor": "strain rate factor",
+}
+VEHICLE = {
+    "vehicle_mass_kg": "mass",
+    "impact_speed_m_s": "speed",
+    "vehicle_spring_N_m": "spring of the front",
+    "vehicle_damper_N_s_m": "damper of the front",
+    "bumper_height_m": "bumper above ground",
+    "hood_height_m": "hood above ground",
+    "bed_offset_m": "bumper to cargo bed",
+}
+OPEN_IN_WORDS = "no study says what a second opinion is worth here; the design is judged by its margin alone"
+"""What a design without a grade is."""
+NOT_ASKED = "not asked", "second opinions are not asked of designs that are drawn at random"
+"""The same of a design with a probability."""
+MOST_CASES = 40
+"""Most cases of soil and vehicle that are listed."""
+Cell = str | Measure
+
+
+class Words(NamedTuple):
+    """Sentences in one system of units."""
+
+    question: str
+    recommendation: tuple[str, ...]
+    """What to build; where nothing qualifies, what comes nearest."""
+    others: tuple[str, ...]
+    untested: str
+    ground: str
+    governs: str
+    """The case that the numbers are of; empty where there is one."""
+
+
+class Sheet(NamedTuple):
+    """What the first page shows."""
+
+    words: dict[str, Words]
+    """By system of units."""
+    qualifies: bool
+    title: str
+    sketch: Sketch
+    checks: tuple[tuple[str, Cell, Cell, str], ...]
+    """Name, computed, allowed, and how much of it is used."""
+    build: tuple[tuple[str, Cell], ...]
+    soil: tuple[tuple[str, Cell, str], ...]
+    """Name, value, source,"""
+    vehicle: tuple[tuple[str, Cell, str], ...]
+    """and the same."""
+    grade: tuple[str, str]
+    """Of the recommended design in all cases, and what it means."""
+    cases: AnswerTable | None
+    """It in every soil and before every vehicle."""
+
+
+def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
+    """Return the first page of a result.
+
+    Parameters
+    ----------
+    rows, answer
+        The result, and what it says.
+    units
+        Units shown first, ``si`` or ``us``.
+    """
+    found, row, settings = answer.need.recommendation, answer.row, rows.settings
+    near = None if found is None or found.nearest is None else found.nearest.design
+    design = (found.design if found is not None and found.design is not None else near) or Design([row])
+    qualifies = found is not None and found.design is not None
+    several = [name for name in (*SOIL, *VEHICLE) if len({one[name] for one in design.rows}) > 1]
+    named = [name for name in answer.need.sweep.plan.labels if name in row]
+    grade = design.grade
+    worst = next(one for one in design.rows if one["robustness"] == grade)
+    means = OPEN_IN_WORDS if grade == "open" else meaning_of(worst) or ""
+    return Sheet(
+        words={system: _words(answer, design, named or several, settings, system) for system in SYSTEMS},
+        qualifies=qualifies,
+        title=answer.named.title,
+        sketch=sketch_of(inputs_of(row), settings, units),
+        checks=_checks(row, settings["criterion"], answer.need),
+        build=_build(rows, row),
+        soil=_inputs(design.rows, SOIL, settings),
+        vehicle=_inputs(design.rows, VEHICLE, settings),
+        grade=NOT_ASKED if "p_pass" in row else (grade or "", means),
+        cases=_cases(design.rows, [*named, *several]) if len(design.rows) > 1 else None,
+    )
+
+
+def _words(answer: Answer, design: Design, names: Sequence[str], settings: Mapping[str, Any], units: str) -> Words:
+    """Return the sentences; the names are those of the inputs that tell cases apart."""
+    found, said, asked = answer.need.recommendation, advice(answer.need, units), question(answer.need, units)
+    ground = ground_words(settings, units) or "dry, level, the same at every depth, without cohesion"
+    case = ", ".join(_named(name, answer.row[name], units) for name in names)
+    governs = f"in the worst of {len(design.rows):,} cases: {case}" if case else ""
+    if found is None:  # the worst answer, or why there is none
+        said = ["".join(p if isinstance(p, str) else _measured(p, units) for p in answer.sentences[0])]
+    if found is None or found.design is None:
+        return Words(asked, tuple(said), (), "", ground, governs)
+    return Words(asked, (said[0],), tuple(said[1:-1]), said[-1], ground, governs)
+
+
+def _measured(part: Measure, units: str) -> str:
+    """Return a number with its unit."""
+    return quantity_text(part.unit, units, part.value).replace(" deg", "°").replace("^3", "³")
+
+
+def _named(name: str, value: str | float, units: str) -> str:
+    """Return an input with its value: the name of a set, or words and a number with its unit."""
+    if isinstance(value, str):
+        return value
+    return f"{(SOIL | VEHICLE)[name]} {_measured(Measure(value, BY_NAME[name].unit), units)}"
+
+
+def _checks(
+    row: Mapping[str, Any], criterion: Mapping[str, Any], need: Need
+) -> tuple[tuple[str, Cell, Cell, str], ...]:
+    """Return loads and limits of the row that governs; a boulder that is hardly buried may not slide far."""
+    slides = ISLAND_SLIDE if row[DEPTH] < ISLAND_RATIO * row["boulder_height_m"] else None
+    limit, overlap = PENETRATION_LIMITS_M[criterion["rating"]], criterion["min_overlap_m"]
+    of: list[tuple[str, str, str, float | None]] = [
+        ("rotation", "max_rotation_deg", "deg", criterion["max_rotation_deg"]),
+        ("displacement", "max_displacement_m", "m", slides),
+        (f"penetration of cargo bed, {criterion['rating']}", "penetration_m", "m", limit),
+        ("overlap, at least", "overlap_m", "m", overlap),
+        ("peak force of the truck", "peak_force_kN", "kN", None),
+        ("acting at a height of", "impact_height_m", "m", None),
+    ]
+    lines: list[tuple[str, Cell, Cell, str]] = []
+    for words, name, unit, allowed in of:
+        value = row[name]
+        used = "–"
+        if value and allowed:
+            used = f"{100.0 * max(allowed / value if name == 'overlap_m' else value / allowed, 0.0):.0f} %"
+        none = "no limit" if name == "max_displacement_m" else "–"
+        computed: Cell = "–" if value is None else Measure(value, unit)
+        lines.append((words, computed, none if allowed is None else Measure(allowed, unit), used))
+    if "p_pass" in row:
+        least = "–" if need.probability is None else f"≥ {100.0 * need.probability:.4g} %"
+        lines.insert(0, ("probability of passing", f"{row['p_pass']:.1%}", least, "–"))
+    return tuple(lines)
+
+
+def _build(rows: ResultRows, row: Mapping[str, Any]) -> tuple[tuple[str, Cell], ...]:
+    """Return what the drawing does not say of the boulder, and what it takes to build."""
+    built = zip(("excavation", "backfill"), TO_BUILD[1:], strict=True)
+    mass = row.get(BOULDER_MASS) or float(rows.mass().flat[0])
+    return (
+        ("mass", Measure(float(mass), "kg")),
+        ("density of rock", Measure(row["boulder_density_kg_m3"], "kg/m^3")),
+        *((words, Measure(float(row[spec.name]), spec.unit)) for words, spec in built if spec.name in row),
+    )
+
+
+def _inputs(
+    cases: Sequence[Mapping[str, Any]], names: Mapping[str, str], settings: Mapping[str, Any]
+) -> tuple[tuple[str, Cell, str], ...]:
+    """Return inputs with their values in all cases, and where they come from."""
+    lines = []
+    for name, words in names.items():
+        values, field = sorted({float(one[name]) for one in cases}), BY_NAME[name]
+        if name == "strain_rate_factor" and values == [1.0]:
+            continue
+        for value in dict.fromkeys((values[0], values[-1])):
+            first = value == values[0]
+            shown = f"{words}{', least' if first else ', largest'}" if len(values) > 1 else words
+            lines.append((shown, Measure(value, field.unit), _source(name, values, settings) if first else ""))
+    return tuple(lines)
+
+
+def _source(name: str, values: Sequence[float], settings: Mapping[str, Any]) -> str:
+    """Return where the value of an input comes from, in few words."""
+    derived = settings.get("derived", {})
+    read = {"density_low_kg_m3": "soil_density_kg_m3"}
+    of_soil = {read.get(key, key) for data in derived.get("soil", []) for key in data}
+    spread = settings.get("distributions", {}).get(name)
+    if name in of_soil:
+        source = "field readings"
+    elif name == "impact_speed_m_s" and "approach" in derived:
+        source = "approach"
+    elif BY_NAME[name].default is not None and values == [BY_NAME[name].default]:
+        source = "default"
+    else:
+        source = "given"
+    return source if spread is None else f"{source}; {_spread(spread)}"
+
+
+def _spread(own: Mapping[str, Any]) -> str:
+    """Return how an input is spread."""
+    if own.get("cov") is not None:
+        return f"cov {100.0 * own['cov']:.0f} %"
+    return f"sd {own['sd']:.3g}" if own.get("sd") is not None else str(own.get("kind", "uncertain"))
+
+
+def _cases(cases: Sequence[Mapping[str, Any]], names: Sequence[str]) -> AnswerTable:
+    """Return a design in all its cases as a table."""
+    outcomes = [("max_rotation_deg", "rotation", "deg"), ("penetration_m", "penetration", "m")]
+    heads = [label_of(name) for name in names] + [head for _, head, _ in outcomes]
+    chance = "p_pass" in cases[0]
+    heads += ["P(pass)"] if chance else ["margin", "second opinion"]
+    lines = []
+    for row in cases[:MOST_CASES]:
+        line: list[Cell] = [row[n] if isinstance(row[n], str) else Measure(row[n], BY_NAME[n].unit) for n in names]
+        line += ["–" if row[name] is None else Measure(row[name], unit) for name, _, unit in outcomes]
+        margin = "–" if row["margin"] is None else f"{row['margin']:.1%}"
+        line += [f"{row['p_pass']:.1%}"] if chance else [margin, row["robustness"] or row["reason"] or "–"]
+        lines.append(tuple(line))
+    left = f"the first {MOST_CASES} of {len(cases):,} cases" if len(cases) > MOST_CASES else ""
+    return AnswerTable(tuple(heads), tuple(lines), left)

@@ -1,0 +1,229 @@
+"""The sheet that a report begins with, and the recommendation that a file of answers keeps for it."""
+
+from __future__ import annotations
+
+import json
+import random
+import re
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import openpyxl
+import pyarrow.parquet as pq
+import pytest
+
+import boulder_sweep
+from boulder_sweep.answers.advice import advice, question
+from boulder_sweep.answers.need import Need
+from boulder_sweep.answers.outputs import AnswerFile
+from boulder_sweep.errors import ReportError
+from boulder_sweep.report import write_report, writing
+from boulder_sweep.report.answers import answer_of
+from boulder_sweep.report.asked import Measure
+from boulder_sweep.report.rows import read_rows
+from boulder_sweep.report.sheet import Sheet, sheet_of
+from boulder_sweep.settings.sweep import Heading
+from tests.answers.designs import UNCERTAIN_FRICTION, site
+
+HEADING = Heading("Main Street", "City", "North gate", "2026-11-28", "A", "C. Day", "E. Fox")
+
+
+@pytest.fixture(scope="module")
+def needs() -> dict[str, Need]:
+    """Answers with a recommendation, and without one that qualifies."""
+    return {
+        "depth": boulder_sweep.need(site(height="[3.0, 3.4, 3.6] m")),
+        "mass": boulder_sweep.need(
+            site(height="[2.6, 3.6] m", friction="[38, 40] deg"), "mass", margin=0.1, robust=False
+        ),
+        "chance": boulder_sweep.need(site(height="3.4 m", **UNCERTAIN_FRICTION), probability=0.9),
+        "nearest": boulder_sweep.need(site(height="3.0 m")),
+        "never": boulder_sweep.need(site(height="2.0 m", friction="36 deg")),
+    }
+
+
+@pytest.fixture(scope="module")
+def files(needs: dict[str, Need], tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("sheets")
+    for name, found in needs.items():
+        found.write(folder / f"{name}.parquet")
+    return {name: folder / f"{name}.parquet" for name in needs}
+
+
+def sheet(file: Path, units: str = "si") -> Sheet:
+    rows = read_rows(file)
+    return sheet_of(rows, answer_of(rows), units)
+
+
+NAMES = ("depth", "mass", "chance", "nearest", "never")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_file_says_what_the_terminal_said(needs: dict[str, Need], files: dict[str, Path], name: str) -> None:
+    found, read = needs[name], AnswerFile(files[name], ReportError).answers()
+    assert isinstance(read, Need)
+    assert found.recommendation is not None
+    assert read.recommendation is not None
+    assert read.recommendation.to_dict() == found.recommendation.to_dict()
+    for units in ("si", "us"):
+        said = advice(found, units)
+        words = sheet(files[name]).words[units]
+        assert [*words.recommendation, *words.others, *([words.untested] if words.untested else [])] == said != []
+        assert words.question == question(found, units)
+
+
+def test_answers_without_a_recommendation_have_none_in_their_file(tmp_path: Path) -> None:
+    boulder_sweep.need(site(height="3.4 m"), most="speed").write(tmp_path / "speed.parquet")
+    read = AnswerFile(tmp_path / "speed.parquet", ReportError).answers()
+    assert isinstance(read, Need)
+    assert read.recommendation is None
+    assert b"boulder_sweep.recommendation" not in pq.read_schema(tmp_path / "speed.parquet").metadata
+    assert "largest vehicle speed" in sheet(tmp_path / "speed.parquet").words["si"].recommendation[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "asks"),
+    [
+        (
+            "depth",
+            "Which of 3 boulders, buried how deep, stops a truck of 6,804\u00a0kg at 13.41\u00a0m/s in both soils, ",
+        ),
+        ("mass", "Which is the lightest boulder that stops a truck of "),
+        ("chance", "How deep must the boulder be buried to stop a truck of "),
+    ],
+)
+def test_the_question_is_asked_in_words(files: dict[str, Path], name: str, asks: str) -> None:
+    assert sheet(files[name]).words["si"].question.startswith(asks)
+    assert "15,000\u00a0lb at 30\u00a0mph" in sheet(files[name]).words["us"].question
+
+
+def test_the_limits_are_those_of_the_case_with_the_least_margin(needs: dict[str, Need], files: dict[str, Path]) -> None:
+    found = sheet(files["depth"])
+    best = needs["depth"].recommendation
+    assert best is not None
+    assert best.design is not None
+    worst = min(best.design.rows, key=lambda row: row["margin"])
+    lines = {name: (computed, allowed, used) for name, computed, allowed, used in found.checks}
+    assert lines["rotation"][:2] == (Measure(worst["max_rotation_deg"], "deg"), Measure(20.0, "deg"))
+    used = [int(line[2].split()[0]) for line in (lines["rotation"], lines["penetration of cargo bed, P1"])]
+    assert 100 - max(used) == round(100 * worst["margin"])
+    assert f"friction angle φ′ {worst['friction_angle_deg']:g}°" in found.words["si"].governs
+    assert found.cases is not None
+    assert len(found.cases.rows) == len(best.design.rows) == 2
+    assert ("friction angle φ′, least", Measure(36.0, "deg"), "given") in found.soil
+    assert ("bumper above ground", Measure(0.5, "m"), "default") in found.vehicle
+    assert found.grade[0] == "robust"
+    assert found.qualifies
+
+
+def test_what_does_not_qualify_is_not_recommended(files: dict[str, Path]) -> None:
+    for name in ("nearest", "never"):
+        found = sheet(files[name])
+        assert not found.qualifies
+        assert found.title == "Nearest design, which does not qualify"
+        assert "does not pass" in found.words["si"].recommendation[0]
+
+
+@pytest.mark.parametrize(("name", "printed"), [("depth", False), ("grid", True)])
+def test_a_map_is_printed_only_where_no_table_says_the_same(
+    files: dict[str, Path], result: Path, name: str, printed: bool, tmp_path: Path, opened: Any
+) -> None:
+    page = opened(write_report(files.get(name, result), tmp_path / "page.html"))
+    assert page.is_visible("#figure-sweep-map")
+    page.emulate_media(media="print")
+    assert page.is_visible("#figure-sweep-map") == printed
+
+
+def test_a_spreadsheet_says_what_is_recommended(needs: dict[str, Need], files: dict[str, Path], tmp_path: Path) -> None:
+    boulder_sweep.export(files["depth"], tmp_path / "depth.xlsx", units="us")
+    sheets = openpyxl.load_workbook(tmp_path / "depth.xlsx").worksheets
+    said = advice(needs["depth"], "us")
+    assert [row[0] for row in sheets[1].iter_rows(max_row=len(said), values_only=True)] == said
+
+
+OTHERS = (None, True, -1, 0, 1.5, 1e300, "", "x", [], ["x"], {}, {"a": 1}, "gone")
+
+
+def places(tree: Any, above: tuple[str | int, ...] = ()) -> list[tuple[str | int, ...]]:
+    """Every place of plain data."""
+    keys = tree if isinstance(tree, dict) else range(len(tree)) if isinstance(tree, list) else ()
+    return [place for key in keys for place in [(*above, key), *places(tree[key], (*above, key))]]
+
+
+@pytest.mark.parametrize("name", ["depth", "chance", "nearest"])
+def test_a_damaged_recommendation_ends_in_words(files: dict[str, Path], name: str, tmp_path: Path) -> None:
+    """Or in a sheet, where the place holds what a recommendation may say."""
+    table, chance, said = pq.read_table(files[name]), random.Random(name), list[str]()
+    key = b"boulder_sweep.recommendation"
+    for _ in range(40):
+        tree = json.loads(table.schema.metadata[key])
+        *above, last = chance.choice(places(tree))
+        inner: Any = tree
+        for step in above:
+            inner = inner[step]
+        value = chance.choice(OTHERS)
+        if value == "gone":
+            del inner[last]
+        else:
+            inner[last] = value
+        metadata = table.schema.metadata | {key: json.dumps(tree).encode()}
+        pq.write_table(table.replace_schema_metadata(metadata), tmp_path / "changed.parquet")
+        try:
+            assert sheet(tmp_path / "changed.parquet").words["si"].recommendation, (last, value)
+        except ReportError as problem:
+            said.append(str(problem))
+    assert len(said) > 10
+    assert all("changed.parquet is damaged; write it again with `sweep need`" in words for words in said)
+
+
+def test_a_pdf_has_todays_date_and_a_page_only_a_given_one(
+    files: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pages: list[str] = []
+    monkeypatch.setattr(writing, "printed", lambda text: pages.append(text) or b"%PDF")
+
+    class Fixed(date):
+        @classmethod
+        def today(cls) -> Fixed:
+            return cls(2031, 2, 3)
+
+    monkeypatch.setattr(writing, "date", Fixed)
+    write_report(files["depth"], tmp_path / "page.pdf")
+    write_report(files["depth"], tmp_path / "page.pdf", heading=HEADING)
+    assert "<dt>date</dt><dd>2031-02-03</dd>" in pages[0]
+    assert "2031-02-03" not in pages[1]
+    assert "2031-02-03" not in write_report(files["depth"], tmp_path / "page.html").read_text()
+    for words in ("<dt>checked by</dt><dd>E. Fox</dd>", "<dt>revision</dt><dd>A</dd>", "Prepared by C. Day"):
+        assert words in pages[1]
+
+
+def test_the_name_of_a_project_stays_text_in_the_footer(files: dict[str, Path], tmp_path: Path) -> None:
+    name = '"; } </style><script>alert(1)</script>'
+    page = write_report(files["depth"], tmp_path / "page.html", heading=HEADING._replace(project=name)).read_text()
+    (footer,) = re.findall(r'@bottom-left \{ content: "(.*?)"; \}', page)
+    plain = re.sub(r"\\([0-9a-f]+) ", lambda code: chr(int(code[1], 16)), footer)
+    assert plain.startswith(f"{name} · site · boulder-sweep ")
+    assert "<" not in footer
+
+
+@pytest.mark.parametrize(("name", "units"), [("depth", "si"), ("chance", "us"), ("nearest", "us")])
+def test_the_sheet_fits_on_one_page(files: dict[str, Path], name: str, units: str, tmp_path: Path, opened: Any) -> None:
+    page = opened(write_report(files[name], tmp_path / "page.html", units=units, heading=HEADING))
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    page.emulate_media(media="print")
+    head, body = (page.locator(place).bounding_box() for place in ("header", ".sheet"))
+    paper = page.evaluate("({ width: PAPER.width, height: PAPER[page.data.units] })")
+    assert body["width"] == pytest.approx(paper["width"], abs=2)
+    assert body["y"] + body["height"] - head["y"] <= paper["height"] + 12  # the page has that much more
+    inner = page.evaluate(
+        "(({ scrollHeight, clientHeight }) => scrollHeight - clientHeight)(document.querySelector('.sheet'))"
+    )
+    assert inner <= 1  # nothing hangs out of it
+    drawn = page.locator(".section svg").bounding_box()
+    assert drawn["height"] > 150
+    sizes = page.evaluate(
+        "[...document.querySelectorAll('.section svg text')].map((one) => one.getBoundingClientRect().height)"
+    )
+    assert min(sizes) >= 10.6  # 8 pt
+    assert page.complaints == []
