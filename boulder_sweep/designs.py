@@ -18,11 +18,11 @@ from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS
 
 SIDES = ("boulder_length_m", "boulder_width_m", "boulder_height_m")
 LEAST_SOLIDITY, MOST_SOLIDITY = 0.95, 1.15
-"""Volume of a boulder by its mass over that of the box of its sides, between which it counts as that box: sides are
-taped to 5 cm, and mass and density are not known better. More is a mistake. With less no box of the same mass stands
-for it, but a family of shapes does (`boulder_sweep.stones.taped`),"""
+"""Volume of a boulder by its mass, over the volume of the box of its sides, between which it counts as this box: sides
+are taped to 5 cm, and mass and density are not known better. More is a mistake."""
 LEAST_TAPED = 0.4
-"""down to this; with less it is no block, and no shape stands for it."""
+"""The same, above which the worst of a family of shapes stands for a boulder that fills less than its box
+(`boulder_sweep.stones.taped`). With less it is no block, and no shape stands for it."""
 MAX_DICTIONARY = 1 << 16
 """Largest dictionary of a column; beyond that a column holds one value per row."""
 

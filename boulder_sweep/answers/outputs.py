@@ -218,7 +218,7 @@ class AnswerFile:
             raise self._refusal(f"{what} (its recommendation: {shorten(str(problem))})") from None
 
     def _rows_of(self, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-        """Return rows of a recommendation, whose columns are those of the table but for the answer, or refuse them."""
+        """Return rows of a recommendation, or refuse them; but for the answer they have the columns of the table."""
         fields = {field.name: field for field in self.table.schema}
         for row in rows:
             if fields.keys() - row.keys() - {self.question["asked"], *ANSWER} or row.keys() - fields.keys():

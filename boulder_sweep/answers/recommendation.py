@@ -201,7 +201,7 @@ class Recommendation:
 
         def design(own: Mapping[str, Any]) -> Design:
             read = Design(checked(own["rows"]))
-            read.to_dict()  # what words take from it is there
+            _ = sum(read.to_dict()[name] for name in read.sizes)  # what words take from it is there
             return read
 
         def by_name(own: Mapping[str, Any], known: tuple[str, ...]) -> dict[str, Design]:

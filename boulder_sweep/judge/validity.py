@@ -84,7 +84,7 @@ DAMPING = (
 NOWHERE = 1e9
 """A friction angle that no soil has [deg]."""
 _SIZES = [usual_range(f"boulder_{side}_m") for side in ("length", "width", "height")]
-_EMBEDMENT, _ROCK = usual_range("embedment_ratio"), usual_range("boulder_density_kg_m3")
+_EMBEDMENT, _ROCK = usual_range("embedment_ratio"), (2400.0, 3074.0)
 _ANGLE, _SOIL = usual_range("friction_angle_deg"), usual_range("soil_density_kg_m3")
 _RATE_FACTOR = usual_range("strain_rate_factor")
 
@@ -119,9 +119,10 @@ FLAGS = (
     ),
     Flag(
         "rock_density",
-        "a density that rock does not have",
+        "rock lighter or heavier than the study's",
         f"boulder density outside {_ROCK[0]:.0f} to {_ROCK[1]:.0f} kg/m³",
-        "The granites tested have 2596 and 3074 kg/m³; lighter sound rock, some limestones, is rare.",
+        "The granites tested have 2596 and 3074 kg/m³, and the study of second opinions draws from this range. Some "
+        "limestones are lighter.",
     ),
     Flag(
         "soil_pair",

@@ -57,6 +57,7 @@ _EXAMPLES: dict[str, tuple[str, str]] = {
     "boulder.height": ("{from: 2.4 m, to: 3.6 m, step: 0.2 m}", "{from: 8 ft, to: 12 ft, step: 6 in}"),
     "boulder.density": ("2600 kg/m^3", "162 pcf"),
     "boulder.mass": ("18200 kg", "40000 lb"),
+    "boulder.rock": ("granite",) * 2,
     "boulder.profile": (
         "[{height: 0 m, width: 1.8 m, length: 1.7 m}, {height: 3 m, width: 1.2 m, length: 1.1 m}]",
         "[{height: 0 ft, width: 6 ft, length: 5.5 ft}, {height: 10 ft, width: 4 ft, length: 3.5 ft}]",

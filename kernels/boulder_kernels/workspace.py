@@ -414,14 +414,17 @@ def by_count(load: Callable[[Any, int], Any]) -> Callable[[Any, int], tuple[Any,
 
     @inlined
     def one(p: Any, m: int, lane: int) -> Any:
+        """Load one, as a tuple."""
         return (load(p[m], lane),)
 
     @inlined
     def two(p: Any, m: int, lane: int) -> Any:
+        """Load two."""
         return one(p, m, lane) + one(p, m + 1, lane)
 
     @inlined
     def four(p: Any, m: int, lane: int) -> Any:
+        """Load four."""
         return two(p, m, lane) + two(p, m + 2, lane)
 
     def choose(parts: Any, lane: Any) -> Callable[..., Any]:

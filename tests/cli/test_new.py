@@ -61,6 +61,7 @@ def test_every_entry_is_in_it_and_every_optional_line_holds(tmp_path, units):
                 "site.embedment_depth": "not both",
                 "boulder.profile": "is part of boulder.profile",
                 "boulder.scan": "follows from the scan; remove one of them",
+                "boulder.rock": "follows from boulder.rock; remove one of them",
                 "soil.correlation": "needs a distribution",
             }
             assert [p for p in found if alternatives.get(field.path, "-") not in p] == [], field.path

@@ -29,7 +29,8 @@ BARE = {
 """Every such option: a command with a bare number, and a part of what is to be written in its place."""
 PLAIN = {
     *("--set", "--at", "--least", "--most", "--across", "--up", "--facing", "--columns", "--rows", "--case", "--class"),
-    *("--unit", "--scheduler", "--project", "--client", "--author", "--date"),
+    *("--unit", "--scheduler", "--project", "--client", "--site", "--date", "--revision"),
+    *("--author", "--checked-by"),
     *("--margin", "--probability", "--half-width", "--confidence"),
 }
 """Options that take words, or numbers without a dimension."""

@@ -43,7 +43,7 @@ def test_what_stands_beside_a_pass(sweep):
     assert "a simulation, not a rating by test" in out
     assert "caution" not in out
     _, out, _ = sweep("simulate", case, "--set", "boulder.density=3200 kg/m^3", "-q")
-    assert "caution: a density that rock does not have" in out
+    assert "caution: rock lighter or heavier than the study's" in out
 
 
 def test_a_pass_has_its_second_opinion_before_any_caution(sweep, tmp_path):

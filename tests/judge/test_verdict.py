@@ -324,7 +324,7 @@ def test_a_law_of_the_resistance_is_no_strain_rate() -> None:
 def test_several_flags_stand_in_the_order_of_the_register() -> None:
     both = one_row(changes={"rho_b": 1.0}, crush_max=2.0)
     assert flags_of(both) == "crush;rock_density"
-    assert meanings(flags_of(both))[1] == "a density that rock does not have"
+    assert meanings(flags_of(both))[1] == "rock lighter or heavier than the study's"
     assert meanings("") == []
 
 
