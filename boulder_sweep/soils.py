@@ -115,11 +115,11 @@ def with_shape(table: DesignTable, law: str, ground: Ground, shape: str, fills: 
     Parameters
     ----------
     table, law, ground
-        As of `with_soil`; the density is that of the rock.
+        As of `with_soil`; the density of the rock.
     shape
         One of `boulder_sweep.columns.SHAPES`.
     fills
-        Volume of each boulder over that of the box of its sides, shape (n,).
+        Volume of each boulder over the volume of the box of its sides, shape (n,).
     """
     profiles = taped_profiles(shape, fills)
     if law != "width_capped":  # no other looks at the width

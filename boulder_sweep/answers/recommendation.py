@@ -108,7 +108,7 @@ class Nearest:
     Attributes
     ----------
     rows : list of dict
-        Its rows of the answer, where nothing passes those at the last value tried; of a run those of the design.
+        Its rows of the answer, or at the last value tried where nothing passes; of a run the rows of the design.
     design : Design or None
         It at the depth at which it has the most of what was asked for; None where it does not pass even without a
         margin.

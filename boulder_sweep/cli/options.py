@@ -78,7 +78,7 @@ at_option = click.option(
     help="Uncertain inputs: at both ends, p5 [default], p10, ..., and the mean, or mean alone.",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout.")
-units_option = click.option("--units", type=click.Choice(SYSTEMS), help="Units shown [those of the file].")
+units_option = click.option("--units", type=click.Choice(SYSTEMS), help="Units shown [as in the file].")
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="No notes.")
 margin_option = click.option("--margin", default="0", metavar="SHARE", help="Least margin to the limits, e.g. '25 %'.")
 second_opinion_option = click.option(

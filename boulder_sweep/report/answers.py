@@ -148,7 +148,7 @@ class _Designs:
         return numbers[order][self.first[numbers[order]]].tolist()
 
     def _design(self, number: int) -> Design:
-        """Return a design with all its rows, second opinions asked of those of which the run asked none."""
+        """Return a design with all its rows, and ask second opinions where the run asked none."""
         read = []
         numbers = self.rows.siblings(number, self.kinds)
         for each in numbers[self.computed.ravel()[numbers]].tolist():

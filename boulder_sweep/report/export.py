@@ -49,7 +49,7 @@ def export(out: str | Location, file: str | Path, *, units: str | None = None) -
     file
         The table: ``.xlsx``, with a second sheet of units, settings and versions, ``.csv`` or ``.parquet``.
     units
-        ``si`` for the table as it is, ``us`` for US customary units, by default those of the settings file; column
+        ``si`` for the table as it is, ``us`` for US customary units, by default as in the settings file; column
         names end in the unit.
 
     Returns

@@ -115,7 +115,7 @@ def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
 
 
 def _words(answer: Answer, design: Design, names: Sequence[str], settings: Mapping[str, Any], units: str) -> Words:
-    """Return the sentences; the names are those of the inputs that tell cases apart."""
+    """Return the sentences; the names are inputs that tell cases apart."""
     found, said, asked = answer.need.recommendation, advice(answer.need, units), question(answer.need, units)
     ground = ground_words(settings, units) or "dry, level, the same at every depth, without cohesion"
     case = ", ".join(_named(name, answer.row[name], units) for name in names)

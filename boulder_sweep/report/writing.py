@@ -89,11 +89,11 @@ def write_report(
     designs
         Rows to be shown in full; by default the one that is recommended.
     units
-        Units shown first, ``si`` or ``us``, by default those of the settings file; the reader can switch.
+        Units shown first, ``si`` or ``us``, by default as in the settings file; the reader can switch.
     command
         Command that regenerates the page.
     heading
-        Whom and what it is for; an entry that is not given is that of the settings file. The date of a PDF is today's
+        Whom and what it is for; an entry that is not given is taken from the settings file. The date of a PDF is today's
         where none is given.
 
     Returns
