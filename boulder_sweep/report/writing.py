@@ -93,7 +93,7 @@ def write_report(
     command
         Command that regenerates the page.
     heading
-        Whom and what it is for; an entry that is not given is taken from the settings file. The date of a PDF is today's
+        Whom and what it is for; an entry that is not given comes from the settings file. The date of a PDF is today's
         where none is given.
 
     Returns
