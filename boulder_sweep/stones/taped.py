@@ -3,8 +3,8 @@
 The mass over the density of the rock is its volume, and that over the box of its sizes its fill f. Three shapes have
 this volume within these sizes, on a flat foot. The sides of a section at the height z over the foot are sqrt(p) s(z)
 times the sides of the box. Where s falls linearly from 1 to t over a height h, the volume is p (1 + t + t^2)/3 W L h,
-and t follows from f. With p = 1 a foot of half the largest section, t = 1/2, fills 7/12; a stone that fills less has sections
-that do not fill their rectangles, p = 12 f/7.
+and t follows from f. With p = 1 a foot of half the largest section, t = 1/2, fills 7/12; a stone that fills less has
+sections that do not fill their rectangles, p = 12 f/7.
 """
 
 from __future__ import annotations
