@@ -8,7 +8,7 @@ less, and pyarrow believes the page. Text is read as words and codes, so that no
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import lru_cache, partial
 from typing import IO, TYPE_CHECKING
 
@@ -38,8 +38,8 @@ _SPELLED = {"DELTA_LENGTH_BYTE_ARRAY"} | _MARKS
 of the word before, and may be of any length."""
 _MOST_PAGES = 100_000
 """Most pages of a piece of a column: every one has a head that is read."""
-_LONGEST_HEAD = 65_536
-"""Most bytes of the head of a page, which may hold its smallest and largest word."""
+_USUAL_HEAD, _LONGEST_HEAD = 256, 65_536
+"""Bytes that nearly every head of a page fits in, and most of one, which may hold its smallest and largest word."""
 _REMEDY = "write it again with pandas.DataFrame.to_parquet"
 
 
@@ -140,7 +140,7 @@ class TableFile:
                 raise ParquetError(f"is damaged: it has {len(table):,} rows, and says {self.rows:,}")
             for name, column in zip(table.column_names, table.columns, strict=True):
                 if _is_text(column.type):
-                    self._check_words(_shown(name), column)
+                    self._check_words(name, column)
             return table
 
     def _check_chunks(self) -> None:
@@ -168,41 +168,49 @@ class TableFile:
         for index, field in enumerate(self.schema):
             if field.name not in wanted:
                 continue
-            shown, is_text = _shown(field.name), _is_text(field.type)
+            is_text = _is_text(field.type)
             encodings: set[str] = set()
             for group in self._groups:
                 stored = group.column(index)
                 if stored.num_values != group.num_rows:
-                    raise ParquetError(f"is damaged: column {shown} has not one value in each row")
+                    raise ParquetError(f"is damaged: column {_shown(field.name)} has not one value in each row")
                 encodings.update(stored.encodings)
-                values, unpacked = group.num_rows * (_width(field.type) or _CODE), self._unpacked(stored, shown)
+                values, unpacked = group.num_rows * (_width(field.type) or _CODE), self._unpacked(stored, field.name)
                 self._taken += values + unpacked if is_text else max(values, unpacked)
                 if self._taken > self._most_bytes:
                     most = size_text(self._most_bytes)
-                    raise ParquetLimitError(f"has more than {most} once unpacked, up to column {shown}")
+                    raise ParquetLimitError(f"has more than {most} once unpacked, up to column {_shown(field.name)}")
             if is_text and not encodings <= _CODED:
                 if not encodings <= _SPELLED:
-                    raise ParquetLimitError(f"column {shown} is text in an encoding that is not read; {_REMEDY}")
+                    raise ParquetLimitError(f"column {_shown(field.name)} is text in an encoding that is not read; {_REMEDY}")
                 spelled.add(field.name)
         return spelled
 
-    def _unpacked(self, stored: pq.ColumnChunkMetaData, shown: str) -> int:
+    def _unpacked(self, stored: pq.ColumnChunkMetaData, name: str) -> int:
         """Add up the bytes that the pages of a piece of a column take once they are unpacked."""
         at = min(filter(None, (stored.dictionary_page_offset, stored.data_page_offset)))
         end, total = at + stored.total_compressed_size, 0
         for _ in range(_MOST_PAGES):
             if at == end:
                 return total
-            self._source.seek(at)
-            head, length = _whole_numbers(self._source.read(min(_LONGEST_HEAD, end - at)), 0, 3)
+            head, length = self._head(at, end)
             unpacked, packed = head[2], head[3]
             if min(unpacked, packed) < 0 or at + length + packed > end:
-                raise ParquetError(f"is damaged: a page of column {shown} is longer than its column")
+                raise ParquetError(f"is damaged: a page of column {_shown(name)} is longer than its column")
             total += unpacked
             at += length + packed
-        raise ParquetLimitError(f"column {shown} is in more than {_MOST_PAGES:,} pages; {_REMEDY}")
+        raise ParquetLimitError(f"column {_shown(name)} is in more than {_MOST_PAGES:,} pages; {_REMEDY}")
 
-    def _check_words(self, shown: str, column: pa.ChunkedArray) -> None:
+    def _head(self, at: int, end: int) -> tuple[dict[int, int], int]:
+        """Return the whole numbers in the head of a page, and its length, see `_whole_numbers`."""
+        for longest in (_USUAL_HEAD, _LONGEST_HEAD):
+            self._source.seek(at)
+            data = self._source.read(min(longest, end - at))
+            with suppress(IndexError):  # it is longer
+                return _whole_numbers(data, 0, 3)
+        raise LookupError("no head of a page")
+
+    def _check_words(self, name: str, column: pa.ChunkedArray) -> None:
         """Refuse words that are too long, or too many rows of long ones."""
         import pyarrow.compute as pc
 
@@ -210,7 +218,7 @@ class TableFile:
             longest = pc.max(pc.utf8_length(chunk.dictionary)).as_py() or 0
             if longest > LONGEST_WORD:
                 said = f"has a word of {longest:,} characters; a word may have {LONGEST_WORD:,}"
-                raise ParquetLimitError(f"column {shown} {said}")
+                raise ParquetLimitError(f"column {_shown(name)} {said}")
             sizes = pc.binary_length(chunk.dictionary)
             text = len(chunk) * (pc.max(sizes).as_py() or 0)
             if self._text + text > self._most_text:  # at most; now exactly
@@ -218,7 +226,7 @@ class TableFile:
             self._text += text
             if self._text > self._most_text:
                 most = size_text(self._most_text)
-                raise ParquetLimitError(f"has more than {most} of text, up to column {shown}")
+                raise ParquetLimitError(f"has more than {most} of text, up to column {_shown(name)}")
 
 
 def _whole_numbers(data: bytes, at: int, depth: int) -> tuple[dict[int, int], int]:
@@ -238,9 +246,11 @@ def _whole_numbers(data: bytes, at: int, depth: int) -> tuple[dict[int, int], in
         if step:
             field += step
         else:
-            field, at = _signed(data, at)
+            number, at = _unsigned(data, at)
+            field = (number >> 1) ^ -(number & 1)  # its lowest bit is its sign
         if kind in (4, 5, 6):
-            found[field], at = _signed(data, at)
+            number, at = (data[at], at + 1) if data[at] < 128 else _unsigned(data, at)
+            found[field] = (number >> 1) ^ -(number & 1)
         elif kind == 8:
             size, at = _unsigned(data, at)
             at += size
@@ -261,12 +271,6 @@ def _unsigned(data: bytes, at: int) -> tuple[int, int]:
         if data[at + place] < 128:
             return number, at + place + 1
     raise ValueError("a number of more than 64 bits")
-
-
-def _signed(data: bytes, at: int) -> tuple[int, int]:
-    """Return a number whose lowest bit is its sign, and the position behind it."""
-    number, at = _unsigned(data, at)
-    return (number >> 1) ^ -(number & 1), at
 
 
 @contextmanager

@@ -27,15 +27,15 @@ if TYPE_CHECKING:
     from boulder_sweep.judge.evaluation import Evaluation
     from boulder_sweep.settings import Sweep
 
-WORK_S, BLOCK_S = 0.25, 0.125
+WORK_S, BLOCK_S = 0.4, 0.125
 """Work of a range, and most of a block [s]: so long that the few rows of a block that need finer steps fill lanes, and
 short enough for Ctrl-C to act at once, also where threads share a core."""
-_PLAIN_S, _LAYERED_S, _OUTLINED_S = 1e-5, 4e-5, 6e-5
+_PLAIN_S, _LAYERED_S, _OUTLINED_S = 5e-6, 2e-5, 3e-5
 """Cost of a row on one core [s]: of a box in uniform soil, in layers, and of a boulder of several pieces in them."""
 _STEP_S, _LOCATED_STEP_S, _LOCATED = 0.012, 0.006, 3.0
 """Steps at which these hold; where steps end at the yield, rows take three times as long at half the step."""
-_OPINION_S = 1e-4
-"""Cost of a second opinion [s]."""
+_OPINION_S = 1e-5
+"""Cost of a second opinion [s] per design, of which a third pass."""
 _TRIES = 2
 _FAILURES_BUDGET = 5_000
 """Failed tries after which a run stops: something is then wrong with more than single designs."""

@@ -51,14 +51,21 @@ _OTHER_BOUNDS = {
     "count": Bound(1, MOST_ROWS, ""),  # some values are made from it
     "soil": Bound(1, MAX_ELEMENTS, ""),
 }
-_CONTROL_BOUNDS = {
-    "h": (1e-7, 1.0),
-    "horizon": (1e-4, 100.0),
-    "theta_limit": (math.radians(0.01), math.radians(90.0)),
-    "elements": (0, MAX_ELEMENTS),
-    "longest_horizon": (0.0, 1e4),
-    "event_tolerance": (1e-12, 1.0),
+_CONTROL: dict[str, tuple[type, float, float]] = {
+    "h": (float, 1e-7, 1.0),
+    "horizon": (float, 1e-4, 100.0),
+    "theta_limit": (float, math.radians(0.01), math.radians(90.0)),
+    "elements": (int, 0, MAX_ELEMENTS),
+    "longest_horizon": (float, 0.0, 1e4),
+    "event_tolerance": (float, 1e-12, 1.0),
+    **dict.fromkeys(
+        "error_estimate stop_at_limit locate_yield refined last_resort paired side_by_side".split(), (bool, 0, 1)
+    ),
 }
+"""Entries of `boulder_kernels.Control` with their types and bounds. The kernels are not asked: to import them, and the
+compiler with them, takes longer than to read a table."""
+_READINGS = {"inertia_box", "arm_geometric", "contact_left_face", "restoring_gravity", "separation_released"}
+"""Entries of `boulder_kernels.Readings`."""
 
 
 @dataclass
@@ -173,18 +180,13 @@ def check_control(control: dict[str, Any], readings: dict[str, Any]) -> None:
     ValueError
         An entry is missing, unknown, or no value that a settings file leads to.
     """
-    from boulder_kernels.control import Control
-    from boulder_kernels.design import Readings
-
-    kinds = get_type_hints(Control)
-    if control.keys() != kinds.keys():
-        raise ValueError(f"control has other entries than {', '.join(kinds)}")
-    for name, kind in kinds.items():
+    if control.keys() != _CONTROL.keys():
+        raise ValueError(f"control has other entries than {', '.join(_CONTROL)}")
+    for name, (kind, low, high) in _CONTROL.items():
         value = control[name]
-        low, high = _CONTROL_BOUNDS.get(name, (-math.inf, math.inf))
         if not _is_of(value, kind) or not low <= value <= high:
             raise ValueError(f"control.{name} is {str(value)[:60]!r}, which no settings give")
-    if readings.keys() != {*Readings._fields} or any(type(value) is not bool for value in readings.values()):
+    if readings.keys() != _READINGS or any(type(value) is not bool for value in readings.values()):
         raise ValueError("readings are not the five of the paper")
 
 
