@@ -19,6 +19,7 @@ import numpy as np
 import pandas as pd
 
 import boulder_sweep
+from boulder_sweep.judge.inputs import SOURCES
 from tests import rk4
 
 DESIGNS, SEED = 30_000, 22
@@ -27,22 +28,6 @@ UNTIL_S, LIMIT = 30.0, math.radians(20.0)
 PIECE = 250
 """Designs followed at a time, between two looks at the progress."""
 CORRECTED = (True,) * 5
-COLUMNS = {
-    "L": "boulder_length_m",
-    "W": "boulder_width_m",
-    "H": "boulder_height_m",
-    "rho_b": "boulder_density_kg_m3",
-    "d": "embedment_depth_m",
-    "e": "impact_height_m",
-    "rho_s": "soil_density_kg_m3",
-    "phi": "friction_angle_deg",
-    "beta": "subgrade_reaction_MN_m3",
-    "K_epsilon": "strain_rate_factor",
-    "m_v": "vehicle_mass_kg",
-    "v_0": "impact_speed_m_s",
-    "k_v": "vehicle_spring_N_m",
-    "c_v": "vehicle_damper_N_s_m",
-}
 
 
 def shallow(count: int, seed: int) -> pd.DataFrame:
@@ -85,7 +70,7 @@ def judged(designs: pd.DataFrame, accuracy: str) -> pd.DataFrame:
 
 def truth(table: pd.DataFrame, jobs: int) -> np.ndarray:
     """Largest rotations [rad] of the rows of a table by each of `STEPS_S`, shape (n, 2)."""
-    inputs = {name: table[column].to_numpy(float) for name, column in COLUMNS.items()}
+    inputs = {name: table[column].to_numpy(float) for name, column in SOURCES.items() if name != "e_bumper"}
     inputs["phi"] = np.radians(inputs["phi"])
     pieces = [slice(at, at + PIECE) for at in range(0, len(table), PIECE)]
 

@@ -78,7 +78,7 @@ class OutcomeColumn(ColumnSpec):
     rows : {'all', 'judged', 'computed', 'free', 'rated', 'overturned', 'passing'}
         Which rows have a value; null elsewhere. *Judged* are all but errors, *computed* those simulated, *free* those
         of them that were not stopped at the limit of the rotation, *rated* those whose penetration counts: neither
-        overturned nor left undecided by anything but the numerical error. *Passing* are those of verdict pass.
+        overturned nor left undecided by anything but the numerical error. *Passing* rows have the verdict pass.
     words : tuple of str
         What the codes of a dictionary column stand for; a row may add words of its own behind them. Code -1 is null.
     """
@@ -233,7 +233,7 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "time_to_limit_error_s",
         "float64",
         "s",
-        "estimated numerical error of time_to_limit_s: that of the displacements over the speed of impact",
+        "estimated numerical error of time_to_limit_s: error of the displacements over the speed of impact",
         lambda facts: (
             _known(facts.outcomes.x_error) / np.where(facts.rows["overturned"], facts.designs.table.v_0, np.nan)
         ),
@@ -243,8 +243,8 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "vehicle_crush_m",
         "float64",
         "m",
-        "largest crush of the vehicle's front while it drives forward: displacement of the vehicle less that of the "
-        "point of contact",
+        "largest crush of the vehicle's front while it drives forward: displacement of the vehicle less the point of "
+        "contact's",
         lambda facts: facts.outcomes.crush_max,
     ),
     OutcomeColumn(
@@ -259,8 +259,8 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "solidity",
         "float64",
         "1",
-        "volume of the boulder over that of the box of its length, width and height, by its mass and the density of "
-        "its rock; 1 where no mass is given",
+        "volume of the boulder over the volume of the box of its length, width and height, by its mass and the density "
+        "of its rock; 1 where no mass is given",
         lambda facts: facts.designs.solidity,
         rows="judged",
     ),
@@ -329,7 +329,7 @@ TO_BUILD: tuple[ColumnSpec, ColumnSpec, ColumnSpec] = (
     ),
 )
 """What a design takes to build, beside the mass of the boulder; see `boulder_sweep.judge.quantities`.
-In tables of answers and of `sweep export`; those of runs have what they follow from."""
+In tables of answers and of `sweep export`; tables of runs have what they follow from."""
 
 COLUMNS: tuple[ColumnSpec, ...] = (DESIGN_ID, *INPUTS, *OUTCOMES)
 INPUT_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in INPUTS)

@@ -232,7 +232,7 @@ def refusal(
 def solidity_of(
     mass: np.ndarray, density: np.ndarray, length: np.ndarray, width: np.ndarray, height: np.ndarray
 ) -> np.ndarray:
-    """Return the volume of boulders of a mass [kg] and rock [kg/m^3] over that of the boxes of their sides [m]."""
+    """Return the volume of boulders of a mass [kg] and rock [kg/m^3] over their boxes' [m]."""
     return mass / (density * (length * width * height))
 
 

@@ -1,7 +1,7 @@
 """The errors meant for a user, and the exit codes of the command line.
 
 Everything that a user can cause or fix is a `BoulderSweepError`: its text says what is wrong and what is allowed,
-and its exit code is that of the command. Any other exception is a bug in this package.
+and its exit code is the command's. Any other exception is a bug in this package.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ class ScanError(BoulderSweepError):
 
 
 def safe_words(rows_done: int | None, rows: int) -> str:
-    """Say how many rows of a table are safe; None stands for those of an earlier run that were not counted yet."""
+    """Say how many rows of a table are safe; None stands for the rows of an earlier run, which were not counted yet."""
     return f"{'the rows that were there' if rows_done is None else f'{rows_done:,} of {rows:,} rows'} are safe"
 
 

@@ -2,7 +2,7 @@
 
 Published correlations for clean sand. Several are in wide use and differ by up to 6 deg: every one of the tables
 `BY_BLOW_COUNT` and `BY_CONE` is worked out, and the one with the weakest soil counts. Where a source leaves a choice,
-the weaker soil is taken, too: the stress that a reading is normalized by is that of dense soil without water where no
+the weaker soil is taken, too: a reading is normalized by the stress in dense soil without water where no
 density is measured, the normalization is limited to 1.7 (Youd et al. 2001), rods count as no longer than the depth
 (Skempton 1986), the excess pore pressure behind a cone is left out, and nothing is extrapolated. `docs/site_data.md`
 tells which of the sources were seen.
@@ -60,8 +60,8 @@ CONE_ANGLES = Range(30.0, 46.0)
 RELATIVE_DENSITIES = Range(0.15, 0.85)
 """Where the table of EM 1110-2-2504 gives both ends of the friction angle."""
 SPT_SD_DEG, CPT_SD_DEG, DENSITY_SD_DEG = 3.0, 2.8, 2.0
-"""Scatter of the friction angle about a correlation [deg], as a standard deviation: that of Hatanaka and Uchida, taken
-for Wolff's, too; that of Kulhawy and Mayne, with which Phoon and Kulhawy (1999) calculate, taken for Robertson and
+"""Scatter of the friction angle about a correlation [deg], as a standard deviation: Hatanaka and Uchida's, taken
+for Wolff's, too; Kulhawy and Mayne's, with which Phoon and Kulhawy (1999) calculate, taken for Robertson and
 Campanella's, too; Bowles (1996), Table 3-4."""
 
 # Constant of horizontal subgrade reaction [MN/m^3] over friction angle [deg] of the two families in use.
@@ -223,7 +223,7 @@ def angle_by_relative_density(ratio: float) -> float:
 def densities(angle_deg: float) -> tuple[float, float]:
     """Return the least and largest moist density [kg/m^3] of sand with a friction angle, by EM 1110-2-2504, Table 3-1.
 
-    Beyond the table the density of dense sand counts, which is less than that of very dense one.
+    Beyond the table the density of dense sand counts, which is less than the density of very dense sand.
     """
     state = next((state for state in STATES if angle_deg <= state.friction_angle_deg), STATES[-1])
     return state.lightest_pcf * PCF, state.heaviest_pcf * PCF

@@ -182,7 +182,9 @@ class TableFile:
                     raise ParquetLimitError(f"has more than {most} once unpacked, up to column {_shown(field.name)}")
             if is_text and not encodings <= _CODED:
                 if not encodings <= _SPELLED:
-                    raise ParquetLimitError(f"column {_shown(field.name)} is text in an encoding that is not read; {_REMEDY}")
+                    raise ParquetLimitError(
+                        f"column {_shown(field.name)} is text in an encoding that is not read; {_REMEDY}"
+                    )
                 spelled.add(field.name)
         return spelled
 

@@ -19,7 +19,7 @@ from boulder_sweep.settings.shape import BOX, ProfilePoint, Shape
 from boulder_sweep.stones.taped import taped_profiles
 
 SLICES = 16
-"""Slices of the buried depth in which the law that depends on the width takes that of their middle."""
+"""Slices of the buried depth in which the law that depends on the width takes the width of their middle."""
 
 
 def coefficients(table: DesignTable, law: str) -> np.ndarray:
@@ -115,7 +115,7 @@ def with_shape(table: DesignTable, law: str, ground: Ground, shape: str, fills: 
     Parameters
     ----------
     table, law, ground
-        As of `with_soil`; the density of the rock.
+        See `with_soil`; the density of the rock.
     shape
         One of `boulder_sweep.columns.SHAPES`.
     fills

@@ -3,8 +3,8 @@
 What they are, what the paper says of them in words and numbers, and what the model gives for it; among it how many soil
 elements are enough: sums over N elements against their limit in closed form.
 
-Table 3 gives the speed of the second test as 14.5 m/s, Table 2 that of the first as 13.36 m/s (the text rounds it to
-13.4 m/s). The densities are those of the tables too: the text has 2652 kg/m^3 for Rockville White Granite and
+Table 3 gives the speed of the second test as 14.5 m/s, Table 2 the first as 13.36 m/s (the text rounds it to
+13.4 m/s). The densities are taken from the tables, too: the text has 2652 kg/m^3 for Rockville White Granite and
 2010 kg/m^3 for the soil.
 """
 
@@ -113,7 +113,7 @@ class Convergence:
     elements: tuple[int, ...]
 
     def difference(self, test: str, preset: str, n: int) -> float:
-        """Largest rotation by N elements minus that of the closed form [deg]."""
+        """Largest rotation by N elements minus the largest by the closed form [deg]."""
         return self.rotation_deg[test, preset, n] - self.rotation_deg[test, preset, 0]
 
     def order(self, test: str, preset: str) -> float:

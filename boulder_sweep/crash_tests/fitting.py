@@ -268,8 +268,8 @@ def fit_pulse(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) -
     Raises
     ------
     FitError
-        Mass or speed are not those of a vehicle, the record contradicts the speed, no vehicle comes near the record,
-        the record does not determine spring or damper, or they are not those of a vehicle.
+        Mass or speed are not a vehicle's, the record contradicts the speed, no vehicle comes near the record,
+        the record does not determine spring or damper, or they are not a vehicle's.
     """
     for name, column, value in (("mass", "vehicle_mass_kg", mass_kg), ("speed", "impact_speed_m_s", speed_m_s)):
         if value is not None and not 0.0 < value < math.inf:

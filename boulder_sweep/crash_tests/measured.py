@@ -292,4 +292,4 @@ def _check_size(label: str, values: np.ndarray, name: str) -> None:
     if size == 0.0 or (name != "acceleration" and np.nanmin(values) == np.nanmax(values)):
         raise FitError(f"{label} does not change; it must show how the wall stops the vehicle")
     if not SIZES[0] <= size <= SIZES[1]:
-        raise FitError(f"{label} reaches {size:.3g} {unit}, which is not that of an impact; check the column's unit")
+        raise FitError(f"{label} reaches {size:.3g} {unit}, which no impact reaches; check the column's unit")

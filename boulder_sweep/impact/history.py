@@ -56,7 +56,7 @@ class Motion:
 
     @property
     def outline(self) -> np.ndarray:
-        """Outline of the boulder, shape (P, 4), see `boulder_kernels.outlined`; of a box that of the box."""
+        """Outline of the boulder, shape (P, 4), see `boulder_kernels.outlined`; a box has its own."""
         soil, half = getattr(self.constants, "soil", None), 0.5 * self.design.L
         if soil is not None and is_outlined(soil):
             return np.asarray(soil.outline)

@@ -179,7 +179,7 @@ def one_design(settings: dict[str, Any], inputs: dict[str, float | None], contro
 
 
 def _in_case(case: dict[str, Any], given: dict[str, Any], inputs: dict[str, float | None]) -> dict[str, float | None]:
-    """Return the inputs of a row in a case, by the place that its own values have among those of the settings.
+    """Return the inputs of a row in a case, by the place of its own values among the values of the settings.
 
     Parameters
     ----------

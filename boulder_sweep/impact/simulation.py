@@ -65,13 +65,13 @@ def simulate(
     design_id : int
         Number of the design within the sweep.
     readings : str or ReadingChoice, optional
-        ``as_printed``, ``corrected``, or single readings; those of the sweep by default.
+        ``as_printed``, ``corrected``, or single readings; the sweep's by default.
     soil_elements : int, optional
         Number of soil elements, 0 for the closed form; as the sweep says by default.
     step_s : float, optional
         Step of the integrator [s], used as it is; by default what the accuracy of the sweep asks for.
     horizon_s : float, optional
-        Time simulated [s]; that of the sweep by default.
+        Time simulated [s]; the sweep's by default.
     sample_s : float
         Time between two samples of the trajectory [s]. Maxima do not depend on it.
 

@@ -34,7 +34,7 @@ class Steps(NamedTuple):
 
 
 STEPS = {"fast": Steps(0.012), "balanced": Steps(0.012), "fine": Steps(0.006, locate_yield=True)}
-"""Steps of each named accuracy: but for ``fast``, three times those of the solution that is reported."""
+"""Steps of each named accuracy: but for ``fast``, three times the steps of the solution that is reported."""
 STEPS_PRINTED = {"fast": Steps(0.006), "balanced": Steps(0.006), "fine": Steps(0.003, locate_yield=True)}
 """The same where the restoring moment is read as printed: it jumps where the angular velocity passes zero, and a
 design close to that jump needs shorter steps to end on the right side of it."""
@@ -80,7 +80,7 @@ class Accuracy:
         Steps of the integrator; where ``error_estimate``, a solution with a third of the step is reported.
     error_estimate
         Whether doubtful rows are solved a second time, and rows closer to a limit than their error again by finer
-        steps; without, the error of a row is that of the steps of one solution, and such rows stay undecided.
+        steps; without, the error of a row is estimated from the steps of one solution, and such rows stay undecided.
     achieved_deg
         Quantile `QUANTILE` of the estimated error of the rotation over the designs of a pilot run [deg]; None unless
         the requested accuracy is a number; infinite where the error of more designs is not known.
@@ -261,7 +261,7 @@ def simulated(designs: Designs, readings: Readings, control: Control) -> Outcome
 def estimated_error_deg(designs: Designs, readings: Readings, control: Control) -> float:
     """Quantile of the estimated errors of the rotation [deg]; 0 where no error could be estimated.
 
-    A boulder that overturns has no error of its largest rotation, but its other errors stand for one: those of the
+    A boulder that overturns has no error of its largest rotation, but its other errors stand for one: the errors of the
     displacements, over the embedment depth or half the height of the boulder, as `estimate_error` compares them.
     """
     outcomes = simulated(designs, readings, control)

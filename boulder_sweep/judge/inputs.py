@@ -54,9 +54,9 @@ class Designs(NamedTuple):
     fills: np.ndarray | None = None
     """`solidity` where the file gives masses or a shape; None of boxes."""
     rocks: np.ndarray | None = None
-    """Density of the rock where the file gives masses, so that it is not that of what is simulated [kg/m^3]."""
+    """Density of the rock where the file gives masses, so that what is simulated has another [kg/m^3]."""
     factors: np.ndarray | None = None
-    """Strain rate factor as given, where that of `table` also holds what law, slope and water make of it."""
+    """Strain rate factor as given, where the one of `table` also holds what law, slope and water make of it."""
     shape: int = -1
     """Which of `SHAPES` stands for boulders as taped and weighed; -1 where none does."""
 
@@ -80,7 +80,7 @@ class Designs(NamedTuple):
 
     @property
     def solidity(self) -> np.ndarray:
-        """Volume of each boulder over that of the box of its sides, shape (n,)."""
+        """Volume of each boulder over the volume of the box of its sides, shape (n,)."""
         return np.ones(self.size) if self.fills is None else self.fills
 
     @property

@@ -30,7 +30,7 @@ class Judged:
     columns : dict of str to ndarray, shape (n,)
         Every outcome column of the table by its name: float64, NaN for no value, or int32 codes of words, -1 for none.
     words : dict of str to tuple of str
-        What the codes of each dictionary column stand for: first those of the register, then those of these rows.
+        What the codes of each dictionary column stand for: first the register's words, then these rows'.
     """
 
     columns: dict[str, np.ndarray]
@@ -98,7 +98,7 @@ def not_computed(reasons: tuple[str, ...], codes: np.ndarray) -> Judged:
 
 
 def joined(pieces: list[Judged]) -> Judged:
-    """Put consecutive pieces together; the words in use end up sorted behind those of the register.
+    """Put consecutive pieces together; the words in use end up sorted behind the words of the register.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def reserves(judged: Judged) -> np.ndarray:
 
 
 def _words_in_use(spec: OutcomeColumn, pieces: list[Judged]) -> tuple[str, ...]:
-    """Words of a column: those of the register, then what else some row has, sorted."""
+    """Words of a column: the register's, then what else some row has, sorted."""
     used = set()
     for piece in pieces:
         piece_words = piece.words[spec.name]

@@ -66,7 +66,7 @@ def at_values(sweep: Sweep, at: str | None = None) -> Sweep:
     -------
     Sweep
         With `Sweep.taken_at`, which says for each input what was taken, and but for ``mean`` with `Sweep.cases`: the
-        means, the other ends, and the ends of inputs without a sense. Quantiles are those of each input alone: a
+        means, the other ends, and the ends of inputs without a sense. Each input has quantiles of its own: a
         correlation has no part in them.
 
     Raises

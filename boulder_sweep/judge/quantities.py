@@ -68,14 +68,14 @@ def wedge_slope(phi_deg: np.ndarray) -> np.ndarray:
 
 
 def buried_share(shape: Shape, ratio: np.ndarray) -> np.ndarray:
-    """Return the volume of a boulder below a height over that of its box, exactly.
+    """Return the volume of a boulder below a height over the volume of its box, exactly.
 
     Parameters
     ----------
     shape
         Shape of the boulder.
     ratio
-        The height as a share of that of the boulder; above its top all of it lies below.
+        The height as a share of the boulder's; above its top all of it lies below.
     """
     total = np.zeros(np.shape(ratio))
     for low, high in pairwise(shape.points or BOX):

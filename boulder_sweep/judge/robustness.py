@@ -216,7 +216,7 @@ def with_second_opinions(
     passes
         Designs of those that pass.
     laws, present, limits, longest_s
-        As of `stands`.
+        See `stands`.
     """
     passing = np.flatnonzero(judged.verdict == PASS)
     grade, under = judged["robustness"].copy(), judged["stands_under"].copy()
@@ -251,5 +251,5 @@ def with_second_opinions(
 
 
 def is_studied(sweep: Sweep) -> bool:
-    """Return whether the study's model is that of a sweep: the paper's law, and what second opinions know."""
+    """Return whether a sweep has the study's model: the paper's law, and what second opinions know."""
     return sweep.model.resistance == RESISTANCES[0] and can_be_asked(sweep)

@@ -115,7 +115,7 @@ FLAGS = (
         "embedment",
         "an unusual embedment",
         f"embedment depth over height outside {_EMBEDMENT[0]:.2g} to {_EMBEDMENT[1]:.2g}",
-        "The boulders tested have 0.55 and 0.59. The range is that of usual embedments.",
+        "The boulders tested have 0.55 and 0.59. The range covers usual embedments.",
     ),
     Flag(
         "rock_density",
@@ -208,7 +208,7 @@ def run_by_run(function: Callable[[np.ndarray], np.ndarray], column: np.ndarray)
     function
         Takes values and returns numbers for each, along the last axis.
     column
-        Values of shape (n,), such as those of a soil: from one design of a grid to the next they seldom change.
+        Values of shape (n,), such as a soil's: from one design of a grid to the next they seldom change.
     """
     starts = np.flatnonzero(column[1:] != column[:-1]) + 1
     if 4 * len(starts) >= len(column):

@@ -24,8 +24,8 @@ for the page of a report:
 
 A peak beyond its limit is decided even where the error is larger than the excess: that is the safe side. But where only
 one of the two solutions from which the error is estimated overturns, the error is infinite and nothing is decided.
-Where errors are those of one solution, as by ``fast``, rows of rule 11 stay as they are, and motion beyond the horizon
-is not simulated, since nothing would confirm it; else finer steps decide them.
+Where errors are estimated from one solution, as by ``fast``, rows of rule 11 stay as they are, and motion beyond
+the horizon is not simulated, since nothing would confirm it; else finer steps decide them.
 """
 
 from __future__ import annotations
@@ -186,7 +186,7 @@ def judged_rows(rows: Rows, designs: Designs, limits: Limits, only: tuple[str, .
     rows
         The rows, after `boulder_kernels.rules.consider_rows`.
     designs, limits, only
-        As of `judge`.
+        See `judge`.
     """
     facts = facts_of(rows, designs, limits)
     columns, words = {}, {}

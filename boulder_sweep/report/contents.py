@@ -211,7 +211,7 @@ def table_data(rows: ResultRows, kept: Thinned) -> dict[str, Any]:
 
 
 def map_of(rows: ResultRows) -> dict[str, Any]:
-    """Return what the map of answers adds to that of a list: the axes it starts with, and the input asked for."""
+    """Return what the map of answers adds to the map of a list: the axes it starts with, and the input asked for."""
     if rows.need is None:
         return {"first": [], "asked": ""}
     key, varying = rows.need.key, rows.varying()
@@ -308,7 +308,7 @@ def _units() -> list[str]:
 def _input(name: str, start: Mapping[str, float], settings: Mapping[str, Any], ground: Ground) -> dict[str, Any]:
     """Description of an input: words, unit, range of its slider, admitted and usual values."""
     field, here, axis = BY_NAME[name], start[name], settings["inputs"].get(name)
-    assert field.admitted is not None  # as of every input
+    assert field.admitted is not None  # every input has a range
     ends = [here, *(axis if isinstance(axis, list) else [])]
     if field.usual is not None:
         ends += [field.usual.low, field.usual.high]

@@ -1,6 +1,6 @@
 """What the page calls: the kernels behind two functions over pointers to doubles.
 
-`rows` does the work of ``sweep run``, one design after another instead of in lanes, and `history` that of
+`rows` does the work of ``sweep run``, one design after another instead of in lanes, and `history` the work of
 ``sweep simulate``.
 """
 
@@ -85,7 +85,7 @@ def put_soils(
     ground_at, below_at, deeper
         Numbers in the order of GROUND, deeper layers, shape (deeper, BELOW), and their number.
     profile, layers, outlines
-        As of `put_soil`.
+        See `put_soil`.
     """
     g = carray(ground_at, (GROUND_COUNT,))
     ground = Ground(int(g[0]), g[1], g[2], g[3], carray(below_at, (deeper, BELOW)))
@@ -159,7 +159,7 @@ def simulate_in_soil(
     out: np.ndarray,
     centre: np.ndarray,
 ) -> Outcome:
-    """Simulate one design in its soil; layers, outline and room for the soil are as of `history`."""
+    """Simulate one design in its soil; layers, outline and room for the soil are `history`'s."""
     m, points, n = len(layers), len(outline), control.elements
     room = carray(soil_at, (ELEMENT_ROOM * n + 1,))
     if m == 0 and control.last_resort and control.stop_at_limit:
@@ -262,7 +262,7 @@ def rows(
     n
         Number of designs.
     ground_at, below_at, deeper
-        The soil as it lies, as of `put_soils`.
+        The soil as it lies, see `put_soils`.
     profile_at, points
         Profile of the boulders, shape (points, 4); no points for boxes.
     layers_at, m
@@ -336,7 +336,7 @@ def history(
     design_from
         Inputs, shape (len(DESIGN),); K_epsilon is written over.
     ground_at, below_at, deeper, profile_at, points, layers_at, m, outline_at, soil_at
-        The soil as it lies and room for what follows from it, as of `rows` for one design.
+        The soil as it lies and room for what follows from it, as `rows` takes them for one design.
     settings_at
         Settings, shape (len(SETTINGS),).
     n, times_at

@@ -22,7 +22,7 @@ from boulder_sweep.settings.shape import BOX, Shape
 from boulder_sweep.views.pictures import VERDICTS
 
 COLOURS = {**VERDICTS, "none": "#BBBBBB"}
-"""Colours of verdicts, those of `sweep plot`."""
+"""Colours of verdicts, as in `sweep plot`."""
 HATCHES = {"sensitive": "/", "open": "."}
 """Patterns of passes that are not robust, by their grade."""
 LINES = ("#1E88C9", "#D55E00", "#009E73")

@@ -334,7 +334,7 @@ def _check_whole(file: AnswerFile, path: Location) -> None:
 
 
 def _inputs_of(table: pa.Table, given: dict[str, Any]) -> dict[str, Any]:
-    """Return the inputs of answers as those of a list of designs; what follows from others is left out."""
+    """Return the inputs of answers as a list of designs has them; what follows from others is left out."""
     inputs: dict[str, Any] = {}
     for name in (name for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS) if name in table.column_names):
         optional = name in OPTIONAL_COLUMNS and name not in given
@@ -365,7 +365,7 @@ def _column(columns: dict[str, np.ndarray], name: str) -> np.ndarray:
 def _axes(
     settings: dict[str, Any], sets: dict[str, NamedSets], columns: dict[str, np.ndarray]
 ) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield the axes with their values; those of named sets are counted by their names."""
+    """Yield the axes with their values; named sets are counted by their names."""
     given = settings["inputs"]
     counted_by = [(given | settings.get("labels", {}))[name] for name in settings["order"]]
     lengths = [int(axis["count"]) if isinstance(axis, dict) else len(axis) for axis in counted_by]

@@ -162,7 +162,7 @@ def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str | 
     number
         Number of the design.
     page, units, command
-        As of `write_report`.
+        See `write_report`.
 
     Raises
     ------
@@ -240,7 +240,7 @@ def _shown(one: Named, row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _notes_on_rules(judged_by: str) -> list[str]:
-    """Return a note on the rules by which a table was judged, if they are not those of the simulator in the page."""
+    """Return a note on the rules by which a table was judged, if the simulator in the page has others."""
     if not judged_by:
         return []
     return [
@@ -268,7 +268,9 @@ def _general_notes(settings: Mapping[str, Any], control: Control, units: str) ->
     for factor in settings.get("partial_factor", {}).values():
         notes.append(f"Friction angles are design values, with a partial factor of {factor:g} on their tangent.")
     if not control.error_estimate:
-        notes.append("Numerical errors are those of one solution: a verdict nearer to a limit than that is undecided.")
+        notes.append(
+            "Numerical errors are estimated from one solution: a verdict nearer to a limit than that is undecided."
+        )
     if control.elements > MOST_ELEMENTS:
         notes.append(
             f"The settings ask for {control.elements:,} soil elements; what is simulated in this page uses "
@@ -298,7 +300,7 @@ def _written(page: Path, text: str) -> Path:
     Raises
     ------
     ReportError
-        The system refuses it, or as of `printed`.
+        The system refuses it; or see `printed`.
     """
     content = printed(text) if page.suffix.lower() == ".pdf" else text.encode()
     try:

@@ -215,7 +215,7 @@ def _connected(distributed: Any, scheduler: str) -> Any:
 
 
 def _check_workers(client: Any, scheduler: str) -> None:
-    """Wait for a worker, and refuse workers whose rows could differ from those of this machine.
+    """Wait for a worker, and refuse workers whose rows could differ from this machine's.
 
     Raises
     ------

@@ -213,7 +213,7 @@ class _Run:
     done : int
         Rows that are safe,
     is_counted : bool
-        and whether those of an earlier run are among them.
+        and whether rows of an earlier run are among them.
     written : list of Written
         Parts written by this run.
     jobs : int

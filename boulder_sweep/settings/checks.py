@@ -33,7 +33,7 @@ FLOATS = "soil of {value} would float; give the density of the saturated soil be
 
 _FRONT = ("vehicle_mass_kg", "impact_speed_m_s", "vehicle_spring_N_m", "vehicle_damper_N_s_m")
 LEAST_CRUSH, MOST_CRUSH = 0.5, 1.25
-"""Crush at a rigid wall over the calibrated one, between which spring and damper are taken for those of the vehicle. A
+"""Crush at a rigid wall over the calibrated one, between which spring and damper are taken for the vehicle's. A
 boulder gives way and takes less of the front than a wall: hence more than 1."""
 BEYOND_FRONT = (
     "against a rigid wall the front of this vehicle would be crushed by {crush}; its spring and damper are calibrated "
@@ -55,7 +55,7 @@ def check_complete(entries: Entries) -> None:
         if field.name in entries.listed and field.path in entries.given:
             entries.report(field.path, f"is given here and as column {field.name} of the table; remove one")
         if field.name == "boulder_density_kg_m3" and entries.gives_mass:
-            continue  # that of most rocks is assumed
+            continue  # the density of most rocks is assumed
         if not field.optional and not table_refused and field.path not in present | entries.misspelled:
             entries.report(field.path, "is required and missing")
     _check_embedment(entries, present, table_refused)
@@ -123,7 +123,7 @@ def _check_embedment(entries: Entries, present: set[str], table_refused: bool) -
 
 
 def check_pairs(entries: Entries) -> None:
-    """Report contradictory single values; those of axes and tables are reported row by row in the result."""
+    """Report contradictory single values; values of axes and tables are reported row by row in the result."""
     bumper, hood = entries.single("bumper_height_m"), entries.single("hood_height_m")
     if bumper is not None and hood is not None and hood < bumper:
         key = "hood_height" if "vehicle.hood_height" in entries.given else "bumper_height"

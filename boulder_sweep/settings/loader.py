@@ -79,7 +79,7 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
     path : str or Path
         YAML file.
     overrides : sequence of str
-        ``key.path=value`` entries that replace those of the file, as ``--set`` gives them.
+        ``key.path=value`` entries that replace entries of the file, as ``--set`` gives them.
 
     Returns
     -------
@@ -163,8 +163,8 @@ def apply_overrides(root: Mapping, overrides: Sequence[str], problems: ProblemLi
     root : Mapping
         The tree of the file, changed in place.
     overrides : sequence of str
-        As typed behind ``--set``, the key as of `boulder_sweep.settings.fields.named`; the value is YAML, so lists and
-        ranges work as in the file. ``--accuracy=fine`` is an option of its own.
+        As typed behind ``--set``, the key as `boulder_sweep.settings.fields.named` takes it; the value is YAML, so
+        lists and ranges work as in the file. ``--accuracy=fine`` is an option of its own.
     problems : ProblemList
         Receives what cannot be understood.
     """

@@ -129,7 +129,7 @@ def setting(path: str, unit: str, meaning: str, default: Any = MISSING, **more: 
     path : str
         Dotted key.
     unit, meaning
-        As of `Field`.
+        See `Field`.
     default
         Value where the file does not give the entry; none where it must.
     more
@@ -328,7 +328,7 @@ class Model:
     water_table_m: float | None = setting(
         "soil.water_table",
         "m",
-        "depth of the water table below the soil line; densities below it are those of the saturated soil",
+        "depth of the water table below the soil line; densities below it are the saturated soil's",
         None,
         admitted=Bound(0.0, 1000.0, "counted downwards from the soil line"),
         also=("water", "ground_water", "groundwater", "water_level"),
@@ -360,7 +360,7 @@ class Model:
     taper: float = setting(
         "boulder.taper",
         "1",
-        "width and length of the top over those of the foot; width and length given are those of the larger end",
+        "width and length of the top over width and length of the foot; the larger end has the width and length given",
         1.0,
         admitted=Bound(0.05, 20.0, "0.8 for a top of four fifths of the foot"),
         usual=Usual(0.5, 1.5, "usual boulders"),

@@ -106,7 +106,7 @@ class LeafError(Exception):
 class Mistakes(list[Mistake]):
     """Mistakes of an entry, collected so that all are reported at once.
 
-    ``with mistakes:`` takes those of a part of the entry; what follows the block is read all the same.
+    ``with mistakes:`` takes the mistakes of a part of the entry; what follows the block is read all the same.
     """
 
     def add(self, position: Position, message: str) -> None:

@@ -52,7 +52,7 @@ class Shape:
 
     @property
     def taper(self) -> float | None:
-        """Width and length of the top over those of the foot, if that says it all; 1 for a box."""
+        """Width and length of the top over width and length of the foot, if that says it all; 1 for a box."""
         if self.is_box:
             return 1.0
         both = all(point.near == point.far == 0.5 * point.width for point in self.points)
@@ -68,7 +68,7 @@ class Shape:
 
     @property
     def filled(self) -> float:
-        """Volume over that of the box of height, width and length: the integral of w l, by Simpson's rule exactly."""
+        """Volume over the box's of height, width and length: the integral of w l, by Simpson's rule exactly."""
         return self._integral(lambda near, far: near + far)
 
     @property

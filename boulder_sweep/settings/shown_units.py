@@ -59,7 +59,7 @@ class Shown(NamedTuple):
     name: str
     unit: str
     size: float
-    """One of its unit in that of the result."""
+    """One of its unit in the unit of the result."""
     meaning: str
 
 

@@ -567,7 +567,7 @@ def unfold_soils(
             if len(given) > 1:
                 raise wrong(soil.entries[given[1]].position, f"give one of {', '.join(given)}")
             if "water_table" in soil.entries and "subgrade_reaction" in lacking:
-                message = "the API curve is that of dry sand; with a water table give soil.subgrade_reaction"
+                message = "the API curve holds for dry sand; with a water table give soil.subgrade_reaction"
                 raise wrong(entry.position, message)
             density, node, method, log = _plain_density(soil), entry.value, given[0], None
             if method == LOG:

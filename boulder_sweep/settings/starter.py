@@ -47,7 +47,7 @@ KM_PER_MILE = 1.609344
 
 
 def is_published(vehicle: str) -> bool:
-    """Whether spring, damper and cargo bed of a class are published: those of the paper's medium-duty truck."""
+    """Whether spring, damper and cargo bed of a class are published: only the paper's medium-duty truck has them."""
     return CLASSES[vehicle][0] == next(iter(CATEGORIES))
 
 

@@ -59,7 +59,8 @@ _CONTROL: dict[str, tuple[type, float, float]] = {
     "longest_horizon": (float, 0.0, 1e4),
     "event_tolerance": (float, 1e-12, 1.0),
     **dict.fromkeys(
-        "error_estimate stop_at_limit locate_yield refined last_resort paired side_by_side".split(), (bool, 0, 1)
+        ("error_estimate", "stop_at_limit", "locate_yield", "refined", "last_resort", "paired", "side_by_side"),
+        (bool, 0, 1),
     ),
 }
 """Entries of `boulder_kernels.Control` with their types and bounds. The kernels are not asked: to import them, and the

@@ -163,7 +163,7 @@ class Sweep:
         Partial factor on tan(friction angle). The friction angles in `constants`, `axes` and `table` are design
         values: the factor has been applied to them.
     overrides : tuple of str
-        Entries that replaced those of the file, as of ``--set``.
+        Entries that replaced entries of the file, as ``--set`` gives them.
     heading : Heading
         Project, client, author and date for the heading of a report.
     derived : dict of str to Any

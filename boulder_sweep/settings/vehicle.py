@@ -29,7 +29,7 @@ FRICTION = 1.0
 APPROACH = "approach"
 SPEED = "speed"
 NEEDS_ACCELERATION = (
-    "lacks acceleration: that of the vehicle at full throttle on level ground, averaged over the run-up, by its maker "
+    "lacks acceleration: the vehicle's at full throttle on level ground, averaged over the run-up, by its maker "
     "or a timed run from rest (2 s / t^2); no values for classes of vehicles are built in"
 )
 
@@ -147,7 +147,7 @@ def read_approach(node: Node) -> Approach:
     given = node.entries if isinstance(node, Mapping) else {}
     mistakes = Mistakes()
     if "length" not in given:
-        mistakes.add(node.position, "lacks length, that of the run-up to the boulder")
+        mistakes.add(node.position, "lacks length, the length of the run-up to the boulder")
     if "acceleration" not in given:
         mistakes.add(node.position, NEEDS_ACCELERATION)
     if not {"from", "curve_radius"} & set(given):

@@ -106,7 +106,7 @@ def _one(points: np.ndarray, faces: np.ndarray) -> list[Part]:
 def _fans(corners: np.ndarray, counts: np.ndarray) -> np.ndarray:
     """Return the triangles of polygons, each a fan from its first corner.
 
-    Their volume is that of the polygons for every flat polygon, convex or not.
+    Their volume is the volume of the polygons for every flat polygon, convex or not.
     """
     first = np.cumsum(counts) - counts
     fans = counts - 2
@@ -478,7 +478,7 @@ def _glb_chunks(data: bytes) -> tuple[dict[str, Any], memoryview]:
 
 
 def _placing(node: dict[str, Any]) -> np.ndarray:
-    """Return what moves the points of a node to those of the node above."""
+    """Return what moves the points of a node to the points of the node above."""
     if "matrix" in node:
         return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
     placing = np.eye(4)

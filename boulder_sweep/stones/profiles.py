@@ -4,7 +4,7 @@ A plane cuts every face that it passes through along a line, and the oriented li
 middle follow from them by Green's theorem, whatever the shape of the section and in however many parts.
 
 The model takes a stone whose horizontal sections are rectangles. A section of area A within a by b becomes one of the
-same area, middle and proportions: its sides are a and b times sqrt(A / (a b)), never more than those of the stone. So
+same area, middle and proportions: its sides are a and b times sqrt(A / (a b)), never more than the stone's. So
 soil is pushed by no more width, and the boulder stands on no longer a foot, than there is, while volume and centre of
 mass are kept and the moment of inertia nearly.
 """
@@ -158,7 +158,7 @@ GOOD_FIT = 0.005
 LEAST_SECTIONS = 4
 """Sections that a piece holds at least."""
 LEAST_WEIGHT = 0.1
-"""Weight of the smallest sections in a fit, as a share of that of the largest."""
+"""Weight of the smallest sections in a fit, as a share of the weight of the largest."""
 LEAST_SIDE = 0.02
 """Shortest side of a profile, as a share of its longest: a pointed top ends in a small flat."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 ROCK_KG_M3 = 2650.0
-"""Density of rock where none is known: that of granite and most others."""
+"""Density of rock where none is known: granite's and most others'."""
 ROCKS = {
     "granite": (2500.0, 2640.0, 2810.0),
     "granodiorite": (2670.0, 2730.0, 2790.0),

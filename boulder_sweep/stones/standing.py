@@ -165,12 +165,12 @@ class Stone:
 
     @property
     def solidity(self) -> float:
-        """Volume over that of the smallest box."""
+        """Volume over the volume of the smallest box."""
         return self.solid.volume / float(np.prod(self.sides_m))
 
     @property
     def hull_share(self) -> float:
-        """Volume over that of the convex hull."""
+        """Volume over the volume of the convex hull."""
         return self.solid.volume / float(self._hull.volume)
 
     def standings(self) -> Iterator[Standing]:

@@ -162,7 +162,7 @@ def scanned(
     mass_kg
         Mass of the whole stone, from which its density follows.
     density_kg_m3
-        Its density, where no mass is given; that of `ROCK_KG_M3` where neither is.
+        Its density, where no mass is given; `ROCK_KG_M3` where neither is.
 
     Raises
     ------

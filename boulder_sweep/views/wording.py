@@ -58,7 +58,7 @@ def sized(unit: str, units: str) -> tuple[str, float]:
 
 
 def size_of(name: str, units: str) -> float:
-    """Return the size of the unit in which an input is printed, in that of the table."""
+    """Return the size of the unit in which an input is printed, in the unit of the table."""
     return sized(BY_NAME[name].unit, units)[1] if name in BY_NAME else 1.0
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from boulder_sweep.tradeoff.study import Point, Tradeoff
 
 FIRST_STEP_MS = 16.0
-"""Step whose name stands on the other side of its point, off that of the next."""
+"""Step whose name stands on the other side of its point, off the name of the next."""
 LEAST_DEG = 1e-11
 """Smaller errors are drawn here, because a logarithmic axis has no zero [deg]."""
 COLOURS = (ORANGE, AMBER, PURPLE, GREY, SKY)

@@ -281,10 +281,10 @@ def test_a_deceleration_changes_its_sign_and_rows_before_zero_stay() -> None:
         ({"velocity": np.linspace(-13.0, 2.0, 91)}, "the velocity is negative at first"),
         (
             {"displacement": np.linspace(0.0, 1e200, 91)},
-            r"reaches 1e\+200 m, which is not that of an impact; check the",
+            r"reaches 1e\+200 m, which no impact reaches; check the",
         ),
-        ({"acceleration": np.linspace(-1e308, -9e307, 91)}, r"reaches 1e\+308 m/s\^2, which is not that of an impact"),
-        ({"deceleration": np.linspace(1e-200, 2e-200, 91)}, r"reaches 2e-200 m/s\^2, which is not that of an impact"),
+        ({"acceleration": np.linspace(-1e308, -9e307, 91)}, r"reaches 1e\+308 m/s\^2, which no impact reaches"),
+        ({"deceleration": np.linspace(1e-200, 2e-200, 91)}, r"reaches 2e-200 m/s\^2, which no impact reaches"),
     ],
 )
 def test_signals_without_the_motion_of_an_impact_are_refused(signals: dict[str, np.ndarray], message: str) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from scipy.integrate import solve_ivp
 
@@ -39,7 +41,8 @@ def rolling(body: Body, times: np.ndarray) -> np.ndarray:
     def tips(_t: float, state: np.ndarray, turns: bool) -> float:
         return reduced(state)[1][1] if not turns else 1.0
 
-    tips.terminal = True  # type: ignore[attr-defined]
+    event: Any = tips
+    event.terminal = True
     how = {"rtol": 1e-9, "atol": 1e-11, "dense_output": True, "max_step": 2e-3}
     start = np.array([0.0, 0.0, 0.0, 0.0, 0.0, inputs.v_0, 0.0])
     stands = solve_ivp(rate, (0.0, times[-1]), start, args=(False,), events=tips, **how)

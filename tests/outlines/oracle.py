@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import cos, sin, tan
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -157,7 +157,8 @@ def simulate(stone: Stone, i: Inputs, horizon: float, elements: int = ELEMENTS, 
             M = loads(y)[1]
             return min(weight * ahead - M, M + weight * behind) if side == 0 else side * y[2]
 
-        leaves.terminal, leaves.direction = True, -1.0  # type: ignore[attr-defined]
+        event: Any = leaves
+        event.terminal, event.direction = True, -1.0
         found = solve_ivp(
             lambda _t, y, side=side: rates(y, side), (t, horizon), y,
             method="DOP853", rtol=rtol, atol=rtol * 1e-2, max_step=1e-3, events=[leaves], dense_output=True,

@@ -19,7 +19,10 @@ from boulder_sweep.stones.weighing import scanned
 from tests.stones.files import ply, prism, regular
 
 SIDES = "  length: 1.65\n  width: 1.68\n  height: 3.44\n"
-POINTS = "[{height: 0 m, width: 1.2 m, length: 1.1 m}, {height: 40 in, width: 1.7 m, near: 0.9 m, far: 0.7 m}, {height: 3 m, width: 1.4 m, length: 1.2 m}]"  # noqa: E501
+POINTS = (
+    "[{height: 0 m, width: 1.2 m, length: 1.1 m}, {height: 40 in, width: 1.7 m, near: 0.9 m, far: 0.7 m}, "
+    "{height: 3 m, width: 1.4 m, length: 1.2 m}]"
+)
 
 
 def with_profile(minimal: str, points: str, more: str = "") -> str:
@@ -78,7 +81,7 @@ def test_a_taper_goes_with_axes_of_the_sides(load_it, minimal):
 
 
 def test_a_constant_profile_and_a_taper_of_one_are_boxes(load_it, minimal):
-    same = "[{height: 0, width: 1.68, length: 1.65}, {height: 2, width: 1.68, length: 1.65}, {height: 3.44, width: 1.68, length: 1.65}]"  # noqa: E501
+    same = f"[{', '.join(f'{{height: {height}, width: 1.68, length: 1.65}}' for height in (0, 2, 3.44))}]"
     sweep = load_it(with_profile(minimal, same))
     box = load_it(minimal)
     assert sweep.model.shape.is_box

@@ -96,9 +96,9 @@ def test_every_choice_goes_to_the_safe_side(larger):
 
 def test_a_vehicle_that_stops_before():
     with pytest.raises(NoApproachError, match=r"after 12\.7 m"):
-        Approach(80.0, 0.0, 5.0, grade=0.1005).impact_speed_m_s  # noqa: B018
+        _ = Approach(80.0, 0.0, 5.0, grade=0.1005).impact_speed_m_s
     with pytest.raises(NoApproachError, match="after 0 m"):
-        Approach(80.0, 0.0, 0.0).impact_speed_m_s  # noqa: B018
+        _ = Approach(80.0, 0.0, 0.0).impact_speed_m_s
 
 
 def test_the_file(load_it, minimal):
@@ -165,7 +165,7 @@ def test_options_take_its_place(load_it, minimal):
     [
         (f"{SPEED}\n{WHOLE}", "15:3", "give speed or approach, not both"),
         ("  approach: 80 m", "14:13", "an approach must be a block of keys: length, from"),
-        ("  approach: {length: 80 m, from: 0}", "14:13", "lacks acceleration: that of the vehicle at full throttle"),
+        ("  approach: {length: 80 m, from: 0}", "14:13", "lacks acceleration: the vehicle's at full throttle"),
         ("  approach: {from: 0, acceleration: 1}", "14:13", "lacks length"),
         ("  approach: {length: 80, acceleration: 1}", "14:13", "lacks from (0 mph for a start from rest)"),
         ("  approach: {length: 80, from: 0, acceleration: 1, mu: 1}", "14:52", "'mu' is not a key of an approach"),

@@ -8,6 +8,7 @@ import re
 import shutil
 from importlib.metadata import version
 from pathlib import Path
+from typing import get_type_hints
 
 import pyarrow.parquet as pq
 import pytest
@@ -15,6 +16,7 @@ import pytest
 import boulder_kernels
 from boulder_sweep.answers.outputs import AnswerFile
 from boulder_sweep.errors import ReportError
+from boulder_sweep.settings import stored
 from boulder_sweep.store import provenance
 from boulder_sweep.store.provenance import canonical, differences, file_metadata, identity, identity_in, sha256_of
 from tests.answers.designs import bare_need, site
@@ -41,6 +43,12 @@ def test_versions_are_those_of_the_installed_packages():
     packages = ("numpy", "numba", "llvmlite", "pyarrow")
     assert {name: provenance.versions()[name] for name in packages} == {name: version(name) for name in packages}
     assert provenance._version("of-clay") == "unknown"
+
+
+def test_every_entry_of_the_control_is_checked():
+    kinds = get_type_hints(boulder_kernels.Control)
+    assert {name: kind for name, (kind, _, _) in stored._CONTROL.items()} == kinds
+    assert {*boulder_kernels.Readings._fields} == stored._READINGS
 
 
 def test_kernels_are_hashed_by_content(tmp_path, monkeypatch):

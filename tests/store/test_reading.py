@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import random
+import subprocess
+import sys
 import threading
 import warnings
 
@@ -53,6 +55,18 @@ def test_what_is_read_is_what_pandas_reads(out):
     pd.testing.assert_frame_equal(frame, pd.read_parquet(out), check_categorical=False)
     assert (frame.attrs["rows"], frame.attrs["complete"], frame.attrs["judged_by"]) == (ROWS, True, "")
     assert isinstance(frame["verdict"].dtype, pd.CategoricalDtype)
+
+
+def test_reading_needs_neither_the_kernels_nor_the_compiler(out):
+    """To import them takes longer than to read a table."""
+    code = f"""
+import sys
+from boulder_sweep.store import read
+read({str(out)!r})
+print(*sorted({{"numba", "boulder_kernels.table", "scipy"}} & set(sys.modules)))
+"""
+    found = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert found.stdout.strip() == ""
 
 
 def test_some_columns(out):
