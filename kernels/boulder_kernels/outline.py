@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from ._jit import exact_inlined, exact_kernel
-from .design import Body, Design, G, body_of_box
+from .design import Body, Design, body_of_box
 
 HEIGHT, WIDTH, NEAR, FAR = range(4)
 """Columns of an outline, shape (P, 4), from the foot to the top: height over the foot, ascending from 0 to H, width,

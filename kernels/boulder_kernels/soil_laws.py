@@ -70,8 +70,8 @@ def type_of(value: Any) -> type:
 
 
 def soil_of(c: Any) -> Any:
-    """Return the record of the soil of `SoilConstants`, or its Numba type; a record itself, and plain constants."""
-    return c[SoilConstants._fields.index("soil")] if type_of(c) is SoilConstants else c
+    """Return the record of the soil of `SoilConstants`, their last field, or its Numba type; anything else itself."""
+    return c[-1] if type_of(c) is SoilConstants else c
 
 
 def law_of(c: Any) -> SoilLaw:
@@ -136,7 +136,7 @@ def fill_soil(design: Design, profile: SoilProfile) -> Lumped:
 
 @overload(fill_soil)
 def _fill_soil(design: Any, profile: Any) -> Callable[..., Lumped]:
-    fill: Any = law_of(profile[SoilProfile._fields.index("soil")]).fill
+    fill: Any = law_of(profile[-1]).fill
     return lambda design, profile: fill(design, profile.layers, profile.outline, profile.soil)
 
 

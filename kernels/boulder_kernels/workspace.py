@@ -410,6 +410,7 @@ def optional(name: str, value: float) -> tuple[Callable[[Any, int], float], Call
             return lambda record, lane, number: None
 
         def store_number(record: Any, lane: int, number: float) -> None:
+            """Write the number."""
             record[name][lane] = number
 
         return store_number
@@ -419,7 +420,7 @@ def optional(name: str, value: float) -> tuple[Callable[[Any, int], float], Call
     return load, store
 
 
-load_P_0, store_P_0 = optional("P_0", 0.0)
+load_strength, store_strength = optional("P_0", 0.0)
 load_w_0, store_w_0 = optional("w_0", 1.0)
 load_w_1, store_w_1 = optional("w_1", 0.0)
 load_lean, store_lean = optional("lean", 0.0)
@@ -432,7 +433,7 @@ def load_piece(group: Any, m: int, lane: int) -> Piece:
     p = pieces[m]
     low = pieces[m - 1].to[lane] if m > 0 else 0.0
     to = p.to[lane] if m + 1 < len(pieces) else 1.0
-    P_0, w_0, w_1 = load_P_0(p, lane), load_w_0(p, lane), load_w_1(p, lane)
+    P_0, w_0, w_1 = load_strength(p, lane), load_w_0(p, lane), load_w_1(p, lane)
     return Piece(low, to, p.K[lane], p.inverse_K[lane], P_0, p.P_1[lane], p.R[lane], w_0, w_1)
 
 
@@ -525,7 +526,7 @@ def store_in_soil(group: Any, lane: int, c: Any) -> None:
         one, p = group.pieces[m], c.soil.pieces[m]
         one.to[lane], one.K[lane], one.inverse_K[lane], one.P_1[lane] = p.to, p.K, p.inverse_K, p.P_1
         one.R[lane] = p.R
-        store_P_0(one, lane, p.P_0)
+        store_strength(one, lane, p.P_0)
         store_w_0(one, lane, p.w_0)
         store_w_1(one, lane, p.w_1)
 
