@@ -14,12 +14,12 @@ import numpy as np
 import boulder_kernels as bk
 from boulder_kernels import Constants, lanes
 from boulder_kernels.design import design_at
-from boulder_kernels.layered import COUNTS, TO, FewLayers, filled_layers, uniform_layers
 from boulder_kernels.outcomes import empty_outcomes
-from boulder_kernels.outlined import HEIGHT, TaperedSoil, given_beside
+from boulder_kernels.outline import HEIGHT
+from boulder_kernels.pieces import COUNTS, TO, given_pieces, uniform_layers
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_kernels.soil import Kinematics, Reaction, closed_form, element_sums
-from boulder_kernels.table import some_rows
+from boulder_kernels.table import Given, some_rows
 from boulder_sweep.judge.accuracy import LONGEST_HORIZON
 from boulder_sweep.settings.model import SECOND_OPINIONS
 from boulder_sweep.soils import with_law
@@ -52,14 +52,15 @@ def repeated(reaction: Callable[[Kinematics, Constants], Reaction]) -> Callable[
 
 
 def same_soil(designs: bk.DesignTable, count: int) -> np.ndarray:
-    """Return the soil of designs cut into layers of equal height, as rows of a table for lanes, shape (6 count, n)."""
+    """Return designs whose soil is cut into layers of equal height, as rows of a table for lanes."""
     rows = []
     for row in range(len(designs.L)):
         design = design_at(designs, row)
         layers = np.repeat(uniform_layers(design), count, axis=0)
         layers[:-1, TO] = design.d * np.arange(1, count) / count
         rows.append(layers)
-    return filled_layers(np.stack(rows), count)
+    boxes = np.empty((len(rows), 0, 4))
+    return given_pieces(np.stack(designs), np.stack(rows), boxes, count)
 
 
 def same_taper(designs: bk.DesignTable) -> np.ndarray:
@@ -69,7 +70,7 @@ def same_taper(designs: bk.DesignTable) -> np.ndarray:
     outlines = np.stack([point, point], axis=1)
     outlines[:, 1, HEIGHT] = designs.H
     layers = np.stack([uniform_layers(design_at(designs, row)) for row in range(len(designs.L))])
-    return given_beside(np.stack(designs), layers, outlines, 1)
+    return given_pieces(np.stack(designs), layers, outlines, 1)
 
 
 def measure() -> Table:
@@ -84,16 +85,16 @@ def measure() -> Table:
     with_elements = bk.constants_of(design_at(designs, 0), readings, ELEMENTS)
     closed = bk.constants_of(design_at(designs, 0), readings, 0)
     lines = Kinematics(0.05, 0.03, 2.0, 0.5, 0.4, 1.5)
-    layered = {count: np.concatenate([stacked, same_soil(designs, count)]) for count in COUNTS}
+    layered = {count: same_soil(designs, count) for count in COUNTS}
 
-    def in_lanes(table: np.ndarray, form: type | None, count: int) -> Callable[[], object]:
-        out = empty_outcomes(table.shape[1])
-        return partial(lanes.simulate_lanes, table, form, count, readings, control, bk.no_record(), out)
+    def in_lanes(given: Given) -> Callable[[], object]:
+        out = empty_outcomes(given.designs.shape[1])
+        return partial(lanes.simulate_lanes, *given, readings, control, bk.no_record(), out)
 
     work: dict[str, Callable[[], object]] = {
-        "box": in_lanes(stacked, None, 0),
-        **{f"{count} layers": in_lanes(table, FewLayers, count) for count, table in layered.items()},
-        "taper": in_lanes(same_taper(designs), TaperedSoil, 1),
+        "box": in_lanes(Given(stacked)),
+        **{f"{count} layers": in_lanes(Given(table, count, True)) for count, table in layered.items()},
+        "taper": in_lanes(Given(same_taper(designs), 1, has_outline=True)),
         **{law: partial(second_opinions, with_law(passes, law), asked) for law in SECOND_OPINIONS},
         "sums": partial(repeated(element_sums), lines, with_elements, SUMS),
         "closed": partial(repeated(closed_form), lines, closed, CLOSED_FORMS),

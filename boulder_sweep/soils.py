@@ -12,7 +12,7 @@ import numpy as np
 
 from boulder_kernels import DesignTable
 from boulder_kernels import ground as kernels
-from boulder_kernels.layered import LayeredTable, OutlinedTable
+from boulder_kernels.pieces import PiecewiseTable
 from boulder_kernels.table import some_rows
 from boulder_sweep.settings.model import RESISTANCES, Ground
 from boulder_sweep.settings.shape import BOX, ProfilePoint, Shape
@@ -93,8 +93,8 @@ def with_soil(table: DesignTable, law: str, ground: Ground, turned: float = 0.0,
 
     Returns
     -------
-    DesignTable, LayeredTable or OutlinedTable
-        The first where the resistance is proportional to depth, the last where boulders are no boxes.
+    DesignTable or PiecewiseTable
+        The first where boulders are boxes and the resistance is proportional to depth.
     """
     shape = shape or Shape()
     if shape.is_box and ground.is_usual:
@@ -104,12 +104,11 @@ def with_soil(table: DesignTable, law: str, ground: Ground, turned: float = 0.0,
     layers, outlines = np.empty((n, layers_count(law, ground, shape), 6)), np.empty((n, len(profile), 4))
     lies = ground_of(law, ground, turned)
     kernels.put_soil(table, lies, not ground.is_proportional, SLICES, profile, layers, outlines)
-    if len(profile):
-        return OutlinedTable(*table, layers, outlines)
-    return table if ground.is_proportional else LayeredTable(*table, layers)
+    is_uniform = shape.is_box and ground.is_proportional
+    return table if is_uniform else PiecewiseTable(*table, layers, outlines)
 
 
-def with_shape(table: DesignTable, law: str, ground: Ground, shape: str, fills: np.ndarray) -> OutlinedTable:
+def with_shape(table: DesignTable, law: str, ground: Ground, shape: str, fills: np.ndarray) -> PiecewiseTable:
     """Return the same for boulders as taped and weighed, by one of the shapes that they may have.
 
     Parameters
@@ -128,7 +127,7 @@ def with_shape(table: DesignTable, law: str, ground: Ground, shape: str, fills: 
     rows = [np.flatnonzero(fills == fill) for fill in np.unique(fills)]
     each = [with_soil(some_rows(table, some), law, ground, shape=Shape(_points(profiles[some[0]]))) for some in rows]
     order = np.argsort(np.concatenate(rows))
-    return OutlinedTable(*(np.ascontiguousarray(np.concatenate(column)[order]) for column in zip(*each, strict=True)))
+    return PiecewiseTable(*(np.ascontiguousarray(np.concatenate(column)[order]) for column in zip(*each, strict=True)))
 
 
 def _points(profile: np.ndarray) -> tuple[ProfilePoint, ...]:

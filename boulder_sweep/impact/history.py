@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -19,9 +19,10 @@ from boulder_kernels.dynamics import (
     TURNING_FORWARD,
     Acceleration,
 )
-from boulder_kernels.layered import SoilLayers
-from boulder_kernels.outlined import OutlinedElements, OutlinedPieces, body_beside, is_outlined
+from boulder_kernels.outline import body_with
+from boulder_kernels.pieces import ManyPieces, Piece
 from boulder_kernels.soil import drag_force, soil_kinematics, spring_force
+from boulder_kernels.soil_laws import BOX
 from boulder_kernels.time_history import StoredEnergies, evaluate_samples
 
 MODE_NAMES = {
@@ -49,17 +50,20 @@ class Motion:
     outcome: Outcome
     """Of the whole motion that was recorded, beyond the limit."""
 
+    given_outline: np.ndarray = field(default_factory=lambda: BOX)
+    """Outline of the boulder, shape (P, 4), see `boulder_kernels.outline`; P = 0 of a box."""
+
     @property
     def body(self) -> Body:
         """The boulder as a rigid body."""
-        return body_beside(self.design, getattr(self.constants, "soil", None))
+        return body_with(self.design, self.given_outline)
 
     @property
     def outline(self) -> np.ndarray:
-        """Outline of the boulder, shape (P, 4), see `boulder_kernels.outlined`; a box has its own."""
-        soil, half = getattr(self.constants, "soil", None), 0.5 * self.design.L
-        if soil is not None and is_outlined(soil):
-            return np.asarray(soil.outline)
+        """Outline of the boulder, shape (P, 4), see `boulder_kernels.outline`; a box has its own."""
+        if len(self.given_outline):
+            return self.given_outline
+        half = 0.5 * self.design.L
         return np.array([[z, self.design.W, half, half] for z in (0.0, self.design.H)])
 
 
@@ -225,18 +229,12 @@ def soil_profile(motion: Motion, sample: int, slices: int) -> SoilForces:
 
 
 def _pressed_at(ratio: np.ndarray, displacement: np.ndarray, velocity: np.ndarray, c: Any) -> np.ndarray:
-    """What layers or elements press with at ratios of the depth, per ratio [N]; of elements, those they lie in."""
+    """What pieces or elements press with at ratios of the depth, per ratio [N]; of elements, those they lie in."""
     soil = c.soil
-    if isinstance(soil, OutlinedElements):
-        soil = soil.elements
-    if isinstance(soil, OutlinedPieces):
-        at = np.searchsorted(soil.to, ratio)
-        width = soil.w_0[at] + soil.w_1[at] * ratio
-        spring, drag = soil.K[at] * ratio * width, soil.R[at] * width
-        ultimate = (soil.P_0[at] + soil.P_1[at] * ratio) * width
-    elif isinstance(soil, SoilLayers):
-        at = np.searchsorted(soil.to, ratio)
-        spring, ultimate, drag = soil.K[at] * ratio, soil.P_0[at] + soil.P_1[at] * ratio, soil.R[at]
+    if isinstance(soil, ManyPieces):
+        p = Piece(*soil.pieces[np.searchsorted(soil.pieces[:, Piece._fields.index("to")], ratio)].T)
+        width = np.asarray(p.w_0 + p.w_1 * ratio)
+        spring, ultimate, drag = p.K * ratio * width, (p.P_0 + p.P_1 * ratio) * width, p.R * width
     else:
         elements = len(soil.ratio)
         at = np.minimum((ratio * elements).astype(int), elements - 1)

@@ -15,7 +15,7 @@ from boulder_kernels import simulate as simulate_impact
 from boulder_kernels._jit import plain
 from boulder_kernels.control import control_for
 from boulder_kernels.outcomes import FINER, NONE_NEEDED
-from boulder_kernels.soil_laws import constants_in
+from boulder_kernels.soil_laws import BOX, constants_in
 from boulder_kernels.table import is_layered, is_paired, problem_at, step_of_solution
 from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS, SHAPES
 from boulder_sweep.impact.history import Motion
@@ -143,7 +143,8 @@ def history_of(
     problem = problem_at(designs.table, 0, drawn)
     outcome = simulate_impact(problem, how, drawn, record)
     c = constants_in(problem.design, how, drawn.elements, problem.profile)
-    motion = Motion(problem.design, how, c, drawn, _kept(record, times, outcome), outcome)
+    outline = BOX if problem.profile is None else problem.profile.outline
+    motion = Motion(problem.design, how, c, drawn, _kept(record, times, outcome), outcome, outline)
     decided = _decided(designs, how, deciding)
     return Trajectory.of(sweep.name, design_id, inputs, sweep.resolved(), motion, judged, decided)
 

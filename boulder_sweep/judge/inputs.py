@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import math
 from itertools import product
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from boulder_kernels import DesignTable
-from boulder_kernels.layered import OutlinedTable
-from boulder_kernels.outlined import FAR, HEIGHT, NEAR
+from boulder_kernels.outline import FAR, HEIGHT, NEAR
 from boulder_sweep.columns import BOULDER_MASS, SHAPES
 from boulder_sweep.designs import LEAST_SOLIDITY, LEAST_TAPED, solidity_of
 from boulder_sweep.settings.model import Model
@@ -43,12 +42,16 @@ SOURCES = {
 """Column of the table that each field of a `DesignTable` comes from; only the angle changes its unit."""
 
 
+NO_OUTLINES = np.empty((0, 0, 4))
+
+
 class Designs(NamedTuple):
     """Designs that can be computed, n of them."""
 
     table: DesignTable
     """What the kernels simulate: contiguous float64 arrays of shape (n,); SI, phi in rad, beta in MN/m^3. Where the
-    soil is not the same at every depth, a `LayeredTable`, whose other fields hold the uppermost layer."""
+    soil is not the same at every depth, or boulders are no boxes, a `PiecewiseTable`, whose other fields hold the
+    uppermost layer."""
     bed_offset: np.ndarray
     """Distance from the front bumper to the leading edge of the cargo bed [m], shape (n,)."""
     fills: np.ndarray | None = None
@@ -86,7 +89,7 @@ class Designs(NamedTuple):
     @property
     def taped(self) -> np.ndarray:
         """Which of them are known by sizes and mass only, so that a family of shapes stands for each, bool, (n,)."""
-        known = self.rocks is None or isinstance(self.table, OutlinedTable)
+        known = self.rocks is None or self.has_outlines
         return np.zeros(self.size, dtype=bool) if known else (self.solidity >= LEAST_TAPED) & ~self.has_known_shape
 
     def in_shape(self, shape: int, model: Model) -> Designs:
@@ -99,17 +102,23 @@ class Designs(NamedTuple):
     @property
     def length(self) -> np.ndarray:
         """Distance from where the vehicle strikes each boulder to its far face, where that is farthest [m], (n,)."""
-        if not isinstance(self.table, OutlinedTable):
+        table: Any = self.table
+        if not self.has_outlines:
             return self.table.L
-        table, outlines = self.table, self.table.outlines
+        outlines = table.outlines
         blow = np.minimum(table.d + table.e, table.H)
         near = [np.interp(z, one[:, HEIGHT], one[:, NEAR]) for z, one in zip(blow, outlines, strict=True)]
         return np.array(near) + outlines[:, :, FAR].max(axis=1)
 
     @property
+    def has_outlines(self) -> bool:
+        """Whether what is simulated are no boxes."""
+        return getattr(self.table, "outlines", NO_OUTLINES).shape[1] > 0
+
+    @property
     def has_known_shape(self) -> np.ndarray:
         """Whether what is simulated has the shape of each boulder, bool, shape (n,)."""
-        return (self.solidity >= LEAST_SOLIDITY) | isinstance(self.table, OutlinedTable)
+        return (self.solidity >= LEAST_SOLIDITY) | self.has_outlines
 
 
 def designs_of(

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from boulder_kernels import Control, Readings, Status, rules
-from boulder_kernels.layered import PRESSURE_SLOPE
+from boulder_kernels.pieces import PRESSURE_SLOPE
 from boulder_kernels.rules import OF_CRITERION, RULES
 from boulder_kernels.table import is_paired
 from boulder_sweep.columns import INPUTS, OPTIONAL_INPUTS, OUTCOMES, TO_BUILD
@@ -273,9 +273,9 @@ def _layout() -> dict[str, Any]:
         ],
         "rulings": page_records.RULINGS,
         "layer": PRESSURE_SLOPE + 1,  # the last of its columns
-        "layer_room": page_records.LAYER_ROOM,
         "piece_room": page_records.PIECE_ROOM,
         "element_room": page_records.ELEMENT_ROOM,
+        "sums_room": page_records.SUMS_ROOM,
         "columns": SOURCES,
     }
 

@@ -19,6 +19,7 @@ from boulder_kernels.error_estimates import safety_of, step_errors, take_second
 from boulder_kernels.ground import Ground, put_soil
 from boulder_kernels.impact import simulate_alone, simulate_last_resort
 from boulder_kernels.outcomes import NONE_NEEDED, PAIR, SECOND, STEP, outcome_in, write_outcome
+from boulder_kernels.pieces import ManyPieces, SoilProfile
 from boulder_kernels.rules import (
     ASKED_SLOWER,
     RULE,
@@ -34,7 +35,7 @@ from boulder_kernels.rules import (
     rule_by_slower,
     tested_in,
 )
-from boulder_kernels.soil_laws import SoilProfile, constants_in
+from boulder_kernels.soil_laws import constants_in
 from boulder_kernels.time_history import sample_of, state_of
 from boulder_sweep.report.page_records import (
     BELOW,
@@ -42,7 +43,6 @@ from boulder_sweep.report.page_records import (
     ELEMENT_ROOM,
     GROUND_COUNT,
     HISTORY_COUNT,
-    LAYER_ROOM,
     LIMITS_COUNT,
     OUTCOME_COUNT,
     PIECE_ROOM,
@@ -53,11 +53,9 @@ from boulder_sweep.report.page_records import (
     SETTINGS_COUNT,
     SIZES_COUNT,
     SIZES_V_0,
+    SUMS_ROOM,
     V_0,
     elements_from,
-    layers_from,
-    outlined_elements_from,
-    pieces_from,
     readings_from,
     table_from,
 )
@@ -160,26 +158,18 @@ def simulate_in_soil(
     centre: np.ndarray,
 ) -> Outcome:
     """Simulate one design in its soil; layers, outline and room for the soil are `history`'s."""
-    m, points, n = len(layers), len(outline), control.elements
-    room = carray(soil_at, (ELEMENT_ROOM * n + 1,))
+    m, n = len(layers), control.elements
     if m == 0 and control.last_resort and control.stop_at_limit:
         return simulate_last_resort(design, readings, control, record)
     if m == 0:
         return simulate_recorded(None, design, readings, control, record, out, centre)
-    if points > 0 and n == 0:
-        k = m + points - 2
-        pieces = pieces_from(carray(soil_at, (7, k)), carray(soil_at, (PIECE_ROOM * k,))[7 * k :], outline)
-        in_pieces = SoilProfile(layers, pieces)
-        return simulate_recorded(in_pieces, design, readings, control, record, out, centre)
-    if points > 0:
-        beside = SoilProfile(layers, outlined_elements_from(room, n, outline))
-        return simulate_recorded(beside, design, readings, control, record, out, centre)
-    if n == 0:
-        numbers = layers_from(carray(soil_at, (6, m)), carray(soil_at, (LAYER_ROOM * m,))[6 * m :])
-        in_layers = SoilProfile(layers, numbers)
-        return simulate_recorded(in_layers, design, readings, control, record, out, centre)
-    by_elements = SoilProfile(layers, elements_from(room, n))
-    return simulate_recorded(by_elements, design, readings, control, record, out, centre)
+    if n > 0:
+        by_elements = SoilProfile(layers, outline, elements_from(carray(soil_at, (ELEMENT_ROOM, n))))
+        return simulate_recorded(by_elements, design, readings, control, record, out, centre)
+    pieces = m + max(len(outline) - 2, 0)
+    room = carray(soil_at, (SUMS_ROOM + PIECE_ROOM * pieces,))
+    soil = ManyPieces(room[:SUMS_ROOM], room[SUMS_ROOM:].reshape(pieces, PIECE_ROOM))
+    return simulate_recorded(SoilProfile(layers, outline, soil), design, readings, control, record, out, centre)
 
 
 class Given(NamedTuple):
@@ -266,13 +256,13 @@ def rows(
     profile_at, points
         Profile of the boulders, shape (points, 4); no points for boxes.
     layers_at, m
-        Room for the layers of their soil, shape (n, m, 6), see `boulder_kernels.layered`; none for a uniform soil
+        Room for the layers of their soil, shape (n, m, 6), see `boulder_kernels.pieces`; none for a uniform soil
         beside boxes.
     outlines_at
-        Room for the outlines of the boulders, shape (n, points, 4), see `boulder_kernels.outlined`.
+        Room for the outlines of the boulders, shape (n, points, 4), see `boulder_kernels.outline`.
     soil_at
-        Room for the soil of one design: for its layers, LAYER_ROOM m numbers, for its pieces beside an outline,
-        PIECE_ROOM (m + points - 2), or for N soil elements ELEMENT_ROOM N + 1.
+        Room for the soil of one design: SUMS_ROOM numbers and PIECE_ROOM for each of its pieces, or for N soil elements
+        ELEMENT_ROOM N.
     controls_at, count
         Settings, shape (count, len(SETTINGS)): the first, and finer ones in the order of
         `boulder_sweep.judge.accuracy.finer_controls`.

@@ -10,8 +10,7 @@ import numpy as np
 from boulder_kernels import Control, Design, DesignTable, OutcomeTable, Readings
 from boulder_kernels._jit import inlined
 from boulder_kernels.ground import Ground
-from boulder_kernels.layered import SoilElements, SoilLayers, SoilSums
-from boulder_kernels.outlined import OutlinedElements, OutlinedPieces
+from boulder_kernels.pieces import Piece, SoilElements, SoilSums
 from boulder_kernels.rules import Course, FlagInputs, Sizes, Tested, VerdictLimits
 
 DESIGN = Design._fields
@@ -64,35 +63,11 @@ def table_from(s: np.ndarray) -> DesignTable:
     return DesignTable(s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9], s[10], s[11], s[12], s[13], s[14])
 
 
-LAYER_ROOM = len(SoilLayers._fields) - 1 + len(SoilSums._fields)
-"""Numbers for each layer of the soil of a design: enough for the layers, and once for their sums."""
-
-
-PIECE_ROOM = len(OutlinedPieces._fields) - 1
-"""The same for each piece of the soil beside a boulder with an outline: of M layers and P points M + P - 2."""
-ELEMENT_ROOM = len(SoilElements._fields)
-"""The same for each of N soil elements, and one more for the weight beside an outline."""
+PIECE_ROOM, SUMS_ROOM, ELEMENT_ROOM = len(Piece._fields), len(SoilSums._fields), len(SoilElements._fields)
+"""Numbers for each piece of the soil of a design, once for their sums, and for each of N soil elements."""
 
 
 @inlined
-def layers_from(t: np.ndarray, sums: np.ndarray) -> SoilLayers:
-    """Return the rows of an array, and the numbers of another, as the layers of one design."""
-    return SoilLayers(t[0], t[1], t[2], t[3], t[4], t[5], sums)
-
-
-@inlined
-def elements_from(room: np.ndarray, n: int) -> SoilElements:
-    """Return the first numbers of an array as n soil elements of one design."""
-    return SoilElements(room[:n], room[n : 2 * n], room[2 * n : 3 * n], room[3 * n : 4 * n])
-
-
-@inlined
-def pieces_from(t: np.ndarray, lean: np.ndarray, outline: np.ndarray) -> OutlinedPieces:
-    """Return the rows of an array, and a number of another, as the soil of one design beside an outline."""
-    return OutlinedPieces(t[0], t[1], t[2], t[3], t[4], t[5], t[6], lean, outline)
-
-
-@inlined
-def outlined_elements_from(room: np.ndarray, n: int, outline: np.ndarray) -> OutlinedElements:
-    """Return the first numbers of an array as n soil elements of one design beside an outline."""
-    return OutlinedElements(elements_from(room, n), room[4 * n : 4 * n + 1], outline)
+def elements_from(t: np.ndarray) -> SoilElements:
+    """Return the rows of an array as the soil elements of one design."""
+    return SoilElements(t[0], t[1], t[2], t[3])

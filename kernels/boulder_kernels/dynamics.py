@@ -33,9 +33,9 @@ from typing import Any, NamedTuple
 from ._jit import inlined, overload
 from .design import Constants, Readings
 from .numerics import sine_versine
-from .outlined import is_outlined
+from .pieces import SoilConstants
 from .soil import soil_kinematics
-from .soil_laws import soil_reaction
+from .soil_laws import soil_reaction, type_of
 
 SEATED = 0
 """Gravity reading: theta_b = 0 and at rest; the weight balances the other moments."""
@@ -222,34 +222,23 @@ def rate_of(y: State, switches: Switches, c: Constants) -> Acceleration:
     return acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, switches, c)
 
 
-def _soil_in(c: Any) -> Any:
-    """Return the record of the soil of constants or of their Numba type; None of uniform soil."""
-    if hasattr(c, "instance_class"):
-        names = c.instance_class._fields
-        return c[names.index("soil")] if "soil" in names else None
-    return getattr(c, "soil", None)
-
-
 def lift_of(sin: float, versin: float, c: Constants) -> float:
     """Return the energy of the weight, lifted by a rotation with this sine and versine [J] (Eqs 37-39, 144)."""
-    lift = c.C_cos * abs(sin) + c.C_sin * versin
-    soil = _soil_in(c)
-    return float(lift + soil.lean[0] * c.d * sin if is_outlined(soil) else lift)
+    return float(c.C_cos * abs(sin) + c.C_sin * versin + getattr(c, "lean", 0.0) * c.d * sin)
 
 
 @overload(lift_of)
 def _lift_of(sin: Any, versin: Any, c: Any) -> Callable[..., float]:
-    if is_outlined(_soil_in(c)):
-        return lambda sin, versin, c: c.C_cos * abs(sin) + c.C_sin * versin + c.soil.lean[0] * c.d * sin
+    if type_of(c) is SoilConstants:
+        return lambda sin, versin, c: c.C_cos * abs(sin) + c.C_sin * versin + c.lean * c.d * sin
     return lambda sin, versin, c: c.C_cos * abs(sin) + c.C_sin * versin
 
 
 def least_couple(c: Constants) -> float:
     """Return the lesser of the moments of the weight about the ends of the foot [N m]; they differ by 2 D (Eq 144)."""
-    soil = _soil_in(c)
-    return float(c.C_cos - abs(soil.lean[0]) * c.d if is_outlined(soil) else c.C_cos)
+    return float(c.C_cos - abs(getattr(c, "lean", 0.0)) * c.d)
 
 
 @overload(least_couple)
 def _least_couple(c: Any) -> Callable[..., float]:
-    return (lambda c: c.C_cos - abs(c.soil.lean[0]) * c.d) if is_outlined(_soil_in(c)) else (lambda c: c.C_cos)
+    return (lambda c: c.C_cos - abs(c.lean) * c.d) if type_of(c) is SoilConstants else (lambda c: c.C_cos)

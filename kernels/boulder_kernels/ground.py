@@ -26,8 +26,8 @@ import numpy as np
 
 from ._jit import exact_inlined, exact_kernel, kernel
 from .design import DesignTable, G
-from .layered import PRESSURE, PRESSURE_SLOPE, TO
-from .outlined import FAR, HEIGHT, NEAR, WIDTH, at_height
+from .outline import FAR, HEIGHT, NEAR, WIDTH, at_height
+from .pieces import PRESSURE, PRESSURE_SLOPE, TO
 
 KP_SQUARED, BROMS, WIDTH_CAPPED = range(3)
 """Laws of the ultimate resistance."""
@@ -201,10 +201,10 @@ def put_soil(
     profile
         Height, width and reaches of the boulders as shares of their sides, shape (P, 4); P = 0 of boxes.
     layers
-        Where the layers go, shape (n, M, 6), see `boulder_kernels.layered`: one for every boundary of soil or water,
+        Where the layers go, shape (n, M, 6), see `boulder_kernels.pieces`: one for every boundary of soil or water,
         and one more for every cut between slices; M may be 0 where nothing asks for layers.
     outlines
-        Where the outlines go, shape (n, P, 4), see `boulder_kernels.outlined`.
+        Where the outlines go, shape (n, P, 4), see `boulder_kernels.outline`.
     """
     cuts = slices - 1 if len(profile) > 0 and ground.law == WIDTH_CAPPED else 0
     for row in range(len(layers)):

@@ -293,8 +293,9 @@ def filled_up(designs: np.ndarray) -> np.ndarray:
 
 def simulate_lanes(
     designs: np.ndarray,
-    soil: type | None,
-    parts: int,
+    pieces: int,
+    has_strength: bool,
+    has_outline: bool,
     readings: Readings,
     control: Control,
     record: Record,
@@ -305,10 +306,10 @@ def simulate_lanes(
     Parameters
     ----------
     designs
-        Designs, SI, shape (15 + G, n): first the fields of `DesignTable`, then what is given of their soil: layers
-        (`GivenLayer`), or the body and pieces (`Body`, `GivenPiece`) one after another.
-    soil, parts
-        The same as in `boulder_kernels.workspace.group_type`; a number of parts in `boulder_kernels.layered.COUNTS`.
+        Designs, SI, shape (15 + G, n): first the fields of `DesignTable`, then what is given where the soil is in
+        pieces: the body and the pieces (`Body`, `GivenPiece`) one after another.
+    pieces, has_strength, has_outline
+        The same as in `boulder_kernels.workspace.group_type`.
     readings
         Which formulas are read as printed.
     control
@@ -325,4 +326,5 @@ def simulate_lanes(
     """
     rows = np.full(LANES + 1, EMPTY)
     rows[NEXT] = 0
-    return run_lanes(filled_up(designs), readings, control, empty_groups(soil, parts), rows, record, out)
+    groups = empty_groups(pieces, has_strength=has_strength, has_outline=has_outline)
+    return run_lanes(filled_up(designs), readings, control, groups, rows, record, out)

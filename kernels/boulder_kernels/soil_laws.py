@@ -1,10 +1,10 @@
 """The laws of the soil in one table: the functions that the motion asks of each, and which design gets which.
 
 A law is one `SoilLaw`. Which one holds follows from the type of the constants of a design: plain `Constants` are those
-of a uniform soil, others carry the record of their soil. Inside kernels the function is chosen when they are compiled,
-so a uniform soil has the code it would have if there were no other.
+of a uniform soil beside a box, `SoilConstants` carry the record of their soil. Inside kernels the function is chosen
+when they are compiled, so a uniform soil has the code it would have if there were no other.
 
-To add a law: write its record and functions in a module beside `boulder_kernels.layered_soil`, and a line in `LAWS`.
+To add a law: write its record and functions beside those of `boulder_kernels.pieces`, and a line in `LAWS`.
 """
 
 from __future__ import annotations
@@ -14,49 +14,29 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import exact_inlined, is_none, kernel, overload, plain
-from .design import Body, Constants, Design, Readings, constants_of, constants_with
-from .layered import (
-    FewLayers,
-    LayeredConstants,
-    Lumped,
-    SoilElements,
-    SoilLayers,
-    SoilSums,
-    fill_elements,
-    fill_layers,
-    with_record,
-)
-from .layered_soil import (
-    potential_of_elements,
-    potential_of_layers,
-    power_of_elements,
-    power_of_layers,
-    reaction_of_elements,
-    reaction_of_layers,
-)
-from .outlined import (
+from ._jit import exact_inlined, inlined, is_none, kernel, overload, plain
+from .design import Constants, Design, Readings, constants_of
+from .outline import body_with
+from .pieces import (
     FewPieces,
-    OutlinedElements,
-    OutlinedPieces,
-    TaperedSoil,
-    body_beside,
-    empty_outlined,
-    fill_outlined_elements,
-    fill_outlined_pieces,
-    is_outlined,
-    lean_with,
-)
-from .outlined_soil import (
-    potential_of_outlined_elements,
+    Lumped,
+    ManyPieces,
+    Piece,
+    SoilConstants,
+    SoilElements,
+    SoilProfile,
+    SoilSums,
+    constants_in_soil,
+    fill_elements,
+    fill_pieces,
+    pieces_count,
+    potential_of_elements,
     potential_of_pieces,
-    potential_of_taper,
-    power_of_outlined_elements,
+    power_of_elements,
     power_of_pieces,
-    power_of_taper,
-    reaction_of_outlined_elements,
+    reaction_of_elements,
     reaction_of_pieces,
-    reaction_of_taper,
+    times,
 )
 from .soil import Kinematics, Potential, Reaction, uniform_drag_power, uniform_potential, uniform_reaction
 
@@ -70,72 +50,94 @@ class SoilLaw(NamedTuple):
     """Elastic energy and its slopes, convex in the displacement at the soil line and its decrease over the depth."""
     drag_power: Callable[..., float]
     """Power that the drag takes out of the motion [W], of `Kinematics`."""
-    fill: Callable[[Design, np.ndarray, Any], Lumped] | None = None
-    """Works out the record from the layers of a design, and returns what follows from them."""
+    fill: Callable[[Design, np.ndarray, np.ndarray, Any], Lumped] | None = None
+    """Works out the record from layers and outline of a design, and returns what follows from them."""
 
 
 UNIFORM = SoilLaw(uniform_reaction, uniform_potential, uniform_drag_power)
 LAWS: dict[type, SoilLaw] = {
-    SoilElements: SoilLaw(reaction_of_elements, potential_of_elements, power_of_elements, fill_elements),
-    SoilLayers: SoilLaw(reaction_of_layers, potential_of_layers, power_of_layers, fill_layers),
-    FewLayers: SoilLaw(reaction_of_layers, potential_of_layers, power_of_layers),
-    OutlinedElements: SoilLaw(
-        reaction_of_outlined_elements,
-        potential_of_outlined_elements,
-        power_of_outlined_elements,
-        fill_outlined_elements,
-    ),
-    OutlinedPieces: SoilLaw(reaction_of_pieces, potential_of_pieces, power_of_pieces, fill_outlined_pieces),
     FewPieces: SoilLaw(reaction_of_pieces, potential_of_pieces, power_of_pieces),
-    TaperedSoil: SoilLaw(reaction_of_taper, potential_of_taper, power_of_taper),
+    ManyPieces: SoilLaw(reaction_of_pieces, potential_of_pieces, power_of_pieces, fill_pieces),
+    SoilElements: SoilLaw(reaction_of_elements, potential_of_elements, power_of_elements, fill_elements),
 }
 """The law of each record of a soil."""
 
 
-def type_of(record: Any) -> type:
-    """Return the type of a record, which may be a value or, inside kernels, its Numba type."""
-    kind: type = getattr(record, "instance_class", type(record))
+def type_of(value: Any) -> type:
+    """Return the type of a named tuple, which may be a value or, inside kernels, its Numba type."""
+    kind: type = getattr(value, "instance_class", type(value))
     return kind
+
+
+def soil_of(c: Any) -> Any:
+    """Return the record of the soil of `SoilConstants`, their last field, or its Numba type; anything else itself."""
+    return c[-1] if type_of(c) is SoilConstants else c
 
 
 def law_of(c: Any) -> SoilLaw:
     """Return the law of the soil of constants, or of the record of a soil."""
-    return LAWS.get(type_of(c[-1] if type_of(c) is LayeredConstants else c), UNIFORM)
+    return LAWS.get(type_of(soil_of(c)), UNIFORM)
 
 
-def by_law(field: str) -> Callable[..., Any]:
-    """Return a function that calls a field of `SoilLaw` of the law of its last argument, for Python and for kernels.
+def soil_reaction(k: Kinematics, c: Any) -> Reaction:
+    """Force and moment of soil and leaning weight at lines ``k`` of displacement, velocity and lever (Eqs 19, 20, 144).
 
-    The last argument is constants, whose record is passed on in their place, or a record.
+    A boulder whose centre does not lie over the middle of its foot has the moment -D cos(theta) of its weight with it:
+    the restoring couple of a box has equal arms either way, and D is half of what differs.
     """
-
-    def call(*arguments: Any) -> Any:
-        """Call the function of the law of these arguments."""
-        c = arguments[-1]
-        if type(c) is Constants:
-            return uniform(*arguments)
-        return getattr(law_of(c), field)(*arguments[:-1], c.soil if type(c) is LayeredConstants else c)
-
-    def choose(*arguments: Any) -> Callable[..., Any]:
-        """Return the call for arguments of these Numba types."""
-        of_law = getattr(law_of(arguments[-1]), field)
-        if type_of(arguments[-1]) is not LayeredConstants:
-            return (lambda a, c: of_law(a, c)) if len(arguments) == 2 else (lambda a, b, c: of_law(a, b, c))
-        return (lambda a, c: of_law(a, c.soil)) if len(arguments) == 2 else (lambda a, b, c: of_law(a, b, c.soil))
-
-    uniform = getattr(UNIFORM, field)
-    overload(call)(choose)
-    return call
+    found = law_of(c).reaction(k, soil_of(c))
+    return leaning(found, k, c.lean) if type(c) is SoilConstants else found
 
 
-soil_reaction = by_law("reaction")
-"""Force and moment of the soil at lines ``k`` of displacement, velocity and lever (Eqs 19, 20)."""
-soil_potential = by_law("potential")
-"""Elastic energy of the soil by the same representation as the forces, a convex function of both displacements [m]."""
-drag_power = by_law("drag_power")
-"""Power that the drag takes out of the motion [W], by the same representation as the forces (Eqs 34-36)."""
-fill_soil = by_law("fill")
-"""Work out a record from the layers of a design, shape (M, 6), and return what follows from them, `Lumped`."""
+@overload(soil_reaction)
+def _soil_reaction(k: Any, c: Any) -> Callable[..., Reaction]:
+    reaction = law_of(c).reaction
+    if type_of(c) is SoilConstants:
+        return lambda k, c: leaning(reaction(k, c.soil), k, c.lean)
+    return lambda k, c: reaction(k, c)
+
+
+@inlined
+def leaning(reaction: Reaction, k: Kinematics, lean: float) -> Reaction:
+    """Add the moment -D cos(theta) of the weight (Eq 144)."""
+    return Reaction(reaction.F, reaction.M - times(lean, k.lever_d))
+
+
+def soil_potential(A: float, slope_x: float, c: Any) -> Potential:
+    """Elastic energy of the soil by the same representation as the forces, a convex function of both lengths [m]."""
+    return law_of(c).potential(A, slope_x, soil_of(c))
+
+
+@overload(soil_potential)
+def _soil_potential(A: Any, slope_x: Any, c: Any) -> Callable[..., Potential]:
+    potential = law_of(c).potential
+    if type_of(c) is SoilConstants:
+        return lambda A, slope_x, c: potential(A, slope_x, c.soil)
+    return lambda A, slope_x, c: potential(A, slope_x, c)
+
+
+def drag_power(k: Kinematics, c: Any) -> float:
+    """Power that the drag takes out of the motion [W], by the same representation as the forces (Eqs 34-36)."""
+    return law_of(c).drag_power(k, soil_of(c))
+
+
+@overload(drag_power)
+def _drag_power(k: Any, c: Any) -> Callable[..., float]:
+    power = law_of(c).drag_power
+    return (lambda k, c: power(k, c.soil)) if type_of(c) is SoilConstants else (lambda k, c: power(k, c))
+
+
+def fill_soil(design: Design, profile: SoilProfile) -> Lumped:
+    """Work out the record of a profile, and return what follows from it."""
+    fill: Any = LAWS[type(profile.soil)].fill
+    lumped: Lumped = fill(design, *profile)
+    return lumped
+
+
+@overload(fill_soil)
+def _fill_soil(design: Any, profile: Any) -> Callable[..., Lumped]:
+    fill: Any = law_of(profile[-1]).fill
+    return lambda design, profile: fill(design, profile.layers, profile.outline, profile.soil)
 
 
 @kernel
@@ -145,41 +147,11 @@ def soil_energy(k: Kinematics, c: Constants) -> float:
     return V
 
 
-class SoilProfile(NamedTuple):
-    """The soil of one design where it is not that of its `Design` all the way down."""
-
-    layers: np.ndarray
-    """Layers from the top down, shape (M, 6), see `boulder_kernels.layered`."""
-    soil: Any
-    """`SoilElements` or `SoilLayers`, worked out from the layers by whoever computes the constants."""
-
-
-def keep_lean(body: Body, design: Design, gravity: bool, soil: Any) -> None:
-    """Keep what the weight adds beside the soil."""
-    if is_outlined(soil):
-        soil.lean[0] = lean_with(body, design, gravity)
-
-
-@overload(keep_lean)
-def _keep_lean(body: Any, design: Any, gravity: Any, soil: Any) -> Callable[..., None]:
-    if not is_outlined(soil):
-        return lambda body, design, gravity, soil: None
-
-    def keep(body: Body, design: Design, gravity: bool, soil: Any) -> None:
-        """Keep it."""
-        soil.lean[0] = lean_with(body, design, gravity)
-
-    return keep
-
-
 @exact_inlined
-def constants_in_profile(design: Design, readings: Readings, elements: int, profile: SoilProfile) -> Any:
-    """Constants of the motion of one design in layers of soil; see `constants_in`."""
-    lumped = fill_soil(design, profile.layers, profile.soil)
-    b, body = lumped.bounds, body_beside(design, profile.soil)
-    keep_lean(body, design, readings.restoring_gravity, profile.soil)
-    c = constants_with(design, body, readings, b.elements, lumped.mass, b.K_soil, b.R_soil, b.x_yield)
-    return with_record(c, profile.soil)
+def constants_in_profile(design: Design, readings: Readings, profile: SoilProfile) -> Any:
+    """Constants of the motion of one design in a profile; see `constants_in`."""
+    lumped = fill_soil(design, profile)
+    return constants_in_soil(design, readings, body_with(design, profile.outline), lumped, profile.soil)
 
 
 def constants_in(design: Design, readings: Readings, elements: int, profile: SoilProfile | None) -> Any:
@@ -194,38 +166,37 @@ def constants_in(design: Design, readings: Readings, elements: int, profile: Soi
     elements
         Number N of elements of a uniform soil, or 0 for the closed form.
     profile
-        Its `SoilProfile`, whose record the constants keep; None for the uniform soil of the design.
+        Its `SoilProfile`, whose record the constants keep; None for the uniform soil of a box.
 
     Returns
     -------
-    Constants or LayeredConstants
+    Constants or SoilConstants
         Non-finite or non-positive where the design is impossible, see `boulder_kernels.design.is_computable`.
     """
     if profile is None:
         return constants_of(design, readings, elements)
-    return plain(constants_in_profile)(design, readings, elements, profile)  # what it calls is compiled
+    return plain(constants_in_profile)(design, readings, profile)  # what it calls is compiled
 
 
 @overload(constants_in)
 def _constants_in(design: Any, readings: Any, elements: Any, profile: Any) -> Callable[..., Any]:
     if is_none(profile):
         return lambda design, readings, elements, profile: constants_of(design, readings, elements)
-    return lambda design, readings, elements, profile: constants_in_profile(design, readings, elements, profile)
+    return lambda design, readings, elements, profile: constants_in_profile(design, readings, profile)
 
 
-def empty_soil(layers: int, elements: int, outline: np.ndarray | None = None) -> Any:
-    """Return a soil to fill: N elements, or where N is 0 as many layers as there are, for which it is exact.
-
-    Beside an outline, shape (P, 4), each of its points may cut a layer in two.
-    """
-    if outline is not None:
-        return empty_outlined(layers + len(outline) - 2, elements, outline)
+def empty_soil(layers: int, points: int, elements: int) -> Any:
+    """Return a soil to fill: N elements, or where N is 0 the pieces of so many layers and points of an outline."""
     if elements > 0:
         return SoilElements(*np.empty((len(SoilElements._fields), elements)))
-    to, K, inverse_K, P_0, P_1, R = np.empty((6, layers))
-    return SoilLayers(to, K, inverse_K, P_0, P_1, R, np.empty(len(SoilSums._fields)))
+    pieces = np.empty((pieces_count(layers, points), len(Piece._fields)))
+    return ManyPieces(np.empty(len(SoilSums._fields)), pieces)
 
 
-def profile_of(layers: np.ndarray, elements: int, outline: np.ndarray | None = None) -> SoilProfile:
-    """Return a soil in layers, by N elements or, where N is 0, exactly; beside an outline if the boulder has one."""
-    return SoilProfile(layers, empty_soil(len(layers), elements, outline))
+BOX = np.empty((0, 4))
+"""The outline of a box: no points."""
+
+
+def profile_of(layers: np.ndarray, elements: int, outline: np.ndarray = BOX) -> SoilProfile:
+    """Return a soil in layers beside an outline, by N elements or, where N is 0, exactly."""
+    return SoilProfile(layers, outline, empty_soil(len(layers), len(outline), elements))

@@ -14,14 +14,6 @@ from .error_estimates import safety_of, step_errors, take_seconds
 from .following import failed
 from .impact import Problem, simulate_alone, simulate_last_resort
 from .lanes import simulate_lanes
-from .layered import (
-    LAYERED,
-    PRESSURE,
-    FewLayers,
-    OutlinedTable,
-    filled_layers,
-    lanes_count,
-)
 from .outcomes import (
     COARSER,
     FINER,
@@ -37,46 +29,28 @@ from .outcomes import (
     outcome_table,
     write_outcome,
 )
-from .outlined import FewPieces, TaperedSoil, given_beside, is_outlined, with_outline
+from .pieces import PRESSURE, PiecewiseTable, SoilProfile, given_pieces, lanes_count, pieces_count
 from .settling import proof_is_possible
-from .soil_laws import SoilProfile, empty_soil, profile_of
+from .soil_laws import empty_soil, profile_of
 from .time_history import Record, no_record
 
 
 @kernel
-def take_profile(row: int, soil: Any, layers: np.ndarray) -> SoilProfile:
-    """Return the soil of one design of a table in layers, shape (n, M, 6)."""
-    return SoilProfile(layers[row], soil)
+def take_profile(row: int, soil: Any, layers: np.ndarray, outlines: np.ndarray) -> SoilProfile:
+    """Return the soil of one design of a `PiecewiseTable`."""
+    return SoilProfile(layers[row], outlines[row], soil)
 
 
-@kernel
-def take_outline(row: int, soil: Any, outlines: np.ndarray) -> Any:
-    """Return the soil to fill for one design of a table of boulders with outlines, shape (n, P, 4)."""
-    return with_outline(soil, outlines[row])
-
-
-def soil_in(row: int, soil: Any, outlines: np.ndarray | None) -> Any:
-    """Return the soil to fill for one design of a table."""
-    return soil if outlines is None else plain(take_outline)(row, soil, outlines)
-
-
-@overload(soil_in)
-def _soil_in(row: Any, soil: Any, outlines: Any) -> Callable[..., Any]:
-    if is_none(outlines):
-        return lambda row, soil, outlines: soil
-    return lambda row, soil, outlines: take_outline(row, soil, outlines)
-
-
-def profile_in(row: int, soil: Any, layers: np.ndarray | None) -> SoilProfile | None:
-    """Return the soil of one design of a table; None for the uniform soil of the design."""
-    return None if layers is None else plain(take_profile)(row, soil, layers)
+def profile_in(row: int, soil: Any, layers: np.ndarray | None, outlines: np.ndarray | None) -> SoilProfile | None:
+    """Return the soil of one design of a table; None for the uniform soil of a box."""
+    return None if layers is None else plain(take_profile)(row, soil, layers, outlines)
 
 
 @overload(profile_in)
-def _profile_in(row: Any, soil: Any, layers: Any) -> Callable[..., Any]:
+def _profile_in(row: Any, soil: Any, layers: Any, outlines: Any) -> Callable[..., Any]:
     if is_none(layers):
-        return lambda row, soil, layers: None
-    return lambda row, soil, layers: take_profile(row, soil, layers)
+        return lambda row, soil, layers, outlines: None
+    return lambda row, soil, layers, outlines: take_profile(row, soil, layers, outlines)
 
 
 @kernel
@@ -96,12 +70,10 @@ def run_rows(
     ----------
     designs
         Shape (15, n), at least one.
-    layers
-        Layers of every design, shape (n, M, 6), see `boulder_kernels.layered`; None for uniform soils.
-    outlines
-        Outlines of the boulders, shape (n, P, 4), see `boulder_kernels.outlined`, of designs in layers; None for boxes.
+    layers, outlines
+        Of `PiecewiseTable`; None for boxes in uniform soils.
     soil
-        Elements or layers that every design fills anew; None for uniform soils.
+        Elements or pieces that every design fills anew; None for boxes in uniform soils.
     readings, control
         As of `simulate_table`.
     record
@@ -111,7 +83,7 @@ def run_rows(
     """
     outcome = failed(Status.INVALID.value)
     for row in range(designs.shape[1]):
-        profile = profile_in(row, soil_in(row, soil, outlines), layers)
+        profile = profile_in(row, soil, layers, outlines)
         design = design_in(designs, row)
         outcome = simulate_alone(Problem(design, profile), readings, control, record)
         write_outcome(out, row, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
@@ -134,10 +106,9 @@ def run_last_resort(
 def problem_at(table: DesignTable, row: int, control: Control) -> Problem:
     """Return one row of a table as a problem."""
     design = design_at(table, row)
-    if not isinstance(table, LAYERED):
+    if not isinstance(table, PiecewiseTable):
         return Problem(design, None)
-    outline = table.outlines[row] if isinstance(table, OutlinedTable) else None
-    return Problem(design, profile_of(table.layers[row], control.elements, outline))
+    return Problem(design, profile_of(table.layers[row], control.elements, table.outlines[row]))
 
 
 def finer_step(step: float) -> float:
@@ -157,8 +128,9 @@ class Given(NamedTuple):
     """Designs as lanes take them, arguments of `simulate_lanes`."""
 
     designs: np.ndarray
-    soil: type | None
-    parts: int
+    pieces: int = 0
+    has_strength: bool = False
+    has_outline: bool = False
 
 
 def given_to_lanes(designs: np.ndarray, layers: np.ndarray | None, outlines: np.ndarray | None) -> Given | None:
@@ -169,23 +141,23 @@ def given_to_lanes(designs: np.ndarray, layers: np.ndarray | None, outlines: np.
     designs
         Shape (15, n).
     layers, outlines
-        Of `LayeredTable` and `OutlinedTable`.
+        Of `PiecewiseTable`; None for boxes in uniform soils.
     """
-    if layers is None:
-        return Given(designs, None, 0)
-    if outlines is None:
-        count = lanes_count(layers.shape[1])
-        return Given(np.concatenate([designs, filled_layers(layers, count)]), FewLayers, count) if count else None
-    pieces = layers.shape[1] + outlines.shape[1] - 2
-    if is_taper(layers, outlines):
-        return Given(given_beside(designs, layers, outlines, 1), TaperedSoil, 1)
-    count = lanes_count(pieces)
-    return Given(given_beside(designs, layers, outlines, count), FewPieces, count) if count else None
+    if layers is None or outlines is None:
+        return Given(designs)
+    points = outlines.shape[1]
+    count = lanes_count(pieces_count(layers.shape[1], points))
+    if count == 0:
+        return None
+    return Given(given_pieces(designs, layers, outlines, count), count, has_strength(layers), points > 0)
 
 
-def is_taper(layers: np.ndarray, outlines: np.ndarray) -> bool:
-    """Return whether soil and width vary as of `boulder_kernels.outlined.TaperedSoil`, arguments as before."""
-    return layers.shape[1] + outlines.shape[1] == 3 and not layers[:, :, PRESSURE].any()
+def has_strength(layers: np.ndarray) -> bool:
+    """Return whether the ultimate resistance of designs may be other than proportional to the depth.
+
+    Layers of another density may happen not to make it so: all designs of a file are to be computed by the same code.
+    """
+    return layers.shape[1] > 1 or bool(layers[:, :, PRESSURE].any())
 
 
 def solve_rows(
@@ -222,8 +194,9 @@ def solve(table: DesignTable, readings: Readings, control: Control) -> tuple[np.
     outlines: np.ndarray | None = getattr(table, "outlines", None)
     out = empty_outcomes(n)
     if n:
-        outline = None if outlines is None else outlines[0]
-        soil = None if layers is None else empty_soil(layers.shape[1], control.elements, outline)
+        soil = None
+        if layers is not None and outlines is not None:
+            soil = empty_soil(layers.shape[1], outlines.shape[1], control.elements)
         designs = np.stack(table[: len(DesignTable._fields)])
         solve_rows(designs, layers, outlines, soil, readings, control, no_record(), out)
     second = out[SECOND].copy()
@@ -253,9 +226,8 @@ def simulate(problem: Problem, readings: Readings, control: Control, record: Rec
     designs = np.array(problem.design, dtype=float)[:, None]
     if problem.profile is None:
         return solve_rows(designs, None, None, None, readings, control, record, empty_outcomes(1))
-    layers, soil = problem.profile
-    outlines = soil.outline[None] if is_outlined(soil) else None
-    return solve_rows(designs, layers[None], outlines, soil, readings, control, record, empty_outcomes(1))
+    layers, outline, soil = problem.profile
+    return solve_rows(designs, layers[None], outline[None], soil, readings, control, record, empty_outcomes(1))
 
 
 def simulate_design(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
@@ -265,9 +237,9 @@ def simulate_design(design: Design, readings: Readings, control: Control, record
 
 def is_layered(table: Any) -> bool:
     """Return whether the soil of a table may yield at one depth after another, other than in uniform soil."""
-    return isinstance(table, LAYERED) and not (
-        isinstance(table, OutlinedTable) and is_taper(table.layers, table.outlines)
-    )
+    if not isinstance(table, PiecewiseTable):
+        return False
+    return pieces_count(table.layers.shape[1], table.outlines.shape[1]) > 1 or has_strength(table.layers)
 
 
 def is_paired(readings: Readings, control: Control, *, layered: bool) -> bool:
@@ -291,8 +263,7 @@ def simulate_table(table: DesignTable, readings: Readings, control: Control) -> 
     Parameters
     ----------
     table
-        Designs, SI, arrays of shape (n,); or a `LayeredTable` or an `OutlinedTable`, whose designs have no
-        last resort.
+        Designs, SI, arrays of shape (n,); or a `PiecewiseTable`, whose designs have no last resort.
     readings
         Which formulas are read as printed.
     control

@@ -1,8 +1,8 @@
 """The numbers of many lanes: a record of each group of them, whose fields have one number for every lane.
 
 ``group.state.theta_b[lane]`` is one number of one lane. Neighbouring lanes are neighbours in memory, and a loop over
-them is vectorised, since the compiler sees that no store touches a later load: all fields are parts of one record. The
-soil of a design that is not uniform makes fields of its own.
+them is vectorised, since the compiler sees that no store touches a later load: all fields are parts of one record. A
+soil in pieces makes fields of its own.
 """
 
 from __future__ import annotations
@@ -18,19 +18,9 @@ from ._jit import IS_PLAIN, LINE, inlined, overload
 from .design import Body, Constants, Design, Readings, constants_of
 from .dynamics import Acceleration, Modes, State, Switches
 from .following import Clock, Impact, Pace
-from .layered import FewLayers, GivenLayer, Layer, SoilSums, constants_of_few, with_record
 from .modes import GapFactors
 from .outcomes import Compression, Maxima
-from .outlined import (
-    FewPieces,
-    GivenPiece,
-    Lean,
-    Piece,
-    TaperedPiece,
-    TaperedSoil,
-    constants_beside_pieces,
-    constants_beside_taper,
-)
+from .pieces import FewPieces, GivenPiece, Piece, SoilSums, constants_of_few, with_soil
 
 LANES = 1 if IS_PLAIN else 8
 """Designs that are integrated side by side: one vector of eight doubles. More of them hide no more latency and take
@@ -48,73 +38,93 @@ class Attempt(NamedTuple):
     """RUNNING, or why the design that has been started here needs no step."""
 
 
-def numbers_of(record: Any) -> np.dtype:
-    """Return the type of a record of the lanes' numbers for every field of a record."""
-    numbers = np.dtype([(name, np.float64, (LANES,)) for name in record._fields], align=True)
+def numbers_of(names: tuple[str, ...]) -> np.dtype:
+    """Return the type of a record of the lanes' numbers under these names."""
+    numbers = np.dtype([(name, np.float64, (LANES,)) for name in names], align=True)
     return np.dtype((np.record, numbers))
 
 
 @functools.cache
-def group_type(soil: type | None, parts: int) -> np.dtype:
+def group_type(pieces: int, has_strength: bool, has_outline: bool) -> np.dtype:
     """Return the type of a group of lanes.
 
     Parameters
     ----------
-    soil
-        `FewLayers`, `FewPieces` or `TaperedSoil`; None for uniform soils.
-    parts
-        Number of layers or pieces of a design.
+    pieces
+        Number of pieces of the soil of a design, in `boulder_kernels.pieces.COUNTS`; 0 for uniform soils beside boxes.
+    has_strength
+        Whether the ultimate resistance of a piece may be other than proportional to the depth.
+    has_outline
+        Whether boulders are no boxes.
     """
     records: list[Any] = [
-        ("constants", numbers_of(Constants)),
-        ("pace", numbers_of(Pace)),
-        ("state", numbers_of(State)),
-        ("start", numbers_of(Acceleration)),
-        ("front", numbers_of(Compression)),
-        ("maxima", numbers_of(Maxima)),
-        ("clock", numbers_of(Clock)),
-        ("modes", numbers_of(Modes)),
-        ("switches", numbers_of(Switches)),
-        ("factors", numbers_of(GapFactors)),
-        ("end_state", numbers_of(State)),
-        ("end", numbers_of(Acceleration)),
-        ("attempt", numbers_of(Attempt)),
-        ("design", numbers_of(Design)),
+        ("constants", numbers_of(Constants._fields)),
+        ("pace", numbers_of(Pace._fields)),
+        ("state", numbers_of(State._fields)),
+        ("start", numbers_of(Acceleration._fields)),
+        ("front", numbers_of(Compression._fields)),
+        ("maxima", numbers_of(Maxima._fields)),
+        ("clock", numbers_of(Clock._fields)),
+        ("modes", numbers_of(Modes._fields)),
+        ("switches", numbers_of(Switches._fields)),
+        ("factors", numbers_of(GapFactors._fields)),
+        ("end_state", numbers_of(State._fields)),
+        ("end", numbers_of(Acceleration._fields)),
+        ("attempt", numbers_of(Attempt._fields)),
+        ("design", numbers_of(Design._fields)),
     ]
-    if soil is FewLayers:
-        records += [("sums", numbers_of(SoilSums)), ("layers", numbers_of(Layer), (parts,))]
-        records += [("given_layers", numbers_of(GivenLayer), (parts,))]
-    elif soil is not None:
-        records += [("lean", numbers_of(Lean)), ("body", numbers_of(Body))]
-        records += (
-            [("pieces", numbers_of(Piece), (parts,))] if soil is FewPieces else [("taper", numbers_of(TaperedPiece))]
-        )
-        records += [("given_pieces", numbers_of(GivenPiece), (parts,))]
+    if pieces:
+        # A piece begins where the one above it ends.
+        constant = ("low", *(() if has_strength else ("P_0",)), *(() if has_outline else ("w_0", "w_1")))
+        piece = tuple(name for name in Piece._fields if name not in constant)
+        records += [("lean", np.float64, (LANES,))] if has_outline else []
+        records += [("sums", numbers_of(SoilSums._fields))]
+        records += [("pieces", numbers_of(piece), (pieces,)), ("body", numbers_of(Body._fields))]
+        records += [("given", numbers_of(GivenPiece._fields), (pieces,))]
     return np.dtype((np.record, np.dtype(records, align=True)))
 
 
-def empty_groups(soil: type | None = None, parts: int = 0) -> np.ndarray:
+def empty_groups(pieces: int = 0, *, has_strength: bool = True, has_outline: bool = True) -> np.ndarray:
     """Return two groups of lanes: where designs run, and where they are started. Arguments: see `group_type`.
 
     Their vectors lie on whole lines of the fast memory.
     """
-    kind = group_type(soil, parts)
+    kind = group_type(pieces, has_strength, has_outline)
     room = np.zeros(2 * kind.itemsize + LINE, np.uint8)
     first = -room.ctypes.data % LINE
     return room[first : first + 2 * kind.itemsize].view(kind)
 
 
-def count_of(group: Any, name: str) -> int:
-    """Return how many records a field of a group, or of its Numba type, has; 0 if there is none of this name."""
+def field_of(group: Any, name: str) -> Any:
+    """Return a field of a record or of its type, Numba's or NumPy's; None if there is none of this name."""
     if isinstance(group, numba.types.Record):
-        array: Any = group.fields[name].type if name in group.fields else None
-        return array.shape[0] if array else 0
-    return len(group[name]) if name in group.dtype.names else 0
+        return group.fields[name].type if name in group.fields else None
+    return group[name] if name in group.dtype.names else None
 
 
-def is_tapered(group: Any) -> bool:
-    """Return whether the lanes of a group, or of its Numba type, have a `TaperedSoil`."""
-    return "taper" in (group.fields if isinstance(group, numba.types.Record) else group.dtype.names)
+def by_soil(uniform: Callable[..., Any], in_pieces: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that calls one for groups of uniform soils, and another where the soil is in pieces."""
+
+    def chosen(group: Any) -> Callable[..., Any]:
+        """Return the one for a group or its type."""
+        return uniform if field_of(group, "pieces") is None else in_pieces
+
+    def call(group: Any, lane: int, *others: Any) -> Any:
+        """Call it."""
+        return chosen(group)(group, lane, *others)
+
+    def choose(group: Any, lane: Any, *others: Any) -> Callable[..., Any]:
+        """Return the call for these types."""
+        of_soil = chosen(group)
+        calls: list[Callable[..., Any]] = [
+            lambda group, lane: of_soil(group, lane),
+            lambda group, lane, c: of_soil(group, lane, c),
+            lambda group, lane, one, other: of_soil(group, lane, one, other),
+        ]
+        return calls[len(others)]  # Numba inlines nothing whose number of arguments is open
+
+    overload(call)(choose)
+    return call
 
 
 @inlined
@@ -372,27 +382,65 @@ def store_numbers(group: Any, lane: int, c: Any) -> None:
     to.C_cos[lane], to.C_sin[lane], to.theta_corner[lane] = c.C_cos, c.C_sin, c.theta_corner
 
 
-@inlined
-def load_layer(p: Any, lane: int) -> Layer:
-    """Return one layer of a lane."""
-    return Layer(p.low[lane], p.to[lane], p.K[lane], p.inverse_K[lane], p.P_0[lane], p.P_1[lane], p.R[lane])
+def optional(name: str, value: float) -> tuple[Callable[[Any, int], float], Callable[[Any, int, float], None]]:
+    """Return functions that load a number of a lane from a record, and store it, if the record has a field for it.
+
+    Where it has none, the number is a constant that the compiler knows, and what is multiplied by zero is left out.
+    """
+
+    def load(record: Any, lane: int) -> float:
+        """Return the number."""
+        numbers = field_of(record, name)
+        return value if numbers is None else float(numbers[lane])
+
+    def store(record: Any, lane: int, number: float) -> None:
+        """Write the number."""
+        if field_of(record, name) is not None:
+            record[name][lane] = number
+
+    def choose_load(record: Any, lane: Any) -> Callable[..., float]:
+        """Return the loading for these types."""
+        if field_of(record, name) is None:
+            return lambda record, lane: value
+        return lambda record, lane: record[name][lane]
+
+    def choose_store(record: Any, lane: Any, number: Any) -> Callable[..., None]:
+        """Return the storing for these types."""
+        if field_of(record, name) is None:
+            return lambda record, lane, number: None
+
+        def store_number(record: Any, lane: int, number: float) -> None:
+            """Write the number."""
+            record[name][lane] = number
+
+        return store_number
+
+    overload(load)(choose_load)
+    overload(store)(choose_store)
+    return load, store
+
+
+load_strength, store_strength = optional("P_0", 0.0)
+load_w_0, store_w_0 = optional("w_0", 1.0)
+load_w_1, store_w_1 = optional("w_1", 0.0)
+load_lean, store_lean = optional("lean", 0.0)
 
 
 @inlined
-def load_given_layer(p: Any, lane: int) -> GivenLayer:
-    """Return one layer as it is given."""
-    return GivenLayer(p.to[lane], p.density[lane], p.friction[lane], p.subgrade[lane], p.p_0[lane], p.p_1[lane])
+def load_piece(group: Any, m: int, lane: int) -> Piece:
+    """Return one piece of the soil of a lane; the ends of the soil are numbers that the compiler knows."""
+    pieces = group.pieces
+    p = pieces[m]
+    low = pieces[m - 1].to[lane] if m > 0 else 0.0
+    to = p.to[lane] if m + 1 < len(pieces) else 1.0
+    P_0, w_0, w_1 = load_strength(p, lane), load_w_0(p, lane), load_w_1(p, lane)
+    return Piece(low, to, p.K[lane], p.inverse_K[lane], P_0, p.P_1[lane], p.R[lane], w_0, w_1)
 
 
 @inlined
-def load_piece(p: Any, lane: int) -> Piece:
-    """Return one piece of the soil of a lane."""
-    return Piece(p.low[lane], p.to[lane], p.K[lane], p.P_0[lane], p.P_1[lane], p.R[lane], p.w_0[lane], p.w_1[lane])
-
-
-@inlined
-def load_given_piece(p: Any, lane: int) -> GivenPiece:
+def load_given(group: Any, m: int, lane: int) -> GivenPiece:
     """Return one piece as it is given."""
+    p = group.given[m]
     return GivenPiece(
         p.to[lane],
         p.density[lane],
@@ -405,174 +453,98 @@ def load_given_piece(p: Any, lane: int) -> GivenPiece:
     )
 
 
-def by_count(load: Callable[[Any, int], Any]) -> Callable[[Any, int], tuple[Any, ...]]:
-    """Return a function that loads as many records, one after another, as there are in an array, into a tuple."""
+def by_count(load: Callable[[Any, int, int], Any]) -> Callable[[Any, int], tuple[Any, ...]]:
+    """Return a function that loads a record of each piece, one after another, into a tuple."""
 
-    def load_all(parts: Any, lane: int) -> tuple[Any, ...]:
+    def load_all(group: Any, lane: int) -> tuple[Any, ...]:
         """Return all of them."""
-        return tuple(load(parts[m], lane) for m in range(len(parts)))
+        return tuple(load(group, m, lane) for m in range(len(group.pieces)))
 
     @inlined
-    def one(p: Any, m: int, lane: int) -> Any:
+    def one(group: Any, m: int, lane: int) -> Any:
         """Load one, as a tuple."""
-        return (load(p[m], lane),)
+        return (load(group, m, lane),)
 
     @inlined
-    def two(p: Any, m: int, lane: int) -> Any:
+    def two(group: Any, m: int, lane: int) -> Any:
         """Load two."""
-        return one(p, m, lane) + one(p, m + 1, lane)
+        return one(group, m, lane) + one(group, m + 1, lane)
 
     @inlined
-    def four(p: Any, m: int, lane: int) -> Any:
+    def four(group: Any, m: int, lane: int) -> Any:
         """Load four."""
-        return two(p, m, lane) + two(p, m + 2, lane)
+        return two(group, m, lane) + two(group, m + 2, lane)
 
-    def choose(parts: Any, lane: Any) -> Callable[..., Any]:
+    def choose(group: Any, lane: Any) -> Callable[..., Any]:
         """Return the function for so many."""
         return {
-            1: lambda parts, lane: one(parts, 0, lane),
-            2: lambda parts, lane: two(parts, 0, lane),
-            4: lambda parts, lane: four(parts, 0, lane),
-            8: lambda parts, lane: four(parts, 0, lane) + four(parts, 4, lane),
-        }[parts.shape[0]]
+            1: lambda group, lane: one(group, 0, lane),
+            2: lambda group, lane: two(group, 0, lane),
+            4: lambda group, lane: four(group, 0, lane),
+            8: lambda group, lane: four(group, 0, lane) + four(group, 4, lane),
+        }[field_of(group, "pieces").shape[0]]
 
     overload(load_all)(choose)
     return load_all
 
 
-load_layers, load_given_layers = by_count(load_layer), by_count(load_given_layer)
-load_pieces, load_given_pieces = by_count(load_piece), by_count(load_given_piece)
+load_pieces, load_all_given = by_count(load_piece), by_count(load_given)
 
 
 @inlined
-def with_layers(group: Any, lane: int) -> Any:
-    """Return the constants of a lane in layers of soil."""
+def load_in_soil(group: Any, lane: int) -> Any:
+    """Return the constants of a lane whose soil is in pieces."""
     s = group.sums
     sums = SoilSums(
+        s.U_0[lane],
+        s.U_1[lane],
         s.S_1[lane],
         s.S_2[lane],
         s.S_3[lane],
-        s.L_1[lane],
-        s.L_2[lane],
-        s.L_3[lane],
-        s.U_0[lane],
-        s.U_1[lane],
         s.Z_0[lane],
         s.Z_1[lane],
         s.Z_2[lane],
         s.Z_3[lane],
     )
-    return with_record(load_numbers(group, lane), FewLayers(sums, load_layers(group.layers, lane)))
+    return with_soil(load_numbers(group, lane), load_lean(group, lane), FewPieces(sums, load_pieces(group, lane)))
+
+
+load_constants = by_soil(load_numbers, load_in_soil)
+"""Return the constants of a lane."""
 
 
 @inlined
-def with_pieces(group: Any, lane: int) -> Any:
-    """Return the constants of a lane in pieces of soil."""
-    soil = FewPieces(Lean(group.lean.moment[lane]), load_pieces(group.pieces, lane))
-    return with_record(load_numbers(group, lane), soil)
-
-
-@inlined
-def with_taper(group: Any, lane: int) -> Any:
-    """Return the constants of a lane beside a taper."""
-    p = group.taper
-    taper = TaperedPiece(p.K[lane], p.R[lane], p.x_yield[lane], p.w_0[lane], p.w_1[lane])
-    return with_record(load_numbers(group, lane), TaperedSoil(Lean(group.lean.moment[lane]), (taper,)))
-
-
-def load_constants(group: Any, lane: int) -> Any:
-    """Return the constants of a lane."""
-    return _constants_loader(group)(group, lane)
-
-
-def _constants_loader(group: Any) -> Callable[..., Any]:
-    if count_of(group, "layers"):
-        return with_layers
-    if count_of(group, "pieces"):
-        return with_pieces
-    return with_taper if is_tapered(group) else load_numbers
-
-
-@overload(load_constants)
-def _load_constants(group: Any, lane: Any) -> Callable[..., Any]:
-    loader = _constants_loader(group)
-    return lambda group, lane: loader(group, lane)
-
-
-@inlined
-def store_layers(group: Any, lane: int, c: Any) -> None:
-    """Write constants in layers of soil."""
+def store_in_soil(group: Any, lane: int, c: Any) -> None:
+    """Write constants whose soil is in pieces."""
     store_numbers(group, lane, c)
+    store_lean(group, lane, c.lean)
     to, s = group.sums, c.soil.sums
-    to.S_1[lane], to.S_2[lane], to.S_3[lane], to.L_1[lane] = s.S_1, s.S_2, s.S_3, s.L_1
-    to.L_2[lane], to.L_3[lane], to.U_0[lane], to.U_1[lane] = s.L_2, s.L_3, s.U_0, s.U_1
-    to.Z_0[lane], to.Z_1[lane], to.Z_2[lane], to.Z_3[lane] = s.Z_0, s.Z_1, s.Z_2, s.Z_3
-    for m in range(len(c.soil.layers)):
-        one, p = group.layers[m], c.soil.layers[m]
-        one.low[lane], one.to[lane], one.K[lane], one.inverse_K[lane] = p.low, p.to, p.K, p.inverse_K
-        one.P_0[lane], one.P_1[lane], one.R[lane] = p.P_0, p.P_1, p.R
-
-
-@inlined
-def store_pieces(group: Any, lane: int, c: Any) -> None:
-    """Write constants in pieces of soil."""
-    store_numbers(group, lane, c)
-    group.lean.moment[lane] = c.soil.lean.moment
+    to.U_0[lane], to.U_1[lane], to.S_1[lane], to.S_2[lane] = s.U_0, s.U_1, s.S_1, s.S_2
+    to.S_3[lane], to.Z_0[lane], to.Z_1[lane], to.Z_2[lane] = s.S_3, s.Z_0, s.Z_1, s.Z_2
+    to.Z_3[lane] = s.Z_3
     for m in range(len(c.soil.pieces)):
         one, p = group.pieces[m], c.soil.pieces[m]
-        one.low[lane], one.to[lane], one.K[lane], one.P_0[lane] = p.low, p.to, p.K, p.P_0
-        one.P_1[lane], one.R[lane], one.w_0[lane], one.w_1[lane] = p.P_1, p.R, p.w_0, p.w_1
+        one.to[lane], one.K[lane], one.inverse_K[lane], one.P_1[lane] = p.to, p.K, p.inverse_K, p.P_1
+        one.R[lane] = p.R
+        store_strength(one, lane, p.P_0)
+        store_w_0(one, lane, p.w_0)
+        store_w_1(one, lane, p.w_1)
+
+
+store_constants = by_soil(store_numbers, store_in_soil)
+"""Write the constants of a lane."""
+
+BELOW, BODY_SIZE, PIECE_SIZE = len(Design._fields), len(Body._fields), len(GivenPiece._fields)
+"""Rows of a table of designs: those above what is given of their soil, those of the body, and those of a piece."""
 
 
 @inlined
-def store_taper(group: Any, lane: int, c: Any) -> None:
-    """Write constants beside a taper."""
-    store_numbers(group, lane, c)
-    group.lean.moment[lane] = c.soil.lean.moment
-    to, p = group.taper, c.soil.pieces[0]
-    to.K[lane], to.R[lane], to.x_yield[lane], to.w_0[lane] = p.K, p.R, p.x_yield, p.w_0
-    to.w_1[lane] = p.w_1
-
-
-def store_constants(group: Any, lane: int, c: Any) -> None:
-    """Write the constants of a lane."""
-    _constants_storer(group)(group, lane, c)
-
-
-def _constants_storer(group: Any) -> Callable[..., None]:
-    if count_of(group, "layers"):
-        return store_layers
-    if count_of(group, "pieces"):
-        return store_pieces
-    return store_taper if is_tapered(group) else store_numbers
-
-
-@overload(store_constants)
-def _store_constants(group: Any, lane: Any, c: Any) -> Callable[..., None]:
-    storer = _constants_storer(group)
-    return lambda group, lane, c: storer(group, lane, c)
-
-
-BELOW = len(Design._fields)
-"""Row of a table of designs at which what is given of their soil begins."""
-BODY_SIZE, LAYER_SIZE, PIECE_SIZE = len(Body._fields), len(GivenLayer._fields), len(GivenPiece._fields)
+def store_nothing_given(group: Any, lane: int, a: np.ndarray, row: int) -> None:
+    """Write nothing of uniform soil."""
 
 
 @inlined
-def store_given_layers(group: Any, lane: int, a: np.ndarray, row: int) -> None:
-    """Write the layers of a design that is to be started, rows of a table."""
-    for m in range(len(group.given_layers)):
-        to, n = group.given_layers[m], BELOW + LAYER_SIZE * m
-        to.to[lane] = a[n + 0, row]
-        to.density[lane] = a[n + 1, row]
-        to.friction[lane] = a[n + 2, row]
-        to.subgrade[lane] = a[n + 3, row]
-        to.p_0[lane] = a[n + 4, row]
-        to.p_1[lane] = a[n + 5, row]
-
-
-@inlined
-def store_given_pieces(group: Any, lane: int, a: np.ndarray, row: int) -> None:
+def store_pieces_given(group: Any, lane: int, a: np.ndarray, row: int) -> None:
     """Write body and pieces of a design that is to be started, rows of a table."""
     b = group.body
     b.m_b[lane] = a[BELOW + 0, row]
@@ -582,8 +554,8 @@ def store_given_pieces(group: Any, lane: int, a: np.ndarray, row: int) -> None:
     b.line[lane] = a[BELOW + 4, row]
     b.foot[lane] = a[BELOW + 5, row]
     b.lean[lane] = a[BELOW + 6, row]
-    for m in range(len(group.given_pieces)):
-        to, n = group.given_pieces[m], BELOW + BODY_SIZE + PIECE_SIZE * m
+    for m in range(len(group.given)):
+        to, n = group.given[m], BELOW + BODY_SIZE + PIECE_SIZE * m
         to.to[lane] = a[n + 0, row]
         to.density[lane] = a[n + 1, row]
         to.friction[lane] = a[n + 2, row]
@@ -594,33 +566,8 @@ def store_given_pieces(group: Any, lane: int, a: np.ndarray, row: int) -> None:
         to.w_1[lane] = a[n + 7, row]
 
 
-@inlined
-def store_nothing_given(group: Any, lane: int, a: np.ndarray, row: int) -> None:
-    """Write nothing of uniform soil."""
-
-
-def store_given(group: Any, lane: int, a: np.ndarray, row: int) -> None:
-    """Write what is given of the soil of a design that is to be started, the rows of a table below its `Design`."""
-    _given_storer(group)(group, lane, a, row)
-
-
-def _given_storer(group: Any) -> Callable[..., None]:
-    if count_of(group, "given_layers"):
-        return store_given_layers
-    return store_given_pieces if count_of(group, "given_pieces") else store_nothing_given
-
-
-@overload(store_given)
-def _store_given(group: Any, lane: Any, a: Any, row: Any) -> Callable[..., None]:
-    storer = _given_storer(group)
-    return lambda group, lane, a, row: storer(group, lane, a, row)
-
-
-@inlined
-def load_body(group: Any, lane: int) -> Body:
-    """Return the boulder that is being started in a lane."""
-    b = group.body
-    return Body(b.m_b[lane], b.J[lane], b.x[lane], b.y[lane], b.line[lane], b.foot[lane], b.lean[lane])
+store_given = by_soil(store_nothing_given, store_pieces_given)
+"""Write what is given of the soil of a design that is to be started, the rows of a table below its `Design`."""
 
 
 @inlined
@@ -630,42 +577,15 @@ def uniform_in_lane(group: Any, lane: int, design: Design, readings: Readings) -
 
 
 @inlined
-def layers_in_lane(group: Any, lane: int, design: Design, readings: Readings) -> Any:
-    """Return the constants of a design in layers of soil."""
-    return constants_of_few(design, readings, load_given_layers(group.given_layers, lane))
-
-
-@inlined
 def pieces_in_lane(group: Any, lane: int, design: Design, readings: Readings) -> Any:
-    """Return the constants of a design in pieces of soil."""
-    given = load_given_pieces(group.given_pieces, lane)
-    return constants_beside_pieces(design, readings, load_body(group, lane), given)
+    """Return the constants of a design whose soil is in pieces."""
+    b = group.body
+    body = Body(b.m_b[lane], b.J[lane], b.x[lane], b.y[lane], b.line[lane], b.foot[lane], b.lean[lane])
+    return constants_of_few(design, readings, body, load_all_given(group, lane))
 
 
-@inlined
-def taper_in_lane(group: Any, lane: int, design: Design, readings: Readings) -> Any:
-    """Return the constants of a design beside a taper."""
-    given = load_given_pieces(group.given_pieces, lane)
-    return constants_beside_taper(design, readings, load_body(group, lane), given)
-
-
-def constants_in_lane(group: Any, lane: int, design: Design, readings: Readings) -> Any:
-    """Return the constants of a design that is being started."""
-    return _constants_maker(group)(group, lane, design, readings)
-
-
-def _constants_maker(group: Any) -> Callable[..., Any]:
-    if count_of(group, "layers"):
-        return layers_in_lane
-    if count_of(group, "pieces"):
-        return pieces_in_lane
-    return taper_in_lane if is_tapered(group) else uniform_in_lane
-
-
-@overload(constants_in_lane)
-def _constants_in_lane(group: Any, lane: Any, design: Any, readings: Any) -> Callable[..., Any]:
-    maker = _constants_maker(group)
-    return lambda group, lane, design, readings: maker(group, lane, design, readings)
+constants_in_lane = by_soil(uniform_in_lane, pieces_in_lane)
+"""Return the constants of a design that is being started."""
 
 
 @inlined

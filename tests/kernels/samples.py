@@ -11,7 +11,7 @@ import numpy as np
 import boulder_kernels as bk
 from boulder_kernels.design import ultimate_pressure
 from boulder_kernels.dynamics import State, contact_displacement, spring_compression
-from boulder_kernels.layered import LayeredTable
+from boulder_kernels.pieces import table_in_layers
 from boulder_kernels.soil_laws import constants_in, profile_of
 from tests import oracle
 
@@ -87,7 +87,7 @@ def random_designs(count: int, seed: int) -> list[bk.Design]:
     return found
 
 
-def random_layers(designs: list[bk.Design], count: int, seed: int) -> LayeredTable:
+def random_layers(designs: list[bk.Design], count: int, seed: int) -> Any:
     """Put designs into soils of as many layers, some of them below the boulder, the uppermost one with cohesion.
 
     The vertical stress is continuous, so that a layer lighter than what lies over it begins with more than its own.
@@ -103,7 +103,7 @@ def random_layers(designs: list[bk.Design], count: int, seed: int) -> LayeredTab
             p_0 = slope / density * (stress - density * top) + (3e3 if m == 0 else 0.0)
             layers[m] = bottom, density, friction, exp(rng.uniform(log(10.0), log(100.0))), p_0, slope
             top, stress = bottom, stress + density * (bottom - top)
-    return LayeredTable(*table_of(designs), rows)
+    return table_in_layers(table_of(designs), rows)
 
 
 def table_of(designs: list[bk.Design]) -> bk.DesignTable:

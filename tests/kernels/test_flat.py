@@ -13,9 +13,8 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels.design import constants_of
-from boulder_kernels.layered import uniform_layers
-from boulder_kernels.layered_soil import reaction_of_elements
 from boulder_kernels.numerics import WIDTH
+from boulder_kernels.pieces import reaction_of_elements, uniform_layers
 from boulder_kernels.soil import Kinematics, element_sums
 from boulder_kernels.soil_laws import fill_soil, profile_of
 
@@ -50,8 +49,7 @@ def sums(count: int) -> tuple[float, ...]:
     """Force and moment of one design by so many elements of a uniform soil, and by those of a soil in layers."""
     design = random_designs(1, seed=31)[0]
     profile = profile_of(uniform_layers(design), count)
-    assert profile is not None
-    fill_soil(design, profile.layers, profile.soil)
+    fill_soil(design, profile)
     uniform = element_sums(LINES, constants_of(design, bk.corrected(), count))
     return (*uniform, *reaction_of_elements(LINES, profile.soil))
 

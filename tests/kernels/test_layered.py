@@ -8,7 +8,7 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels.design import constants_of
-from boulder_kernels.layered import LayeredTable, uniform_layers
+from boulder_kernels.pieces import table_in_layers, uniform_layers
 from boulder_kernels.soil import closed_form, uniform_drag_power, uniform_potential
 from boulder_kernels.soil_laws import drag_power, soil_energy, soil_potential, soil_reaction
 from boulder_kernels.table import problem_at, simulate_table
@@ -137,7 +137,7 @@ def test_slopes_of_the_energy_are_the_forces() -> None:
 @pytest.mark.compiled
 def test_whole_impacts_in_one_layer() -> None:
     """As in the uniform soil, and settled or at the limit as it is there."""
-    table = LayeredTable(*table_of(DESIGNS), np.stack([uniform_layers(one) for one in DESIGNS]))
+    table = table_in_layers(table_of(DESIGNS), np.stack([uniform_layers(one) for one in DESIGNS]))
     how = control(h=2e-3, horizon=1.0, theta_limit=radians(20.0), stop_at_limit=True)
     found, known = simulate_table(table, READINGS, how), simulate_table(table_of(DESIGNS), READINGS, how)
     np.testing.assert_array_equal(found.status, known.status)
@@ -148,7 +148,7 @@ def test_whole_impacts_in_one_layer() -> None:
 @pytest.mark.compiled
 def test_whole_impact_is_that_of_the_oracle() -> None:
     design = design_of(LAYERED)
-    layered = LayeredTable(*table_of([design]), layers_of(LAYERED)[None])
+    layered = table_in_layers(table_of([design]), layers_of(LAYERED)[None])
     how = control(h=1e-3, horizon=0.4)
     limit = bk.simulate(problem_at(layered, 0, how), READINGS, how, bk.no_record())
     exact = recorded_impact(LAYERED, oracle.CORRECTED, elements=500, horizon=0.4, land_on_kinks=False, rtol=1e-8)

@@ -9,8 +9,8 @@ import boulder_kernels as bk
 from boulder_kernels import OutcomeTable, Status
 from boulder_kernels.error_estimates import step_errors
 from boulder_kernels.impact import simulate_alone
-from boulder_kernels.layered import COUNTS, LayeredTable, filled_layers, lanes_count
 from boulder_kernels.outcomes import empty_outcomes, write_outcome
+from boulder_kernels.pieces import COUNTS, GivenPiece, PiecewiseTable, given_pieces, lanes_count
 from boulder_kernels.soil_laws import soil_potential
 from boulder_kernels.table import problem_at, some_rows
 from boulder_kernels.workspace import LANES
@@ -32,7 +32,7 @@ def one_by_one(table: Any, readings: bk.Readings, how: bk.Control) -> OutcomeTab
     return with_step(out, how.h)
 
 
-def split(table: LayeredTable, m: int) -> LayeredTable:
+def split(table: PiecewiseTable, m: int) -> PiecewiseTable:
     """Cut the layer m of every design in two of the same soil."""
     twice = np.insert(table.layers, m, table.layers[:, m], axis=1)
     top = table.layers[:, m - 1, 0] if m else np.zeros(len(table.L))
@@ -119,13 +119,15 @@ def test_more_layers_than_lanes_take_are_simulated_one_by_one() -> None:
     assert_same(bk.simulate_table(table, READINGS, HOW), one_by_one(table, READINGS, HOW))
 
 
-def test_layers_without_height_are_added_to_the_next_count() -> None:
-    layers = random_layers(random_designs(3, seed=179), 5, seed=6).layers
+def test_pieces_without_height_are_added_to_the_next_count() -> None:
+    table = random_layers(random_designs(3, seed=179), 5, seed=6)
     assert [lanes_count(n) for n in range(1, 10)] == [1, 2, 4, 4, 8, 8, 8, 8, 0]
-    filled = filled_layers(layers, 8)
-    assert filled.shape == (48, 3)
-    assert np.array_equal(filled.T.reshape(3, 8, 6)[:, :5], layers)
-    assert np.array_equal(filled.T.reshape(3, 8, 6)[:, 5:], np.repeat(layers[:, -1:], 3, axis=1))
+    given = given_pieces(np.stack(table[:15]), table.layers, table.outlines, 8)
+    pieces = given[22:].T.reshape(3, 8, len(GivenPiece._fields))
+    assert given.shape == (22 + 64, 3)
+    np.testing.assert_allclose(pieces[:, :5, 0], np.minimum(table.layers[:, :, 0] / table.d[:, None], 1.0), rtol=1e-15)
+    assert np.array_equal(pieces[:, 5:], np.repeat(pieces[:, 4:5], 3, axis=1))
+    assert np.all(pieces[:, :, 6:] == (1.0, 0.0))
 
 
 @pytest.mark.parametrize("count", [1, 2, 4])

@@ -21,8 +21,6 @@ from boulder_kernels.lanes import (
     take_first_steps,
     take_over_steps,
 )
-from boulder_kernels.layered import FewLayers
-from boulder_kernels.outlined import FewPieces, TaperedSoil
 from boulder_kernels.second_opinion import potential_energy
 from boulder_kernels.workspace import LANES, empty_groups
 
@@ -134,12 +132,13 @@ IN_SOILS = (attempt_steps, take_over_steps, compute_constants)
 
 
 @pytest.mark.parametrize("kernel", IN_SOILS, ids=lambda kernel: kernel.__name__)
-@pytest.mark.parametrize(("soil", "parts"), [(FewLayers, 2), (TaperedSoil, 1), (FewPieces, 2)])
-def test_layers_and_pieces_of_soil_are_vectorised(soil, parts: int, kernel) -> None:
+@pytest.mark.parametrize(("pieces", "strength", "outline"), [(2, True, False), (1, False, True), (2, True, True)])
+def test_pieces_of_soil_are_vectorised(pieces: int, strength: bool, outline: bool, kernel) -> None:
     """Written out part by part, so that neither a loop nor a branch nor a logarithm keeps the lanes apart."""
-    given = np.zeros((15 + (6 * parts if soil is FewLayers else 7 + 8 * parts), LANES))
+    given = np.zeros((22 + 8 * pieces, LANES))
     starting = (given, 0, bk.corrected(), HOW) if kernel is compute_constants else ()
-    code = assembly(kernel, empty_groups(soil, parts)[0], *starting)
+    group = empty_groups(pieces, has_strength=strength, has_outline=outline)[0]
+    code = assembly(kernel, group, *starting)
     assert not CALL.search(code)
     found, register = widths(code), widest()
     if register and register != "xmm":

@@ -11,8 +11,8 @@ from boulder_kernels.dormand_prince import step
 from boulder_kernels.dynamics import SEATED, TURNING_FORWARD, Acceleration, State
 from boulder_kernels.following import RUNNING, begin_to_turn, enter_modes, first_touch, go_on
 from boulder_kernels.lanes import follow_lane, start_designs
-from boulder_kernels.layered import PRESSURE, SUBGRADE, TO, uniform_layers
 from boulder_kernels.modes import AT_END, TOLERANCE, initial_modes
+from boulder_kernels.pieces import PRESSURE, SUBGRADE, TO, uniform_layers
 from boulder_kernels.workspace import LANES, empty_groups, load_impact, store_state
 from tests import oracle
 from tests.kernels.samples import layered_constants

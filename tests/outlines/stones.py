@@ -3,7 +3,7 @@
 import numpy as np
 
 import boulder_kernels as bk
-from boulder_kernels.layered import OutlinedTable, uniform_layers
+from boulder_kernels.pieces import PiecewiseTable, uniform_layers
 from boulder_kernels.soil_laws import constants_in, profile_of
 from tests.kernels.samples import table_of
 from tests.outlines.oracle import Stone
@@ -52,6 +52,6 @@ def constants(design: bk.Design, outline: np.ndarray, elements: int, readings=No
     return constants_in(design, readings or bk.corrected(), elements, profile_of(layers, elements, outline))
 
 
-def outlined(design: bk.Design, outline: np.ndarray, layers: np.ndarray | None = None) -> OutlinedTable:
+def outlined(design: bk.Design, outline: np.ndarray, layers: np.ndarray | None = None) -> PiecewiseTable:
     layers = uniform_layers(design) if layers is None else layers
-    return OutlinedTable(*table_of([design]), layers[None], outline[None])
+    return PiecewiseTable(*table_of([design]), layers[None], outline[None])

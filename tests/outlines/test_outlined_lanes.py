@@ -11,8 +11,7 @@ from boulder_kernels import OutcomeTable
 from boulder_kernels._jit import plain
 from boulder_kernels.design import Body, Design
 from boulder_kernels.dynamics import least_couple, lift_of
-from boulder_kernels.layered import COUNTS, OutlinedTable, uniform_layers
-from boulder_kernels.outlined import GivenPiece, constants_beside_pieces, constants_beside_taper, given_beside
+from boulder_kernels.pieces import COUNTS, GivenPiece, PiecewiseTable, constants_of_few, given_pieces, uniform_layers
 from boulder_kernels.soil_laws import constants_in, drag_power, profile_of, soil_potential, soil_reaction
 from boulder_kernels.table import is_layered, is_paired, simulate_table, some_rows
 from boulder_kernels.workspace import LANES
@@ -32,22 +31,21 @@ def outlined(designs: list[Design], shape: Callable[[Design], np.ndarray], layer
         soil = random_layers(designs, layers, seed=seed).layers
     else:
         soil = np.stack([uniform_layers(design) for design in designs])
-    return OutlinedTable(*table_of(designs), soil, np.stack([shape(design) for design in designs]))
+    return PiecewiseTable(*table_of(designs), soil, np.stack([shape(design) for design in designs]))
 
 
-def constants_of_lanes(table: OutlinedTable, row: int, count: int) -> Any:
-    """Return the constants that a lane works out, beside as many pieces or, for 0, those of a taper."""
+def constants_of_lanes(table: PiecewiseTable, row: int, count: int) -> Any:
+    """Return the constants that a lane works out, in as many pieces."""
     designs = np.stack(table[: len(Design._fields)])
-    given = given_beside(designs, table.layers, table.outlines, max(count, 1))[:, row]
+    given = given_pieces(designs, table.layers, table.outlines, count)[:, row]
     body, pieces = np.split(given[len(Design._fields) :], [len(Body._fields)])
     pieces = tuple(GivenPiece(*piece) for piece in pieces.reshape(-1, len(GivenPiece._fields)))
-    constants = plain(constants_beside_pieces if count else constants_beside_taper)
-    return constants(Design(*given[: len(Design._fields)]), READINGS, Body(*body), pieces)
+    return plain(constants_of_few)(Design(*given[: len(Design._fields)]), READINGS, Body(*body), pieces)
 
 
 @pytest.mark.parametrize(
     ("shape", "layers", "count"),
-    [("widens downwards", 0, 0), ("widens upwards", 0, 0), ("widens upwards", 0, 1), ("crooked", 2, 8)],
+    [("widens downwards", 0, 1), ("widens upwards", 0, 1), ("widens upwards", 0, 2), ("crooked", 2, 8)],
 )
 def test_soils_of_lanes_are_those_of_single_impacts(shape: str, layers: int, count: int) -> None:
     """Constants, force and moment, energy with its slopes, power of the drag, and what the weight does."""

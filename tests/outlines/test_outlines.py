@@ -6,8 +6,7 @@ import pytest
 import boulder_kernels as bk
 from boulder_kernels.design import G, body_of_box, constants_of
 from boulder_kernels.dynamics import least_couple, lift_of
-from boulder_kernels.layered_soil import reaction_of_layers
-from boulder_kernels.outlined import FAR, NEAR, WIDTH, at_height, body_of_outline
+from boulder_kernels.outline import FAR, NEAR, WIDTH, at_height, body_of_outline
 from boulder_kernels.soil_laws import constants_in, drag_power, profile_of, soil_potential, soil_reaction
 from boulder_kernels.table import simulate_table
 from tests import oracle
@@ -125,7 +124,7 @@ def test_layers_beside_a_box_outline_are_layers():
     rng = np.random.default_rng(8)
     for _ in range(100):
         k = lines(random_state(rng), plain)
-        np.testing.assert_allclose(soil_reaction(k, c), reaction_of_layers(k, plain.soil), rtol=1e-9)
+        np.testing.assert_allclose(soil_reaction(k, c), soil_reaction(k, plain), rtol=1e-9)
         mine, theirs = (soil_potential(k.A, k.slope_x, one) for one in (c, plain))
         np.testing.assert_allclose(mine[:3], theirs[:3], rtol=1e-9)
         assert mine.V * (1.0 - 1e-12) <= mine.highest <= theirs.highest * (1.0 + 0.1)

@@ -10,7 +10,7 @@ import pytest
 import boulder_sweep
 from boulder_kernels import DesignTable
 from boulder_kernels.ground import put_soil, slope_factor
-from boulder_kernels.layered import LayeredTable
+from boulder_kernels.pieces import PiecewiseTable, table_in_layers
 from boulder_sweep.impact.history import soil_profile
 from boulder_sweep.impact.recomputing import recompute
 from boulder_sweep.judge.accuracy import accuracy_of, simulated
@@ -97,7 +97,7 @@ def test_what_is_proportional_to_depth_is_a_factor(law: str, ground: Ground) -> 
     evaluation = evaluation_of(
         boulder_sweep.load("configs/rwg.yaml"), accuracy_of(boulder_sweep.load("configs/rwg.yaml"))
     )
-    layered = LayeredTable(*table, layers_of(table, law, ground, 1))
+    layered = table_in_layers(table, layers_of(table, law, ground, 1))
     designs = (Designs(table, np.zeros(1)) for table in (folded, layered))
     one, other = (simulated(some, evaluation.readings, evaluation.control) for some in designs)
     assert one.status == other.status
@@ -118,7 +118,7 @@ def test_settings_become_layers() -> None:
     assert sweep.model.ground == GROUND
     assert Ground.of_dict(sweep.resolved()["model"]["ground"]) == GROUND
     table = sampled_designs(sweep, 1).table
-    assert isinstance(table, LayeredTable)
+    assert isinstance(table, PiecewiseTable)
     assert table.layers.shape == (1, 4, 6)
     np.testing.assert_allclose(table.layers[0, :, 0], (0.5, 0.8, 1.2, inf))
     factored = boulder_sweep.load("configs/rwg.yaml", (*IN_FILE, "partial_factor.friction_angle=1.25"))

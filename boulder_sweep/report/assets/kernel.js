@@ -5,7 +5,7 @@
  * Names of the numbers that the kernel takes and gives, each in its order, how many numbers a layer of soil has, and how
  * many the kernel makes of it, of a piece beside an outline, and of a soil element; written by Python.
  * @typedef {{design: string[], settings: string[], outcome: string[], history: string[], sizes: string[],
- *   rulings: string[], layer: number, layer_room: number, piece_room: number, element_room: number}} Layout
+ *   rulings: string[], layer: number, piece_room: number, element_room: number, sums_room: number}} Layout
  */
 
 /**
@@ -80,11 +80,10 @@ class Kernel {
    * @returns {number[]} lengths of the arrays for the soil: what is given, and room for layers, outlines and their numbers
    */
   soilLengths(settings, n) {
-    const { layer, layer_room, piece_room, element_room } = this.layout;
+    const { layer, piece_room, element_room, sums_room } = this.layout;
     const { ground, below, profile, points, layers } = this.soil;
     const elements = settings[this.layout.settings.indexOf("elements")];
-    const pieces = piece_room * (layers + points);
-    const room = Math.max(layer_room * layers, pieces, element_room * elements + 1);
+    const room = Math.max(sums_room + piece_room * (layers + points), element_room * elements);
     return [ground.length, below.length, profile.length, layer * layers * n, 4 * points * n, room];
   }
 
