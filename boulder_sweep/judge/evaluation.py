@@ -16,11 +16,8 @@ import numpy as np
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, simulate_table
 from boulder_kernels._jit import plain
 from boulder_kernels.rules import (
-    ASKED_SLOWER,
-    RULE,
     RULES,
     SLOWER_SPEEDS,
-    WANTED,
     Rows,
     consider_rows,
     rule_by_slower,
@@ -212,20 +209,20 @@ class Evaluation:
         while number < len(controls):
             again = designs.rows(some) if number else designs
             found = self.simulate(again.table, self.readings, controls[number])
-            consider_rows(rows, some, np.stack(found), number, every, limits)
-            wanted = rows.courses[WANTED]
+            consider_rows(*rows, some, np.stack(found), number, every, limits)
+            wanted = rows.courses["wanted"]
             number = int(wanted.min(initial=len(controls)))
             some = np.flatnonzero(wanted == number)
         return rows
 
     def _hold_slower(self, rows: Rows, designs: Designs) -> None:
         """Let slower trucks decide the rows of shallow boulders that slide, too."""
-        asked, steps, rule = np.flatnonzero(rows.courses[ASKED_SLOWER]), len(SLOWER_SPEEDS), rows.courses[RULE]
+        asked, steps, rule = np.flatnonzero(rows.courses["asked_slower"]), len(SLOWER_SPEEDS), rows.courses["rule"]
         for at in range(0, len(asked), SLOWER_AT_ONCE):
             some = asked[at : at + SLOWER_AT_ONCE]
             trucks = designs.rows(np.repeat(some, steps))
             v_0 = trucks.table.v_0 * np.tile(SLOWER_SPEEDS, len(some))
-            slower = self._decided(trucks._replace(table=trucks.table._replace(v_0=v_0))).courses[RULE]
+            slower = self._decided(trucks._replace(table=trucks.table._replace(v_0=v_0))).courses["rule"]
             worst = BY_SLOWER.take(slower.astype(np.intp)).reshape(-1, steps).min(axis=1)
             rule[some] = np.minimum(rule[some], worst)
 

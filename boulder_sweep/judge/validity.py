@@ -15,9 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from boulder_kernels.numerics import records_of
 from boulder_kernels.outcomes import empty_outcomes
 from boulder_kernels.rules import FLAGS as RAISED
-from boulder_kernels.rules import ISLAND_SLIDE, UNSTUDIED, Tested, write_flags
+from boulder_kernels.rules import ISLAND_SLIDE, UNSTUDIED, FlagInputs, Tested, write_flags
 from boulder_sweep.investigation import FAMILY_FACTOR, family_bounds
 from boulder_sweep.judge.judged import CHANGES_SIDE
 from boulder_sweep.settings.fields import BY_NAME
@@ -227,7 +228,7 @@ def _bits(designs: Any, limits: Any, counted: np.ndarray, overlap: np.ndarray) -
     soil = (np.degrees(table.phi), table.rho_s, designs.given_factors)
     tested = tested_of(limits.calibrated_crush, limits.tested_rotation, odd_layers=limits.odd_layers)
     bits = np.empty(designs.size, dtype=np.int64)
-    write_flags(counted, overlap, np.stack([*sizes, *vehicle, *soil]), tested, bits)
+    write_flags(counted, overlap, records_of(FlagInputs, (*sizes, *vehicle, *soil)), tested, bits)
     return bits
 
 

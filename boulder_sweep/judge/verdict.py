@@ -37,8 +37,9 @@ import numpy as np
 
 import boulder_kernels.rules as verdicts
 from boulder_kernels import SIMULATED, Control, OutcomeTable, Status
+from boulder_kernels.numerics import record_type, records_of
 from boulder_kernels.outcomes import empty_outcomes, outcome_table
-from boulder_kernels.rules import OF_CRITERION, RULES, Course, Rows, VerdictLimits, consider_rows
+from boulder_kernels.rules import OF_CRITERION, RULES, Course, Rows, Sizes, VerdictLimits, consider_rows
 from boulder_sweep.columns import OUTCOMES, RATINGS, REASONS, VERDICTS, RowKind
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import ERROR, NUMERICAL_ERROR, PASS, UNDECIDED, Judged
@@ -162,7 +163,7 @@ def judge(
         One verdict a row; no row is dropped.
     """
     rows = rows_of(designs, limits)
-    consider_rows(rows, np.arange(designs.size), np.stack(outcomes), 0, UNCONFIRMED, limits.of_rules)
+    consider_rows(*rows, np.arange(designs.size), np.stack(outcomes), 0, UNCONFIRMED, limits.of_rules)
     return judged_rows(rows, designs, limits, only)
 
 
@@ -175,7 +176,7 @@ def rows_of(designs: Designs, limits: Limits) -> Rows:
     table, n = designs.table, designs.size
     flat, known = np.full(n, float(limits.flat_foot)), designs.has_known_shape.astype(float)
     sizes = (designs.length, table.H, table.d, table.e_bumper, designs.bed_offset, table.v_0, flat, known)
-    return Rows(empty_outcomes(n), np.zeros((len(Course._fields), n)), np.stack(sizes))
+    return Rows(empty_outcomes(n), np.zeros(n, record_type(Course)), records_of(Sizes, sizes))
 
 
 def judged_rows(rows: Rows, designs: Designs, limits: Limits, only: tuple[str, ...] = ()) -> Judged:
@@ -210,7 +211,7 @@ def judged_rows(rows: Rows, designs: Designs, limits: Limits, only: tuple[str, .
 
 def facts_of(rows: Rows, designs: Designs, limits: Limits) -> Facts:
     """Return what is known of n rows; see `judged_rows`."""
-    outcomes, courses = outcome_table(rows.counted), dict(zip(Course._fields, rows.courses, strict=True))
+    outcomes, courses = outcome_table(rows.counted), rows.courses
     status, rule, penetration = outcomes.status, courses["rule"].astype(np.intp), courses["penetration"]
     verdict, reason = _VERDICTS.take(rule), _REASONS.take(rule)
     failed = rule == verdicts.NOT_COMPUTED

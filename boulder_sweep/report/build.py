@@ -93,6 +93,8 @@ def intermediate_code() -> str:
         raise RuntimeError("Numba must be configured for a generic processor before it is imported")
     modules = []
     kinds = {"p": numba.types.CPointer(numba.types.float64), "i": numba.types.int32}
+    for letter, record in entry_points.RECORDS.items():
+        kinds[letter] = numba.types.CPointer(numba.from_dtype(record))
     for name, letters in entry_points.EXPORTS.items():
         function, arguments = getattr(entry_points, name), tuple(kinds[letter] for letter in letters)
         function.compile(numba.types.void(*arguments))

@@ -267,11 +267,9 @@ def _layout() -> dict[str, Any]:
         "settings": page_records.SETTINGS,
         "outcome": page_records.OUTCOME,
         "history": page_records.HISTORY,
-        "sizes": [
-            *((SOURCES | OF_THE_PAGE).get(name, name) for name in rules.Sizes._fields),
-            *((SOURCES | OF_FLAGS).get(name, name) for name in rules.FlagInputs._fields),
-        ],
-        "rulings": page_records.RULINGS,
+        "sizes": [(SOURCES | OF_THE_PAGE).get(name, name) for name in rules.Sizes._fields],
+        "flag_inputs": [(SOURCES | OF_FLAGS).get(name, name) for name in rules.FlagInputs._fields],
+        "course": rules.Course._fields,
         "layer": PRESSURE_SLOPE + 1,  # the last of its columns
         "piece_room": page_records.PIECE_ROOM,
         "element_room": page_records.ELEMENT_ROOM,

@@ -21,38 +21,29 @@ from boulder_kernels.impact import simulate_alone, simulate_last_resort
 from boulder_kernels.outcomes import NONE_NEEDED, PAIR, SECOND, STEP, outcome_in, write_outcome
 from boulder_kernels.pieces import ManyPieces, SoilProfile
 from boulder_kernels.rules import (
-    ASKED_SLOWER,
-    RULE,
     SLOWER_SPEEDS,
-    WANTED,
     Rows,
     VerdictLimits,
     consider,
-    course_in,
-    flag_inputs_in,
     flags_of,
-    limits_in,
     rule_by_slower,
-    tested_in,
 )
 from boulder_kernels.soil_laws import constants_in
 from boulder_kernels.time_history import sample_of, state_of
 from boulder_sweep.report.page_records import (
     BELOW,
+    COURSE,
     DESIGN_COUNT,
     ELEMENT_ROOM,
+    FLAG_INPUTS,
     GROUND_COUNT,
     HISTORY_COUNT,
-    LIMITS_COUNT,
+    LIMITS,
     OUTCOME_COUNT,
     PIECE_ROOM,
     READINGS_COUNT,
-    RULE_LIMITS,
-    RULE_SIZES,
-    RULINGS_COUNT,
     SETTINGS_COUNT,
-    SIZES_COUNT,
-    SIZES_V_0,
+    SIZES,
     SUMS_ROOM,
     V_0,
     elements_from,
@@ -60,8 +51,10 @@ from boulder_sweep.report.page_records import (
     table_from,
 )
 
-EXPORTS = {"rows": "pippipipipppippppp", "history": "pppipipipppipppppp"}
-"""The functions that the page calls, and their arguments: p for a pointer to doubles, i for a whole number."""
+RECORDS = {"s": SIZES, "f": FLAG_INPUTS, "l": LIMITS, "c": COURSE}
+EXPORTS = {"rows": "pippipipipppisflppcp", "history": "pppipipipppipppppp"}
+"""The functions that the page calls, and their arguments: p for a pointer to doubles, i for a whole number, and
+a letter of `RECORDS` for a pointer to records."""
 
 
 @kernel
@@ -219,7 +212,7 @@ def decide(rows: Rows, room: np.ndarray, row: int, given: Given, settings: np.nd
         readings, control = readings_from(settings[number]), control_in(controls[number])
         solve_with_error(room[0], room[1], row, given, readings, control)
         consider(rows, row, room[0], row, number, controls, limits)
-        number = int(rows.courses[WANTED, row])
+        number = int(rows.courses[row].wanted)
 
 
 @kernel
@@ -238,10 +231,12 @@ def rows(
     controls_at: Any,
     count: int,
     sizes_at: Any,
+    flag_inputs_at: Any,
     limits_at: Any,
     outcomes_at: Any,
     room_at: Any,
-    rulings_at: Any,
+    courses_at: Any,
+    flags_at: Any,
 ) -> None:
     """Simulate n designs, apply the rules of the verdict, and simulate again what is open or late by finer steps.
 
@@ -266,36 +261,40 @@ def rows(
     controls_at, count
         Settings, shape (count, len(SETTINGS)): the first, and finer ones in the order of
         `boulder_sweep.judge.accuracy.finer_controls`.
-    sizes_at
-        Inputs of the rules and flags, shape (len(SIZES), n).
+    sizes_at, flag_inputs_at
+        Inputs of the rules, n records of `Sizes`, and of the flags, n records of `FlagInputs`.
     limits_at
-        Limits of the criterion, and what the model was tested on, shape (len(LIMITS),).
+        Limits of the criterion, and what the model was tested on, a record of `LIMITS`.
     outcomes_at, room_at
         Where the results go, shape (len(OUTCOME), n), and room for three times as many.
-    rulings_at
-        Where the rulings go, shape (len(RULINGS), n), and room for as many.
+    courses_at
+        Where the rules write, n records of `Course`, and room for as many.
+    flags_at
+        Where the flags go, shape (n,).
     """
-    settings, numbers = carray(controls_at, (count, SETTINGS_COUNT)), carray(limits_at, (LIMITS_COUNT, 1))
-    limits, tested = limits_in(numbers, 0), tested_in(numbers[RULE_LIMITS:], 0)
-    designs, sizes = carray(designs_at, (DESIGN_COUNT, n)), carray(sizes_at, (SIZES_COUNT, n))
+    settings, both = carray(controls_at, (count, SETTINGS_COUNT)), carray(limits_at, (1,))[0]
+    limits, tested = both.criterion, both.tested
+    designs, sizes, flag_inputs = (
+        carray(designs_at, (DESIGN_COUNT, n)),
+        carray(sizes_at, (n,)),
+        carray(flag_inputs_at, (n,)),
+    )
     layers, outlines = carray(layers_at, (n, m, 6)), carray(outlines_at, (n, points, 4))
     put_soils(designs, ground_at, below_at, deeper, carray(profile_at, (points, 4)), layers, outlines)
-    given, flag_inputs = Given(designs, layers, outlines, soil_at), sizes[RULE_SIZES:]
-    room, rulings = carray(room_at, (3, OUTCOME_COUNT, n)), carray(rulings_at, (2, RULINGS_COUNT, n))
-    own = Rows(carray(outcomes_at, (OUTCOME_COUNT, n)), rulings[0, :-1], sizes)
-    slower = Rows(room[2], rulings[1, :-1], sizes)
+    given, room = Given(designs, layers, outlines, soil_at), carray(room_at, (3, OUTCOME_COUNT, n))
+    courses, flags = carray(courses_at, (2, n)), carray(flags_at, (n,))
+    own = Rows(carray(outcomes_at, (OUTCOME_COUNT, n)), courses[0], sizes)
+    slower = Rows(room[2], courses[1], sizes)
     for row in range(n):
         decide(own, room, row, given, settings, limits)
-        o, v_0 = outcome_in(own.counted, row), designs[V_0, row]
-        if own.courses[ASKED_SLOWER, row] > 0.0:
+        course, slow, of_rules, v_0 = own.courses[row], slower.courses[row], sizes[row], designs[V_0, row]
+        if course.asked_slower > 0.0:
             for share in SLOWER_SPEEDS:
-                designs[V_0, row] = sizes[SIZES_V_0, row] = share * v_0
+                designs[V_0, row] = of_rules.v_0 = share * v_0
                 decide(slower, room, row, given, settings, limits)
-                worst = rule_by_slower(slower.courses[RULE, row])
-                own.courses[RULE, row] = min(own.courses[RULE, row], worst)
-            designs[V_0, row] = sizes[SIZES_V_0, row] = v_0
-        overlap = course_in(own.courses, row).overlap
-        rulings[0, -1, row] = flags_of(o, overlap, flag_inputs_in(flag_inputs, row), tested)
+                course.rule = min(course.rule, float(rule_by_slower(slow.rule)))
+            designs[V_0, row] = of_rules.v_0 = v_0
+        flags[row] = flags_of(outcome_in(own.counted, row), course.overlap, flag_inputs[row], tested)
 
 
 @kernel

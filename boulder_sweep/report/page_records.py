@@ -10,6 +10,7 @@ import numpy as np
 from boulder_kernels import Control, Design, DesignTable, OutcomeTable, Readings
 from boulder_kernels._jit import inlined
 from boulder_kernels.ground import Ground
+from boulder_kernels.numerics import record_type
 from boulder_kernels.pieces import Piece, SoilElements, SoilSums
 from boulder_kernels.rules import Course, FlagInputs, Sizes, Tested, VerdictLimits
 
@@ -25,14 +26,11 @@ SETTINGS_COUNT = len(SETTINGS)
 OUTCOME = OutcomeTable._fields
 """Results of a design, in this order; SI, rad."""
 OUTCOME_COUNT = len(OUTCOME)
-LIMITS = (*VerdictLimits._fields, *Tested._fields)
-"""Limits of the criterion, and what the model was tested on, in this order; rad, m, kg/m^3."""
-SIZES = (*Sizes._fields, *FlagInputs._fields)
-"""Inputs of the rules, then inputs of the flags; SI, the friction angle of the flags in degrees."""
-RULE_LIMITS, RULE_SIZES, SIZES_V_0 = len(VerdictLimits._fields), len(Sizes._fields), SIZES.index("v_0")
-RULINGS = (*Course._fields, "flags")
-"""What the rules make of a design."""
-LIMITS_COUNT, SIZES_COUNT, RULINGS_COUNT = len(LIMITS), len(SIZES), len(RULINGS)
+SIZES, FLAG_INPUTS, COURSE = map(record_type, (Sizes, FlagInputs, Course))
+"""Records of a design: inputs of the rules, and of the flags, SI but for the friction angle of the flags in degrees;
+and what the rules make of it."""
+LIMITS = np.dtype((np.record, [("criterion", record_type(VerdictLimits)), ("tested", record_type(Tested))]))
+"""Limits of the criterion, and what the model was tested on; rad, m, kg/m^3."""
 HISTORY = (
     *("x_b", "v_b", "theta_b", "omega_b", "x_v", "v_v"),
     *("touching", "F_v"),

@@ -24,7 +24,7 @@ The loop over j is vectorised if its elements are read by `field`, whose index n
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numba
@@ -33,6 +33,16 @@ from llvmlite import ir
 from numba.core import cgutils
 
 from ._jit import exact_inlined, inlined, overload
+
+
+def record_type(kind: Any) -> np.dtype:
+    """Return the type of a record with a number for each field of a named tuple."""
+    return np.dtype((np.record, [(name, np.float64) for name in kind._fields]))
+
+
+def records_of(kind: Any, columns: Iterable[Any]) -> np.ndarray:
+    """Return columns of n numbers, one for each field of a named tuple, as n records."""
+    return np.rec.fromarrays([np.asarray(column, dtype=float) for column in columns], dtype=record_type(kind))
 
 
 class SineVersine(NamedTuple):

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import exact_inlined, exact_kernel, inlined
+from ._jit import exact_inlined, exact_kernel
 from .control import VALID_ROTATION, Control, control_in
 from .error_estimates import LEAST_LATE_M
 from .outcomes import THETA_ERROR, X_ERROR, OutcomeTable, Status, copy_outcome, outcome_in
@@ -108,8 +108,6 @@ class Course(NamedTuple):
 
 OF_CRITERION = VerdictLimits._fields[VerdictLimits._fields.index("min_overlap_m") :]
 """Limits that are settings of the criterion as they are."""
-RULE, WANTED, ASKED_SLOWER = (Course._fields.index(name) for name in ("rule", "wanted", "asked_slower"))
-"""Rows of an array of courses."""
 SHALLOW_RATIO, SHALLOW_SLIDE = 0.45, 0.3
 """A boulder with less depth over height that slides by more [m] may stop a truck and be overturned by a slower one,
 which does not push it aside as far: among the passes of the realistic ranges every such boulder is one of these."""
@@ -118,26 +116,6 @@ SLOWER_SPEEDS = (*(k / 50.0 for k in range(49, 24, -1)), 0.4, 0.3)
 ISLAND_RATIO, ISLAND_SLIDE = 0.35, 0.5
 """With still less depth over height, and a longer slide [m], the speeds at which it stands can be 1 % wide: finer than
 these steps. Such a boulder is not a pass."""
-
-
-@inlined
-def limits_in(a: np.ndarray, row: int) -> VerdictLimits:
-    """Return the limits in a column of an array."""
-    return VerdictLimits(a[0, row], a[1, row], a[2, row], a[3, row])
-
-
-@inlined
-def sizes_in(a: np.ndarray, row: int) -> Sizes:
-    """Return the sizes in a column of an array."""
-    return Sizes(a[0, row], a[1, row], a[2, row], a[3, row], a[4, row], a[5, row], a[6, row], a[7, row])
-
-
-@inlined
-def course_in(a: np.ndarray, row: int) -> Course:
-    """Return the course in a column of an array."""
-    return Course(
-        a[0, row], a[1, row], a[2, row], a[3, row], a[4, row], a[5, row], a[6, row], a[7, row], a[8, row], a[9, row]
-    )
 
 
 @exact_inlined
@@ -317,62 +295,6 @@ class FlagInputs(NamedTuple):
     """Friction angle [deg], density [kg/m^3] and strain rate factor of the soil, as they were given."""
 
 
-@inlined
-def tested_in(a: np.ndarray, row: int) -> Tested:
-    """Return the limits in a column of an array."""
-    return Tested(
-        a[0, row],
-        a[1, row],
-        a[2, row],
-        a[3, row],
-        a[4, row],
-        a[5, row],
-        a[6, row],
-        a[7, row],
-        a[8, row],
-        a[9, row],
-        a[10, row],
-        a[11, row],
-        a[12, row],
-        a[13, row],
-        a[14, row],
-        a[15, row],
-        a[16, row],
-        a[17, row],
-        a[18, row],
-        a[19, row],
-        a[20, row],
-        a[21, row],
-        a[22, row],
-        a[23, row],
-        a[24, row],
-        a[25, row],
-        a[26, row],
-    )
-
-
-@inlined
-def flag_inputs_in(a: np.ndarray, row: int) -> FlagInputs:
-    """Return the inputs in a column of an array."""
-    return FlagInputs(
-        a[0, row],
-        a[1, row],
-        a[2, row],
-        a[3, row],
-        a[4, row],
-        a[5, row],
-        a[6, row],
-        a[7, row],
-        a[8, row],
-        a[9, row],
-        a[10, row],
-        a[11, row],
-        a[12, row],
-        a[13, row],
-        a[14, row],
-    )
-
-
 @exact_inlined
 def is_outside(value: float, least: float, most: float) -> bool:
     """Whether a value lies outside a range."""
@@ -431,14 +353,14 @@ def write_flags(counted: np.ndarray, overlap: np.ndarray, inputs: np.ndarray, te
     counted, overlap
         The solutions that count, shape (11, n), and the overlap with the bumper, shape (n,) [m].
     inputs
-        Rows are the fields of `FlagInputs`, shape (15, n).
+        Records of `FlagInputs`, shape (n,).
     tested
         What the model was tested on.
     out
         Where the flags go, whole numbers, shape (n,).
     """
     for row in range(out.size):
-        out[row] = flags_of(outcome_in(counted, row), overlap[row], flag_inputs_in(inputs, row), tested)
+        out[row] = flags_of(outcome_in(counted, row), overlap[row], inputs[row], tested)
 
 
 FIRST_FACTOR = 0.5
@@ -518,17 +440,9 @@ class Rows(NamedTuple):
     counted: np.ndarray
     """The solutions that count so far, shape (11, n), see `boulder_kernels.outcomes.empty_outcomes`."""
     courses: np.ndarray
-    """How far they are decided, shape (len(Course._fields), n)."""
+    """How far they are decided, records of `Course`, shape (n,)."""
     sizes: np.ndarray
-    """Their inputs; the first rows are the fields of `Sizes`, shape (·, n)."""
-
-
-@exact_kernel
-def put_course(courses: np.ndarray, row: int, c: Course) -> None:
-    """Write the course of one row into a column of an array."""
-    courses[0, row], courses[1, row], courses[2, row], courses[3, row] = c.rule, c.overlap, c.penetration, c.margin
-    courses[4, row], courses[5, row], courses[6, row] = c.decided_by, c.unconfirmed, c.compared_s
-    courses[7, row], courses[8, row], courses[9, row] = c.given_up, c.wanted, c.asked_slower
+    """Their inputs, records of `Sizes`, shape (n,)."""
 
 
 @exact_inlined
@@ -559,34 +473,46 @@ def consider(
     limits
         Limits of the criterion.
     """
-    sizes, control, solution = sizes_in(rows.sizes, row), control_in(controls[number]), outcome_in(found, at)
-    before, counted = course_in(rows.courses, row), outcome_in(rows.counted, row)
-    rule, decided_by = float(rule_of(solution, sizes, limits)), float(number)
+    sizes, control, solution = rows.sizes[row], control_in(controls[number]), outcome_in(found, at)
+    course, counted = rows.courses[row], outcome_in(rows.counted, row)
+    rule = float(rule_of(solution, sizes, limits))
     failed = number > 0 and rule == NOT_COMPUTED
-    confirmed = number > 0 and confirms(before, rule, counted, solution, sizes.v_0)
-    if failed or confirmed:
-        solution, rule, decided_by = counted, before.rule, before.decided_by
-        unconfirmed = before.unconfirmed - 1.0 if confirmed else before.unconfirmed
+    if failed:
+        solution, rule = counted, course.rule
+    elif number > 0 and confirms(course, rule, counted, solution, sizes.v_0):
+        solution, rule = counted, course.rule
+        course.unconfirmed = course.unconfirmed - 1.0
     else:
         copy_outcome(found, at, rows.counted, row)
-        unconfirmed = float(confirmations(rule, solution.t_end, control))
-    compared_s, given_up = before.compared_s if failed else control.h, 1.0 if failed and control.last_resort else 0.0
-    penetration, margin = penetration_of(solution, sizes), margin_of(solution, sizes, limits)
-    overlap = overlap_of(sizes)
-    course = Course(rule, overlap, penetration, margin, decided_by, unconfirmed, compared_s, given_up, 0.0, 0.0)
-    wanted = next_wanted(course, solution.status, number + 1, controls)
-    if wanted == len(controls) and unconfirmed > 0.0:
+        course.decided_by = float(number)
+        course.unconfirmed = float(confirmations(rule, solution.t_end, control))
+    if not failed:
+        course.compared_s = control.h
+    course.given_up = 1.0 if failed and control.last_resort else 0.0
+    course.rule, course.overlap = rule, overlap_of(sizes)
+    course.penetration, course.margin = penetration_of(solution, sizes), margin_of(solution, sizes, limits)
+    course.wanted = float(next_wanted(course, solution.status, number + 1, controls))
+    if course.wanted == len(controls) and course.unconfirmed > 0.0:
         rows.counted[THETA_ERROR, row] = rows.counted[X_ERROR, row] = np.inf
-        rule = float(rule_of(outcome_in(rows.counted, row), sizes, limits))
-    put_course(rows.courses, row, course)
-    rows.courses[RULE, row], rows.courses[WANTED, row] = rule, wanted
-    rows.courses[ASKED_SLOWER, row] = is_asked_slower(rule, solution, sizes)
+        course.rule = float(rule_of(outcome_in(rows.counted, row), sizes, limits))
+    course.asked_slower = 1.0 if is_asked_slower(course.rule, solution, sizes) else 0.0
 
 
 @exact_kernel
 def consider_rows(
-    rows: Rows, some: np.ndarray, found: np.ndarray, number: int, controls: np.ndarray, limits: VerdictLimits
+    counted: np.ndarray,
+    courses: np.ndarray,
+    sizes: np.ndarray,
+    some: np.ndarray,
+    found: np.ndarray,
+    number: int,
+    controls: np.ndarray,
+    limits: VerdictLimits,
 ) -> None:
-    """Take one more solution of some rows into account, whose numbers are given, shape (m,); see `consider`."""
+    """Take one more solution of some rows into account, whose numbers are given, shape (m,); see `consider`.
+
+    The first three are the fields of `Rows`: an array of records in a tuple takes Numba long to recognize.
+    """
+    rows = Rows(counted, courses, sizes)
     for at in range(some.size):
         consider(rows, some[at], found, at, number, controls, limits)

@@ -5,6 +5,7 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels._jit import plain
+from boulder_kernels.numerics import record_type, records_of
 from boulder_kernels.rules import (
     AGREEING,
     CRUSH,
@@ -61,13 +62,13 @@ def column(record, **changed):
 
 def considered(limits, controls, solutions, **changed):
     """Course of a row after each of its solutions, None for a control that is passed over, and what counts then."""
-    rows = Rows(column(bk.OutcomeTable), np.zeros((len(Course._fields), 1)), column(Sizes, **changed))
+    rows = Rows(column(bk.OutcomeTable), np.zeros(1, record_type(Course)), records_of(Sizes, column(Sizes, **changed)))
     found = []
     for number, solution in enumerate(solutions):
         if solution is not None:
             every = np.array(controls, dtype=float)
             consider(rows, 0, column(bk.OutcomeTable, **solution), 0, number, every, limits)
-        found.append(Course(*rows.courses[:, 0]))
+        found.append(Course(*rows.courses[0]))
     return found, bk.OutcomeTable(*rows.counted[:, 0])
 
 

@@ -5,7 +5,7 @@
  * Names of the numbers that the kernel takes and gives, each in its order, how many numbers a layer of soil has, and how
  * many the kernel makes of it, of a piece beside an outline, and of a soil element; written by Python.
  * @typedef {{design: string[], settings: string[], outcome: string[], history: string[], sizes: string[],
- *   rulings: string[], layer: number, piece_room: number, element_room: number, sums_room: number}} Layout
+ *   flag_inputs: string[], course: string[], layer: number, piece_room: number, element_room: number, sums_room: number}} Layout
  */
 
 /**
@@ -118,25 +118,28 @@ class Kernel {
    * @param {number[][]} controls settings in the order of `Layout.settings`, each finer than those before it
    * @param {number[]} limits of the criterion, and what the model was tested on
    * @returns {Record<string, Float64Array>} one number for each design by the names of `Layout.outcome` and
-   *   `Layout.rulings`; `decided_by` is the number of the settings that decided
+   *   `Layout.course`, and its `flags`; `decided_by` is the number of the settings that decided
    */
   rows(designs, inputs, controls, limits) {
-    const { design, outcome, sizes, rulings } = this.layout;
+    const { design, outcome, sizes, flag_inputs, course } = this.layout;
     const n = designs.length;
     const results = outcome.length * n;
     const { at, views } = this.room([
       2, design.length * n, ...this.soilLengths(controls[0], n), controls.flat().length, sizes.length * n,
-      limits.length, results, 3 * results, 2 * rulings.length * n,
+      flag_inputs.length * n, limits.length, results, 3 * results, 2 * course.length * n, n,
     ]);
     design.forEach((name, field) => designs.forEach((one, row) => (views[1][field * n + row] = one[name])));
     views[8].set(controls.flat());
-    sizes.forEach((name, field) => inputs.forEach((one, row) => (views[9][field * n + row] = one[name])));
-    views[10].set(limits);
+    views[9].set(inputs.flatMap((one) => sizes.map((name) => one[name])));
+    views[10].set(inputs.flatMap((one) => flag_inputs.map((name) => one[name])));
+    views[11].set(limits);
     const soil = this.soilArguments(at.slice(2, 8), views.slice(2, 8));
     this.call("rows", [at[1], n, ...soil, at[8], controls.length, ...at.slice(9)]);
-    /** @param {string[]} names @param {Float64Array} found */
-    const named = (names, found) => names.map((name, field) => [name, found.slice(field * n, (field + 1) * n)]);
-    return Object.fromEntries([...named(outcome, views[11]), ...named(rulings, views[13])]);
+    const reached = outcome.map((name, field) => [name, views[12].slice(field * n, (field + 1) * n)]);
+    const judged = course.map((name, field) => [
+      name, Float64Array.from({ length: n }, (_, row) => views[14][row * course.length + field]),
+    ]);
+    return Object.fromEntries([...reached, ...judged, ["flags", views[15].slice()]]);
   }
 
   /**
