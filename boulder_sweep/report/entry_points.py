@@ -160,8 +160,8 @@ def simulate_in_soil(
         by_elements = SoilProfile(layers, outline, elements_from(carray(soil_at, (ELEMENT_ROOM, n))))
         return simulate_recorded(by_elements, design, readings, control, record, out, centre)
     pieces = m + max(len(outline) - 2, 0)
-    room = carray(soil_at, (SUMS_ROOM + PIECE_ROOM * pieces,))
-    soil = ManyPieces(room[:SUMS_ROOM], room[SUMS_ROOM:].reshape(pieces, PIECE_ROOM))
+    sums = carray(soil_at, (PIECE_ROOM * pieces + SUMS_ROOM,))[PIECE_ROOM * pieces :]
+    soil = ManyPieces(sums, carray(soil_at, (pieces, PIECE_ROOM)))
     return simulate_recorded(SoilProfile(layers, outline, soil), design, readings, control, record, out, centre)
 
 

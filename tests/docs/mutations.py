@@ -20,9 +20,8 @@ _DYNAMICS = "kernels/boulder_kernels/dynamics.py"
 _WALL, _TRAJECTORY = "boulder_sweep/crash_tests/rigid_wall.py", "boulder_sweep/impact/trajectory.py"
 _DESIGNS = "boulder_sweep/designs.py"
 _GROUND = "kernels/boulder_kernels/ground.py"
-_LAYERED, _LAYERS = (f"kernels/boulder_kernels/{name}.py" for name in ("layered", "layered_soil"))
+_OUTLINE, _PIECES, _LAWS = (f"kernels/boulder_kernels/{name}.py" for name in ("outline", "pieces", "soil_laws"))
 _HEAVE, _STEPS, _OPINION = (f"kernels/boulder_kernels/{name}.py" for name in ("heave", "runge_kutta", "second_opinion"))
-_BESIDE, _OUTLINED = (f"kernels/boulder_kernels/{name}.py" for name in ("outlined", "outlined_soil"))
 
 MUTATIONS = (
     Mutation((1,), _DESIGN, "return (1.0 + half) / (1.0 - half)", "return (1.0 - half) / (1.0 + half)"),
@@ -82,16 +81,18 @@ MUTATIONS = (
     Mutation((102,), _GROUND, "min(K_p * K_p, K_p * R)", "K_p * R"),
     Mutation((105,), _GROUND, "2e3 * cohesion * np.sqrt(K_p)", "1e3 * cohesion * np.sqrt(K_p)"),
     Mutation((105,), _GROUND, "K_p * (stress - weight * top)", "K_p * stress"),
-    Mutation((105,), _LAYERED, "p_0 * ultimate, p_1 * design.d * ultimate", "p_0 * ultimate, p_1 * ultimate"),
-    Mutation((105,), _LAYERED, "pressure * design.W * h_e", "pressure * h_e"),
+    Mutation((105,), _PIECES, "p.p_0 * ultimate, p.p_1 * design.d * ultimate", "p.p_0 * ultimate, p.p_1 * ultimate"),
+    Mutation((105,), _PIECES, "pressure * design.W * share", "pressure * share"),
     Mutation((106,), _GROUND, "if top >= ground.water else", "if top > ground.water else"),
     Mutation((106,), _GROUND, "stress += weight * (bottom - top)", "stress += G * rho_s * (bottom - top)"),
     Mutation((107,), _GROUND, "/ math.cos(slope))", ")"),
-    Mutation((108,), _LAYERS, "length = a - b if above else b - a", "length = b - a"),
-    Mutation((108,), _LAYERS, "(layer.P_1 if above else -layer.P_1)", "layer.P_1"),
-    Mutation((108,), _LAYERS, "length * powers + P_2 * logarithm", "length * powers - P_2 * logarithm"),
-    Mutation((108,), _LAYERS, "0.5 * w.F_2 + (1.0 / 3.0) * w.G_3", "0.5 * w.F_2 + 0.5 * w.G_3"),
-    Mutation((108,), _LAYERS, "0.5 * (2.0 * w.D_1 - sums.Z_1)", "0.5 * (w.D_1 - sums.Z_1)"),
+    Mutation((108,), _PIECES, "n, m, p = Ka - piece.P_1, Ka + piece.P_1", "n, m, p = Ka + piece.P_1, Ka + piece.P_1"),
+    Mutation((108,), _PIECES, "n * r.three - KS * r.four + times(p, r.two)", "n * r.three - KS * r.four"),
+    Mutation((108,), _PIECES, "Released(times(share, logarithm)", "Released(-times(share, logarithm)"),
+    Mutation(
+        (108,), _PIECES, "s.U_0 + (w_0 * (P_0 * i.one + P_1 * i.two)", "s.U_0 + (w_0 * (P_0 * i.one + P_1 * i.one)"
+    ),
+    Mutation((108,), _PIECES, "BB * N_1 - Bp * N_2 + pp * N_3", "BB * N_1 - Bp * N_1 + pp * N_3"),
     Mutation((131,), _HEAVE, "f.b_b * cos - f.a_b * sin", "f.b_b * cos + f.a_b * sin"),
     Mutation(
         (131,), _HEAVE, "turning = Q.Q_theta - i.S * omega_b * omega_b", "turning = Q.Q_theta + i.S * omega_b * omega_b"
@@ -156,33 +157,24 @@ MUTATIONS = (
         "control.stop and field(work, START, 7) <= 9.0",
     ),
     Mutation((137,), _OPINION, "f) + (crush_energy(u, c) if touching else 0.0)", "f)"),
-    Mutation((141,), _BESIDE, "m_b = design.rho_b * volume", "m_b = 1.01 * design.rho_b * volume"),
-    Mutation((141,), _BESIDE, "area = slice_ * (near + far)", "area = slice_ * 2.0 * near"),
-    Mutation((142,), _BESIDE, "0.5 * (far * far - near * near)", "0.5 * (far * far + near * near)"),
-    Mutation((142,), _BESIDE, "z_c += area * z\n", "z_c += slice_ * z\n"),
-    Mutation((143,), _BESIDE, "- m_b * (x * x + z_c * z_c)", "- m_b * z_c * z_c"),
+    Mutation((141,), _OUTLINE, "m_b = design.rho_b * volume", "m_b = 1.01 * design.rho_b * volume"),
+    Mutation((141,), _OUTLINE, "area = slice_ * (near + far)", "area = slice_ * 2.0 * near"),
+    Mutation((142,), _OUTLINE, "0.5 * (far * far - near * near)", "0.5 * (far * far + near * near)"),
+    Mutation((142,), _OUTLINE, "z_c += area * z\n", "z_c += slice_ * z\n"),
+    Mutation((143,), _OUTLINE, "- m_b * (x * x + z_c * z_c)", "- m_b * z_c * z_c"),
     Mutation(
-        (143,), _BESIDE, "(far * far * far + near * near * near) / 3.0", "(far * far * far - near * near * near) / 3.0"
+        (143,), _OUTLINE, "(far * far * far + near * near * near) / 3.0", "(far * far * far - near * near * near) / 3.0"
     ),
-    Mutation((144,), _DYNAMICS, "lift + soil.lean[0] * c.d * sin if", "lift - soil.lean[0] * c.d * sin if"),
-    Mutation((144,), _DYNAMICS, "c.C_cos - abs(soil.lean[0]) * c.d if", "c.C_cos if"),
-    Mutation((144,), _OUTLINED, "reaction.M - lean[0] * k.lever_d", "reaction.M + lean[0] * k.lever_d"),
+    Mutation((144,), _DYNAMICS, '+ getattr(c, "lean", 0.0) * c.d * sin', '- getattr(c, "lean", 0.0) * c.d * sin'),
+    Mutation((144,), _DYNAMICS, 'c.C_cos - abs(getattr(c, "lean", 0.0)) * c.d', "c.C_cos"),
+    Mutation((144,), _LAWS, "reaction.M - times(lean, k.lever_d)", "reaction.M + times(lean, k.lever_d)"),
     Mutation(
-        (145,), _BESIDE, "-slope_of(outline, i, WIDTH) * d / design.W", "slope_of(outline, i, WIDTH) * d / design.W"
+        (145,), _PIECES, "-slope_of(outline, i, WIDTH) * d / design.W", "slope_of(outline, i, WIDTH) * d / design.W"
     ),
-    Mutation((145,), _BESIDE, "elements.ultimate[n] *= share", "elements.ultimate[n] *= 1.0"),
-    Mutation(
-        (146,),
-        _OUTLINED,
-        "roots_of(KS, K * A + piece.P_1, -piece.P_0, piece)",
-        "roots_of(KS, K * A - piece.P_1, -piece.P_0, piece)",
-    ),
-    Mutation((147,), _OUTLINED, "(piece.w_0 + piece.w_1 * r) * v * abs(v)", "piece.w_0 * v * abs(v)"),
-    Mutation(
-        (147,), _OUTLINED, "first += WEIGHTS[g] * length * pressed * r", "first += WEIGHTS[g] * length * pressed * low"
-    ),
-    Mutation((147,), _OUTLINED, "total - linear - P_2 * piece.w_0 * math.log", "total - P_2 * piece.w_0 * math.log"),
-    Mutation((147,), _OUTLINED, "piece.w_1 * x.S_3) + R", "piece.w_1 * x.S_2) + R"),
-    Mutation((147,), _OUTLINED, "piece.w_0 * D_1 + piece.w_1 * D_2", "piece.w_0 * D_1 + piece.w_1 * D_1"),
-    Mutation((147,), _OUTLINED, "slope_x, x.y, first, last, 1)", "slope_x, x.y, first, last, 0)"),
+    Mutation((145,), _PIECES, "share = (given.w_0 + given.w_1 * ratio) * h_e", "share = given.w_0 * h_e"),
+    Mutation((146,), _PIECES, "squared = half * half + KS * p", "squared = half * half - KS * p"),
+    Mutation((147,), _PIECES, "n * r.four - KS * r.five", "n * r.four - KS * r.four"),
+    Mutation((147,), _PIECES, "times((1.0 / 3.0) * R_1, turn_3)", "times(0.5 * R_1, turn_3)"),
+    Mutation((147,), _PIECES, "piece.w_0 * zeroth + times(piece.w_1, first)", "piece.w_0 * zeroth"),
+    Mutation((147,), _PIECES, "piece.w_0 * first + times(piece.w_1, under.second - over.second)", "piece.w_0 * first"),
 )
