@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from boulder_sweep.crash_tests.cases import crash_test
-from boulder_sweep.crash_tests.tables import Table, number
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
@@ -105,39 +104,6 @@ class ReadingsStudy:
         """How many designs stand under a row but not under its preset, and the other way round."""
         base = self.row(row.base).stands
         return int((row.stands & ~base).sum()), int((base & ~row.stands).sum())
-
-    def crash_test_table(self) -> Table:
-        """What every reading does to the crash tests."""
-        table = Table(
-            (
-                "readings",
-                "equations",
-                "ABG: 20° at [s]",
-                "ABG verdict",
-                "RWG: largest rotation [deg]",
-                "RWG: largest x_b [m]",
-                "RWG verdict",
-            )
-        )
-        for row in self.rows:
-            table.add(
-                row.label,
-                EQUATIONS.get(row.switch, ""),
-                number(row.abg_time_to_limit_s, 4, "never"),
-                row.abg_verdict,
-                number(row.rwg_rotation_deg, 3),
-                number(row.rwg_displacement_m, 4),
-                row.rwg_verdict,
-            )
-        return table
-
-    def grid_table(self) -> Table:
-        """What every reading does to the designs that stand."""
-        table = Table(("readings", "designs that stand", "stand only with it", "stand only without it"))
-        for row in self.rows:
-            moved = [f"{count / self.designs:.1%}" for count in self.changed(row)] if row.switch else ["", ""]
-            table.add(row.label, f"{row.share:.1%}", *moved)
-        return table
 
     def deciding(self) -> list[tuple[str, int]]:
         """Switches by how many verdicts of the grid they change from ``corrected``, most first."""
