@@ -38,7 +38,7 @@ BANNED = {
     "about or on, which it means": r"\bas of\b",
     "next to, besides": r"\bbeside\b",
     "the outcome": r"\bwhat (came|becomes|became) of\b",
-    "what it says in place of where": r"[(,;:.] ?see (`|\[|the )",
+    "what it says in place of where": r"[(,;:.] ?see (·|\[|the )",
     "proved:": r"\bit is proved that\b",
     "boulder": r"(?<!crushed )(?<!the )\bstones?\b(?! of 6)",
     "foot": r"\bbases?\b",
