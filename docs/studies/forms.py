@@ -111,8 +111,8 @@ def grids_words(grid: Path, count: int = DRAWN) -> str:
         few = np.append(few, standing[evaluation.judged(passes)["max_rotation_deg"] <= LITTLE_DEG])
         shares.append(f"{standing.mean():.0%} of the passes of {name}")
     return (
-        f"Robust are {' and '.join(shares)}; of the {few.size} that turn by at most {LITTLE_DEG:g}°, "
-        f"{np.count_nonzero(few)} are."
+        f"{' and '.join(shares)} are robust, and so are {np.count_nonzero(few)} of the {few.size} that turn by at most "
+        f"{LITTLE_DEG:g}°."
     )
 
 
@@ -200,5 +200,5 @@ def random_words(grid: Path, count: int = RANDOM) -> str:
     of_laws = ", ".join(f"{won[law].mean():.1%} under `{law}`" for law in reversed(RESISTANCES))
     return (
         f"Of {len(rotation)} passes among {count} designs {standing.mean():.0%} are robust. "
-        f"Of {len(won[PAPER])} designs that fail, with friction and vertical motion {of_laws} pass."
+        f"Of {len(won[PAPER])} designs that fail, friction and vertical motion let pass {of_laws}."
     )

@@ -193,7 +193,7 @@ def readings_words(study: ReadingsStudy) -> str:
     (most, changes), (second, second_changes), (least, least_changes) = deciding[0], deciding[1], deciding[-1]
     gained, _ = study.changed(study.row("corrected", most))
     return points(
-        f"**`{most}` decides most verdicts.** Read as printed, everything else corrected, it changes "
+        f"**`{most}` decides most verdicts.** As printed, with everything else corrected, it changes "
         f"{changes / study.designs:.1%} of {study.designs:,} designs between standing and not, {gained / changes:.0%} "
         f"of them to standing. `{second}` comes next with {second_changes / study.designs:.1%}; `{least}` is the least "
         f"with {least_changes / study.designs:.1%}.",
@@ -230,6 +230,6 @@ def _strictness_words(study: ReadingsStudy) -> str:
     safe = [f"`{switch}`" for switch, (gained, _) in rows.items() if gained == 0]
     lax = [f"`{switch}`" for switch, (gained, lost) in rows.items() if gained > lost]
     return (
-        f"Seen from `corrected`, with the printed reading only fewer designs stand for {', '.join(safe) or 'none'}; "
-        f"more stand than fall for {', '.join(lax) or 'none'}: the unsafe side."
+        f"One printed formula among corrected ones is safe for {', '.join(safe) or 'none'}, as only fewer designs "
+        f"stand, and unsafe for {', '.join(lax) or 'none'}, as more stand than fall."
     )

@@ -59,7 +59,7 @@ def ground_table() -> Table:
 def grid_table(grid: Path) -> Table:
     """Return how many designs of a sample of a grid pass by every law."""
     sweep = load(grid)
-    table = Table(("law", "passes", "of those that pass by the paper's law"))
+    table = Table(("soil model", "passes", "share of the default's passes"))
     paper: np.ndarray | None = None
     for law in RESISTANCES:
         own = _by(law, sweep)

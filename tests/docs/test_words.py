@@ -62,6 +62,11 @@ def test_public_text_is_plain(name: str) -> None:
     assert {better: places for better, pattern in BANNED.items() if (places := found(pattern, text))} == {}
 
 
+@pytest.mark.parametrize("name", PUBLIC)
+def test_no_sentence_goes_on_behind_code(name: str) -> None:
+    assert re.findall(r"^```\n\n[a-z].*", PUBLIC[name](), re.MULTILINE) == []
+
+
 @pytest.mark.parametrize(
     ("text", "better"),
     [
