@@ -113,6 +113,9 @@ def test_the_errors_far_from_usual_designs_are_those_of_the_study() -> None:
     shown = re.search(r"the largest errors are ([\d.]+)°, ([\d.]+)° and ([\d.]+)°", " ".join(ACCURACY.split()))
     assert shown
     assert list(shown.groups()) == [cell.strip() for cell in worst[3:6]]
+    least = re.search(r"cover at least ([\d.]+) % of the true errors", " ".join(ACCURACY.split()))
+    assert least
+    assert min(float(share) for share in worst[6].split(",")) >= float(least[1])
 
 
 def test_what_the_soil_on_the_approach_side_is_worth_is_that_of_the_study() -> None:
