@@ -278,7 +278,7 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "validity",
         "dictionary",
         "",
-        "what lies outside what the model was tested on: flags joined by ; (docs/validity.md), empty where nothing "
+        "what lies outside what the model was tested on: flags joined by ; (docs/confidence.md), empty where nothing "
         "does; they do not change the verdict",
         lambda facts: facts.validity,
         rows="judged",

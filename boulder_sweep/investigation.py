@@ -4,8 +4,8 @@ Published correlations for clean sand. Several are in wide use and differ by up 
 `BY_BLOW_COUNT` and `BY_CONE` is worked out, and the one with the weakest soil counts. Where a source leaves a choice,
 the weaker soil is taken, too: a reading is normalized by the stress in dense soil without water where no
 density is measured, the normalization is limited to 1.7 (Youd et al. 2001), rods count as no longer than the depth
-(Skempton 1986), the excess pore pressure behind a cone is left out, and nothing is extrapolated. `docs/site_data.md`
-tells which of the sources were seen.
+(Skempton 1986), the excess pore pressure behind a cone is left out, and nothing is extrapolated. `docs/references.md`
+marks the sources that were not seen.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Soils as they lie, from settings to what the kernels take: laws of the resistance, layers, water, cohesion, slope.
 
-The equations stand in `boulder_kernels.ground`; the page ``docs/soil.md`` says where they come from.
+The equations stand in `boulder_kernels.ground`; ``docs/model.md`` derives them.
 """
 
 from __future__ import annotations

@@ -41,6 +41,7 @@ QUICK = (
     "docs/test_documentation.py",
     "docs/test_drift.py",
     "docs/test_register.py",
+    "docs/test_words.py",
     "impact/test_error_of_a_design.py",
     "judge/",
     "kernels/test_check_values.py",

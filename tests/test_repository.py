@@ -23,6 +23,8 @@ SOURCE = PROJECT["urls"]["Source"]
 def test_the_citation_has_the_version_and_licence_of_the_package() -> None:
     citation = YAML(typ="safe").load(ROOT / "CITATION.cff")
     assert (citation["version"], citation["license"]) == (PROJECT["version"], PROJECT["license"])
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"version = {{{PROJECT['version']}}}" in readme, "the BibTeX entry"
 
 
 def test_the_changelog_begins_with_the_version_of_the_package() -> None:

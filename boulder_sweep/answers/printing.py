@@ -121,7 +121,7 @@ def flag_lines(answers: Sequence[str]) -> list[str]:
     flags = flag_counts(Counter(answers).items())
     named = ", ".join(f"{name} {flagged:,}" for name, flagged in flags.items() if name)
     inside = f"flags: {flags.get('', 0):,} of {counted(len(answers), 'answer')} inside what the model was tested on"
-    return wrapped([f"an answer is {NOT_A_RATING}", f"{inside}{f'; {named}' if named else ''} (docs/validity.md)"])
+    return wrapped([f"an answer is {NOT_A_RATING}", f"{inside}{f'; {named}' if named else ''} (docs/confidence.md)"])
 
 
 def foot_lines(model: Model, reasons: Iterable[str | None] = (), units: str = "si") -> list[str]:

@@ -43,7 +43,7 @@ CLASSES = {"M30": 30 * MPH, "M40": 40 * MPH, "M50": 50 * MPH}
 CLASS_MASS_KG = 6800.0
 KM_H = 1.0 / 3.6
 ISO_SPEEDS = {"48 km/h": 48 * KM_H, "64 km/h": 64 * KM_H, "80 km/h": 80 * KM_H}
-"""Speeds [m/s] of tests to IWA 14-1, which ISO 22343-1 supersedes, with a truck of 7200 kg (docs/bibliography.md)."""
+"""Speeds [m/s] of tests to IWA 14-1, which ISO 22343-1 supersedes, with a truck of 7200 kg (docs/references.md)."""
 ISO_MASS_KG = 7200.0
 CLASS_TOLERANCE = 0.02
 """A class applies to a truck of one mass; none is named if the mass differs by more than this share."""

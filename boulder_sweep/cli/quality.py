@@ -159,8 +159,8 @@ Empty cells are gaps in a track.
 def validate(out: str | None, measured: str | None, case: str | None, as_json: bool) -> int:
     """Simulate both crash tests of the paper, with its formulas as printed and corrected, beside what it says of them.
 
-    Your own test (--measured) is laid over the simulation, with a table of peaks: docs/measuring.md says what to
-    measure.
+    Your own test (--measured) is laid over the simulation, with a table of peaks: docs/validation.md says what
+    to measure.
 
     With -o the figures of the paper are redrawn for the simulated side and all time histories written. The exit code
     is 1 if a statement of the paper is contradicted.

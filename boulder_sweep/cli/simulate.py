@@ -179,7 +179,7 @@ def _cautions(row: dict[str, Any], model: Model, *, is_asked: bool) -> list[str]
     from boulder_sweep.judge.validity import NOT_A_RATING, meanings
 
     cautions = [f"caution: {words}" for words in meanings(row["validity"] or "")]
-    cautions += ["see docs/validity.md"] if cautions else []
+    cautions += ["docs/confidence.md has the bounds of all flags"] if cautions else []
     if row["verdict"] == "pass":
         grades = grade_lines([row]) if is_asked else ["open: not asked (`sweep run --second-opinion` asks)"]
         cautions = [*grades, *cautions, f"pass: {NOT_A_RATING}"]

@@ -21,7 +21,7 @@ def default_text(field: Field, units: str = "si") -> str:
 
 
 class Category(NamedTuple):
-    """A vehicle of ASTM F2656, see ``docs/vehicle.md``."""
+    """A vehicle of ASTM F2656; ``docs/site.md`` lists the classes."""
 
     mass: tuple[str, str]
     """In SI and US units."""

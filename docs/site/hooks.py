@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from docs.site.notebooks import as_markdown
-from docs.site.reference import command_help, kernel_page, python_page
+from docs.site.reference import all_entries, command_help, flags_and_columns, kernel_page, public_names, register
 
 if TYPE_CHECKING:
     from mkdocs.config.defaults import MkDocsConfig
@@ -28,8 +28,14 @@ TAKEN = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "benchmarks/README.md")
 """Pages from outside the folder of the documentation."""
 HOME = "README.md"
 """The landing page, over the whole width."""
-COMMAND_LINE = "command_line.md"
-"""The page below which the help of every command stands."""
+MADE = {
+    "command_line.md": command_help,
+    "settings.md": all_entries,
+    "columns.md": flags_and_columns,
+    "python.md": public_names,
+    "model.md": register,
+}
+"""Pages that end with what is made from the code."""
 ASSETS = ("iframe-worker.js", "tables.css")
 """Files of this folder that `mkdocs.yml` names; the first is for the search on pages opened from disk, in place of one
 that the theme would fetch."""
@@ -47,8 +53,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         files.append(File.generated(config, f"assets/{name}", abs_src_path=str(Path(__file__).with_name(name))))
     for notebook in sorted((ROOT / "notebooks").glob("*.ipynb")):
         files.append(File.generated(config, f"notebooks/{notebook.stem}.md", content=as_markdown(notebook)))
-    for name, page in (("python", python_page), ("kernels", kernel_page)):
-        files.append(File.generated(config, f"reference/{name}.md", content=page()))
+    files.append(File.generated(config, "reference/kernels.md", content=kernel_page()))
     return files
 
 
@@ -60,8 +65,8 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, **_: Any) 
     source = next((name for name in taken() if in_site(name) == here), None)
     if here.startswith("reference/"):
         return markdown
-    if here == COMMAND_LINE:
-        markdown = f"{markdown}\n{command_help()}"
+    if here in MADE:
+        markdown = f"{markdown}\n{MADE[here]()}"
     if source is None:
         source = here if here.startswith("notebooks/") else f"docs/{here}"
     pieces = _CODE.split(markdown)

@@ -11,12 +11,11 @@ from scipy.optimize import brentq
 from boulder_kernels import Design, constants_of, corrected
 from boulder_kernels.design import G, design_at, passive_pressure_coefficient
 from boulder_kernels.soil import spring_force
-from boulder_sweep.crash_tests.cases import PAPERS_N, Convergence, crash_test
+from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.judge.inputs import sampled_designs
 from boulder_sweep.settings.model import RESISTANCES
 from boulder_sweep.soils import with_law
-from docs.studies.documents import points
 
 Soil = Callable[[float, float], float]
 """From the displacement [m] at a depth [m] to the force of the soil per metre of depth [N/m]."""
@@ -111,17 +110,3 @@ def post_table() -> Table:
     for speed in SPEEDS_M_S:
         table.add(f"{speed:g}", f"{drag_share(speed):.1%}")
     return table
-
-
-def convergence_words(study: Convergence) -> str:
-    """What the study of soil elements shows."""
-    printed, corrected = (study.difference("rwg", preset, PAPERS_N) for preset in ("as_printed", "corrected"))
-    first, second = (study.order("rwg", preset) for preset in ("as_printed", "corrected"))
-    hundred = abs(study.difference("rwg", "corrected", 100))
-    below = max(abs(corrected), 1e-6)
-    return points(
-        f"As printed, the sums approach their limit with order {first:.1f}: at the paper's N = {PAPERS_N} the rotation "
-        f"of Rockville White Granite is still {printed:+.4f}° off, small enough to be called no change.",
-        f"Corrected, the order is {second:.1f}: at N = {PAPERS_N} the difference is at most {below:.0e}°, and N = 100 "
-        f"is already within {hundred:.4f}°.",
-    )

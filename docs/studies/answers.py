@@ -22,41 +22,18 @@ UNCERTAIN = Path("configs/uncertain_site.yaml")
 FACTORS = (1.0, 1.05, 1.1, 1.15, 1.2, 1.25)
 TARGETS = (0.9, 0.95)
 """Chances for which a factor is told."""
-SPREADS = (
-    "soil.friction_angle={{mean: {friction_angle_deg} deg, cov: 5 %}}",
-    "soil.density={{mean: {soil_density_kg_m3} kg/m^3, cov: 5 %}}",
-    "soil.subgrade_reaction={{distribution: lognormal, mean: {subgrade_reaction_MN_m3} MN/m^3, cov: 40 %}}",
-)
-"""What is uncertain of the cases."""
-LIGHTEST = {
-    "boulder.width": "1.4 m",
-    "boulder.height": "3 m",
-    "site.embedment_ratio": "0.75",
-    "soil.friction_angle": "40 deg",
-    "soil.subgrade_reaction": "63 MN/m^3",
-}
-"""The lightest boulder of the M30 grid for one of its soils."""
-CASES = {
-    "American Black Granite": (Path("configs/abg.yaml"), {}),
-    "Rockville White Granite": (Path("configs/rwg.yaml"), {}),
-    "the lightest of the M30 grid at 40°": (GRID, LIGHTEST),
-}
-ONE_STIFFNESS = ("soil.subgrade_reaction=63 MN/m^3",)
 
 
-def need_of_site(root: Path) -> str:
-    """Return the depths of the site as a terminal shows them."""
-    return _fenced(need_lines(need(load(root / SITE)), again=Again(str(SITE)), table=True, notes=True))
-
-
-def lightest_of_grid(root: Path) -> str:
-    """Return the lightest boulders of the M30 grid as a terminal shows them, at one stiffness of the soil."""
-    return _fenced(need_lines(need(load(root / GRID, ONE_STIFFNESS), "mass"), again=Again(str(GRID))))
+def least_of_site(root: Path) -> str:
+    """Return the least depth without margin and second opinion as a terminal shows it."""
+    sweep = load(root / SITE, ["boulder.height=3.4 m"])
+    found = need(sweep, margin=0.0, robust=False)
+    return _fenced(need_lines(found, again=Again(str(SITE)), table=True))
 
 
 def capacity_of_site(root: Path) -> str:
-    """Return what the designs of the site withstand as a terminal shows it."""
-    return _fenced(reserve_lines(reserves(load(root / SITE))))
+    """Return what the taller designs of the site withstand as a terminal shows it."""
+    return _fenced(reserve_lines(reserves(load(root / SITE, ["boulder.height=[3.4, 3.6] m"]))))
 
 
 def uncertainty_of_site(root: Path) -> str:
@@ -98,23 +75,6 @@ def chances_with_factor(root: Path, factor: float) -> np.ndarray:
     }
     sweep = Sweep("factor", None, (), {}, DesignList("designs", rows), distributions=spread)
     return uncertainty(sweep, half_width=0.03).frame.p_pass.to_numpy()
-
-
-def uncertainty_of_cases(root: Path) -> str:
-    """Return the chances of the crash tests and of a boulder from the grid, their soils uncertain."""
-    table = Table(("design", "readings", "P(pass)", "interval", "decided by"))
-    for name, (path, single) in CASES.items():
-        for readings in ("corrected", "as_printed"):
-            overrides = [f"{key}={value}" for key, value in single.items()] + [f"model.readings={readings}"]
-            values = load(root / path, overrides).constants
-            spreads = [spread.format(**values) for spread in SPREADS]
-            found = uncertainty(load(root / path, [*overrides, *spreads]), half_width=0.005)
-            row = found.arrow.to_pylist()[0]
-            interval = f"{row['p_pass_low']:.3f} to {row['p_pass_high']:.3f}"
-            driver = (row["p_pass_driver"] or "").partition(".")[2].replace("_", " ")
-            words = driver or f"undecided: {row['p_undecided_reason']}"
-            table.add(name, readings.replace("_", " "), f"{row['p_pass']:.3f}", interval, words)
-    return table.markdown()
 
 
 def _fenced(lines: list[str]) -> str:

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, Status, as_printed, corrected, simulate_table
-from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.judge.accuracy import LADDER, STEPS, STEPS_PRINTED, Steps, finer_step
 from boulder_sweep.judge.inputs import sampled_designs
 from boulder_sweep.settings import load
@@ -116,40 +115,6 @@ def coverages(tables: dict[str, DesignTable]) -> Iterator[Coverage]:
                     steps_s = (steps.step_s,)
                 found = _solved(table, readings, steps, estimate=accuracy != "fast", paired=paired)
                 yield _compared(designs, preset, accuracy, steps, steps_s, found, known)
-
-
-def documented(grid: Path) -> Table:
-    """Return the table of the documentation: random designs, and those of a grid."""
-    tables = {"random": random_table(16_384, 1), "M30 grid": grid_table(grid, 8192)}
-    return coverage_table([c for c in coverages(tables) if c.accuracy != "a number" or c.steps == NUMBERS[1]])
-
-
-def coverage_table(found: list[Coverage]) -> Table:
-    """Return the entries as a table; a star marks steps that end where the soil yields."""
-    head: tuple[str, ...] = ("designs", "readings", "accuracy", "steps [ms]", "rotation covered", "largest miss [°]")
-    head += (
-        "movement covered",
-        "rotation: 99.9 %, largest [°]",
-        "movement: 99.9 %, largest [mm]",
-        "wrong",
-        "undecided",
-    )
-    table = Table(head)
-    for c in found:
-        table.add(
-            c.designs,
-            c.readings,
-            c.accuracy,
-            " + ".join(f"{1e3 * step:g}" for step in c.steps_s) + (" *" if c.steps.locate_yield else ""),
-            f"{c.rotation:.1%} of {c.standing}",
-            f"{c.largest_miss_deg:.0e}" if c.largest_miss_deg else "none",
-            f"{c.displacement:.1%}",
-            f"{c.p99_9_deg:.0e}, {c.largest_deg:.0e}",
-            f"{1e3 * c.p99_9_m:.0e}, {1e3 * c.largest_m:.0e}",
-            str(c.flips),
-            str(c.undecided),
-        )
-    return table
 
 
 def _solved(

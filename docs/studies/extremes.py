@@ -1,44 +1,23 @@
-"""The admitted box of inputs and the named refusals, as tables made from the settings and the rules themselves."""
+"""How designs from the whole admitted box end."""
 
 from __future__ import annotations
 
 from collections import Counter
-from functools import cache
 
 import numpy as np
 
-from boulder_kernels import Control, Status, corrected
+from boulder_kernels import Control, corrected
 from boulder_sweep.columns import INPUT_COLUMNS, VERDICTS
-from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.designs import block_of
 from boulder_sweep.judge.accuracy import LONGEST_HORIZON, STEPS
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import ERROR, UNDECIDED, Judged
-from boulder_sweep.judge.verdict import STATUS_REASONS, Limits, judge
-from boulder_sweep.settings.fields import FIELDS, INPUTS, MAX_ELEMENTS
+from boulder_sweep.judge.verdict import Limits, judge
+from boulder_sweep.settings.fields import INPUTS
 
 SPARE = 4
 """Designs drawn for each one that is kept."""
-
-
-def admitted_table() -> Table:
-    """Return every bound of the settings; the reasons stand in the messages of refusals."""
-    table = Table(("entry", "least", "most", "unit"))
-    for field in FIELDS:
-        if field.admitted is not None:
-            low, high, _ = field.admitted
-            table.add(f"`{field.path}`", f"{low:g}", f"{high:g}", field.unit)
-    table.add("soil elements", "1", f"{MAX_ELEMENTS:g}", "1")
-    return table
-
-
-def refusal_table() -> Table:
-    """Return every reason for which a design of the box may have no result."""
-    table = Table(("status", "reason in the table"))
-    for status, reason in STATUS_REASONS.items():
-        table.add(f"`{Status(status).name}`", reason)
-    return table
 
 
 def box_designs(count: int, seed: int) -> Designs:
@@ -66,25 +45,33 @@ def box_designs(count: int, seed: int) -> Designs:
     return designs_of(block_of({name: values[kept] for name, values in given.items()}))
 
 
-@cache
-def box_shares_table(count: int = 4000, seed: int = 1) -> Table:
-    """Return how designs from the whole admitted box end, by the steps of `balanced` and by finer ones."""
+def box_endings(count: int = 4000, seed: int = 1) -> list[Counter[str]]:
+    """Count how designs from the whole admitted box end, by the steps of `balanced` and by finer ones."""
     designs = box_designs(count, seed)
     limits = Limits(float(np.radians(20.0)), "P1")
     control = Control(STEPS["balanced"].step_s, 1.0, limits.rotation, 0, True, longest_horizon=LONGEST_HORIZON)
     evaluation = Evaluation(corrected(), control, limits)
     once = judge(evaluation.simulate(designs.table, corrected(), control), designs, limits)
-    table = Table(("ends as", "by the usual steps", "with finer steps", "share"))
-    counts = [Counter(_endings(rows)) for rows in (once, evaluation.judged(designs))]
-    for ending in sorted({**counts[0], **counts[1]}, key=lambda word: -counts[1][word]):
-        table.add(ending, str(counts[0][ending]), str(counts[1][ending]), f"{counts[1][ending] / count:.1%}")
-    first, last = (sum(number for word, number in found.items() if is_left_open(word)) for found in counts)
-    table.add("undecided or refused, together", str(first), str(last), f"{last / count:.1%}")
-    return table
+    return [Counter(_endings(rows)) for rows in (once, evaluation.judged(designs))]
+
+
+def left_open(endings: Counter[str]) -> int:
+    """Return how many designs end undecided or refused."""
+    return sum(number for word, number in endings.items() if is_left_open(word))
+
+
+def box_words() -> str:
+    """Say how many designs from the whole admitted box end undecided or refused."""
+    usual, finer = box_endings()
+    share = left_open(finer) / finer.total()
+    return (
+        f"Of {finer.total()} designs drawn from the whole admitted box {left_open(finer)} ({share:.1%}) end undecided "
+        f"or refused; by the usual steps alone it would be {left_open(usual)}."
+    )
 
 
 def is_left_open(ending: str) -> bool:
-    """Whether an ending, as of `box_shares_table`, decides nothing."""
+    """Whether an ending of `box_endings` decides nothing."""
     return ending.startswith((VERDICTS[ERROR], VERDICTS[UNDECIDED]))
 
 

@@ -172,7 +172,6 @@ def region_words(grid: Path, least: int = LEAST) -> str:
     little = grid_evaluation(grid).judged(passes)["max_rotation_deg"] <= FREE_ROTATION_DEG
     share = (little & is_free(passes.table)).mean()
     return (
-        f"The free region: {ranges_words()} The worst design that {SEARCHES} searches find in it, from the worst drawn "
-        f"ones on by small changes, turns by {worst:.1f}° under a second opinion. "
-        f"{share:.0%} of the passes of M30 lie in it."
+        f"The free region: {ranges_words()} The worst design that {SEARCHES} searches find in it turns by {worst:.1f}° "
+        f"under a second opinion. {share:.0%} of the passes of M30 lie in it."
     )

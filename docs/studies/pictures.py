@@ -9,7 +9,7 @@ from pathlib import Path
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
-from boulder_sweep import load, need, read, run
+from boulder_sweep import load, need, read, run, uncertainty
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.crash_tests.fitting import fit_pulse
 from boulder_sweep.crash_tests.measured import read_pulse
@@ -19,19 +19,19 @@ from boulder_sweep.report import write_report
 from boulder_sweep.report.writing import browser
 from boulder_sweep.settings.loader import SECOND_OPINION
 from boulder_sweep.settings.sweep import Heading
-from boulder_sweep.views.crash_curves import FIGURES, draw_convergence, draw_crash_test, draw_rigid_wall
+from boulder_sweep.stones.weighing import scanned
+from boulder_sweep.views.crash_curves import FIGURES, draw_crash_test
 from boulder_sweep.views.verdict_map import draw_verdict_map
 from boulder_sweep.views.wording import terms_line
-from docs.studies.answers import SITE
+from docs.studies.answers import SITE, UNCERTAIN
 from docs.studies.contents import GRID
 from docs.studies.example_pulse import example_pulse
-from docs.studies.gallery import draw_sites
-from docs.studies.shapes import draw_shapes
-from docs.studies.stones import example_stone
 
 FOLDER = Path("docs/images")
 STILL_AT_S = 0.06
-BOREHOLE = "configs/borehole.yaml"
+ROCK, ROCK_KG = Path("docs/examples/rock.ply"), 23_500.0
+FILM = "film_rwg.gif"
+"""A boulder that holds, on the first screen of the README."""
 HEADING = Heading("Main Street", "City of Springfield", "North gate", "2026-11-28", "A", "C. Day", "E. Fox")
 MARGIN = 20
 """Beside a photographed sheet [px]."""
@@ -58,19 +58,18 @@ def draw_all(root: Path) -> list[Path]:
         drawn.append(folder / name)
         return drawn[-1]
 
-    for test in ("abg", "rwg"):
-        trajectory = simulate(crash_test(test))
-        trajectory.plot(named(f"trajectory_{test}.png"))
-        trajectory.plot_energy(named(f"energy_{test}.png"))
-        trajectory.plot_side_view(named(f"side_view_{test}.png"), time_s=STILL_AT_S)
+    overturned, held = (simulate(crash_test(test)) for test in ("abg", "rwg"))
+    overturned.plot_energy(named("energy_abg.png"))
+    held.plot_energy(named("energy_rwg.png"))
+    held.plot(named("trajectory_rwg.png"))
+    held.plot_side_view(named("side_view_rwg.png"), time_s=STILL_AT_S)
+    held.animate(named(FILM))
     found = validate()
-    draw_rigid_wall(found.wall, named("figure_10_rigid_wall.png"))
-    draw_convergence(found.convergence, named("convergence.png"))
     for test, (_, name) in FIGURES.items():
         draw_crash_test(test, {p: t for (own, p), t in found.trajectories.items() if own == test}, named(name))
     need(load(root / SITE)).plot(named("design_chart.png"))
-    example_stone(root).plot(named("stone.png"))
-    draw_shapes(named("shapes.png"))
+    uncertainty(load(root / UNCERTAIN)).plot(named("uncertain_site.png"))
+    scanned(root / ROCK, mass_kg=ROCK_KG).plot(named("stone.png"))
     with tempfile.TemporaryDirectory() as scratch:
         pulse = Path(scratch) / "pulse.csv"
         pulse.write_text(example_pulse(), encoding="utf-8")
@@ -80,13 +79,11 @@ def draw_all(root: Path) -> list[Path]:
         table, terms = read(Path(scratch) / "grid.sweep"), terms_line(sweep.resolved())
         draw_verdict_map(table, named("m30_sizing.png"), title=sweep.name, terms=terms)
         need(load(root / SITE)).write(Path(scratch) / "site.parquet")
-        need(load(root / BOREHOLE), probability=0.95).write(Path(scratch) / "borehole.parquet")
-        for name, units in (("site.parquet", "si"), ("grid.sweep", "si"), ("borehole.parquet", "us")):
-            page = write_report(Path(scratch) / name, Path(scratch) / "page.html", units=units, heading=HEADING)
-            photograph(page, named(f"report_{name.partition('.')[0]}.png"))
-    drawn += draw_sites(root, folder)
+        page = write_report(Path(scratch) / "site.parquet", Path(scratch) / "page.html", units="si", heading=HEADING)
+        photograph(page, named("report_site.png"))
     for path in drawn:
-        reduce_colours(path)
+        if path.name != FILM:
+            reduce_colours(path)
     return sorted(drawn)
 
 

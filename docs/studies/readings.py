@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from boulder_sweep.crash_tests.cases import crash_test
-from boulder_sweep.crash_tests.tables import Table, number
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
@@ -106,39 +105,6 @@ class ReadingsStudy:
         base = self.row(row.base).stands
         return int((row.stands & ~base).sum()), int((base & ~row.stands).sum())
 
-    def crash_test_table(self) -> Table:
-        """What every reading does to the crash tests."""
-        table = Table(
-            (
-                "readings",
-                "equations",
-                "ABG: 20° at [s]",
-                "ABG verdict",
-                "RWG: largest rotation [deg]",
-                "RWG: largest x_b [m]",
-                "RWG verdict",
-            )
-        )
-        for row in self.rows:
-            table.add(
-                row.label,
-                EQUATIONS.get(row.switch, ""),
-                number(row.abg_time_to_limit_s, 4, "never"),
-                row.abg_verdict,
-                number(row.rwg_rotation_deg, 3),
-                number(row.rwg_displacement_m, 4),
-                row.rwg_verdict,
-            )
-        return table
-
-    def grid_table(self) -> Table:
-        """What every reading does to the designs that stand."""
-        table = Table(("readings", "designs that stand", "stand only with it", "stand only without it"))
-        for row in self.rows:
-            moved = [f"{count / self.designs:.1%}" for count in self.changed(row)] if row.switch else ["", ""]
-            table.add(row.label, f"{row.share:.1%}", *moved)
-        return table
-
     def deciding(self) -> list[tuple[str, int]]:
         """Switches by how many verdicts of the grid they change from ``corrected``, most first."""
         rows = [row for row in self.rows if row.base == "corrected" and row.switch]
@@ -227,7 +193,7 @@ def readings_words(study: ReadingsStudy) -> str:
     (most, changes), (second, second_changes), (least, least_changes) = deciding[0], deciding[1], deciding[-1]
     gained, _ = study.changed(study.row("corrected", most))
     return points(
-        f"**`{most}` decides most verdicts.** Read as printed, everything else corrected, it changes "
+        f"**`{most}` decides most verdicts.** As printed, with everything else corrected, it changes "
         f"{changes / study.designs:.1%} of {study.designs:,} designs between standing and not, {gained / changes:.0%} "
         f"of them to standing. `{second}` comes next with {second_changes / study.designs:.1%}; `{least}` is the least "
         f"with {least_changes / study.designs:.1%}.",
@@ -264,6 +230,6 @@ def _strictness_words(study: ReadingsStudy) -> str:
     safe = [f"`{switch}`" for switch, (gained, _) in rows.items() if gained == 0]
     lax = [f"`{switch}`" for switch, (gained, lost) in rows.items() if gained > lost]
     return (
-        f"Seen from `corrected`, with the printed reading only fewer designs stand for {', '.join(safe) or 'none'}; "
-        f"more stand than fall for {', '.join(lax) or 'none'}: the unsafe side."
+        f"One printed formula among corrected ones is safe for {', '.join(safe) or 'none'}, as only fewer designs "
+        f"stand, and unsafe for {', '.join(lax) or 'none'}, as more stand than fall."
     )

@@ -6,11 +6,7 @@ import textwrap
 from pathlib import Path
 
 from boulder_sweep import load
-from boulder_sweep.settings.distributions import FRACTILE_5
-from boulder_sweep.settings.problems import Position
-from boulder_sweep.settings.soil_readings import soil_of
 from boulder_sweep.settings.sweep import derived_words
-from boulder_sweep.settings.tree import block_of
 from boulder_sweep.views.log_text import log_lines
 
 BOREHOLE, BOREHOLE_LOG = Path("configs/borehole.yaml"), Path("configs/borehole_log.yaml")
@@ -27,20 +23,3 @@ def drawing_of_log(root: Path) -> str:
     """Return the log of the example as `sweep check` draws it."""
     (log,) = load(root / BOREHOLE_LOG).derived["soil"]
     return "\n".join(["```text", *log_lines(log), "```"])
-
-
-def angles_of_counts(_: Path) -> str:
-    """Return the friction angles by some blow counts at 1.5 m, and what is taken of them."""
-    lines: list[str] = []
-    for n in (10, 16, 22, 30):
-        node = block_of(Position(""), {"n": f"{n}", "energy_ratio": "60 %", "depth": "1.5 m"})
-        soil = soil_of(node, "spt", ("friction_angle",), None)
-        mean, sd, (reading,) = soil["friction_angle_deg"], soil["friction_angle_sd_deg"], soil["readings"]
-        angles = reading["friction_angles_deg"]
-        if not lines:
-            lines = [f"| N | (N₁)₆₀ | {' | '.join(angles)} | taken | 5 % |", "|---" * (4 + len(angles)) + "|"]
-        shown = " | ".join(f"{angle:.1f}°" for angle in angles.values())
-        lines.append(
-            f"| {n} | {reading['n1_60']:.1f} | {shown} | {mean:.1f} ± {sd:g}° | {mean - FRACTILE_5 * sd:.1f}° |"
-        )
-    return "\n".join(lines)

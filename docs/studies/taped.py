@@ -196,7 +196,7 @@ def rocks_table() -> Table:
 def taped_table(grid: Path) -> Table:
     """Return how verdicts differ from those by the stones' own profiles."""
     own, found = verdicts(grid)
-    table = Table(("in place of the stone", "passes where it fails", "does not pass where it does"))
+    table = Table(("in place of the boulder itself", "passes where it fails", "does not pass where it does"))
     for name, passes in found.items():
         unsafe, lost = (f"{100.0 * np.mean(those):.1f} %" for those in (passes & ~own, own & ~passes))
         table.add(name, unsafe, lost)
@@ -210,6 +210,6 @@ def taped_words(grid: Path) -> str:
     length, width, height = (stones.given[side] for side in SIDES)
     fills = stones.given[BOULDER_MASS] / (stones.given["boulder_density_kg_m3"] * length * width * height)
     return (
-        f"{own.size} generated stones fill {fills.min():.0%} to {fills.max():.0%} of their sizes, half of them "
+        f"{own.size} generated boulders fill {fills.min():.0%} to {fills.max():.0%} of their sizes, half of them "
         f"{np.quantile(fills, 0.25):.0%} to {np.quantile(fills, 0.75):.0%}; by their own profiles {own.sum()} pass."
     )

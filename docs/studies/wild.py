@@ -11,7 +11,7 @@ import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Status, corrected, simulate_table
 from boulder_kernels.control import EVENT_TOLERANCE
-from boulder_kernels.table import finer_step, some_rows
+from boulder_kernels.table import some_rows
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.designs import impact_height_of_face
 from boulder_sweep.judge.accuracy import LONGEST_HORIZON, STEPS, Steps, accuracy_of
@@ -32,8 +32,6 @@ DESIGNS = 20_000
 """Of each family."""
 SEED = 7
 """Of the random numbers: not one of those by which `boulder_kernels.error_estimates` was chosen."""
-SECOND = 0.6
-"""A row is reported by a second solution if its step is shorter than that of one solution by this factor."""
 HOOD_M = 1.45
 """Height of the hood that strikes wide and flat boulders [m]."""
 FIRST_STEP_S = 0.004
@@ -118,8 +116,6 @@ class Compared(NamedTuple):
     """Share of these whose estimated error of the rotation is no smaller than the true one."""
     displacement: float
     """The same of the displacements, over all designs that both solutions or neither stopped at the limit."""
-    again: float
-    """Share of all designs that are reported by a second solution, by half the step or less."""
     wrong: int
     """Designs on the wrong side of the limit that are not undecided."""
 
@@ -134,8 +130,8 @@ def _solved(
     return simulate_table(table, corrected(), control)
 
 
-def _compared(found: OutcomeTable, known: OutcomeTable, step_s: float) -> Compared:
-    """Compare estimated with true errors, which are known to within the errors of `known`; `step_s` of one solution."""
+def _compared(found: OutcomeTable, known: OutcomeTable) -> Compared:
+    """Compare estimated with true errors, which are known to within the errors of `known`."""
     computed = np.isfinite(found.theta_max) & np.isfinite(known.theta_max)
     fell, falls = found.status == Status.LIMIT, known.status == Status.LIMIT
     standing, alike = computed & ~fell & ~falls, computed & (fell == falls)
@@ -147,26 +143,19 @@ def _compared(found: OutcomeTable, known: OutcomeTable, step_s: float) -> Compar
         math.degrees(float(turned[standing].max(initial=0.0))),
         float(np.mean((turned <= found.theta_error + known.theta_error)[standing])),
         float(np.mean((moved <= found.x_error + known.x_error)[alike])),
-        float(np.mean(found.step <= SECOND * step_s)),
         int((computed & (fell != falls) & ~unsure).sum()),
     )
 
 
 def _measured(designs: DesignTable) -> dict[str, Compared]:
-    """Compare the named accuracies, and two solutions of every design by the steps of ``balanced``."""
+    """Compare the named accuracies."""
     known = _solved(designs, Steps(REFERENCE_STEP_S, locate_yield=True), estimate=False)
     known.theta_error[:], known.x_error[:] = ROUNDING_RAD, ROUNDING_M
     found = {}
     for name, steps in STEPS.items():
         out = _solved(designs, steps, estimate=name != "fast")
-        found[name] = _compared(out, known, _step_of(name))
-    paired = _solved(designs, STEPS["balanced"], estimate=True, paired=True)
-    return found | {"two": _compared(paired, known, _step_of("balanced"))}
-
-
-def _step_of(accuracy: str) -> float:
-    """Return the step of a solution that needs no second one [s]."""
-    return STEPS[accuracy].step_s if accuracy == "fast" else finer_step(STEPS[accuracy].step_s)
+        found[name] = _compared(out, known)
+    return found
 
 
 def _known_late(designs: Designs) -> OutcomeTable:
@@ -210,14 +199,14 @@ def _measured_late(designs: Designs, grid: Path) -> dict[str, Compared]:
     for name in [name for name in STEPS if name != "fast"]:  # which leaves them undecided
         out = _judged_late(designs, grid, name)
         together = np.abs(out.t_end - known.t_end) < SAME_END_S
-        found[name] = _compared(some_rows(out, together), some_rows(known, together), _step_of(name))
+        found[name] = _compared(some_rows(out, together), some_rows(known, together))
     return found
 
 
 def _worst(families: list[Compared]) -> Compared:
     """Return the worst of each number, and how many designs stand and are wrong in all."""
-    standing, largest, rotation, displacement, again, wrong = zip(*families, strict=True)
-    return Compared(sum(standing), max(largest), min(rotation), min(displacement), max(again), sum(wrong))
+    standing, largest, rotation, displacement, wrong = zip(*families, strict=True)
+    return Compared(sum(standing), max(largest), min(rotation), min(displacement), sum(wrong))
 
 
 def _degrees(angle: float) -> str:
@@ -248,16 +237,15 @@ def wild_table(grid: Path, count: int = DESIGNS, seed: int = SEED) -> Table:
         found = dict(zip(families, pool.map(_measured, families.values()), strict=True))
     found["late, of all these"] = _measured_late(late_designs(count, seed), grid)
     wild = [by for family, by in found.items() if family not in usual]
-    found["worst of thirteen"] = {name: _worst([by[name] for by in wild if name in by]) for name in (*STEPS, "two")}
-    head = ("family", "designs that stand", *(f"`{name}` [°]" for name in STEPS), "by half the step")
-    table = Table((*head, "covered [%]", "by two", "by `fast`", "by `fine`", "wrong verdicts"))
+    found["worst of thirteen"] = {name: _worst([by[name] for by in wild if name in by]) for name in STEPS}
+    head = ("family", "designs that stand", *(f"`{name}` [°]" for name in STEPS))
+    table = Table((*head, "covered [%]", "wrong verdicts"))
     for family, by in found.items():
         table.add(
             family,
             f"{by['balanced'].standing:,}",
             *(_degrees(by[name].largest_deg) if name in by else "" for name in STEPS),
-            f"{by['balanced'].again:.1%}",
-            *(_covered(by[name]) if name in by else "" for name in ("balanced", "two", "fast", "fine")),
+            _covered(by["balanced"]),
             ", ".join(str(by[name].wrong) if name in by else "-" for name in STEPS),
         )
     return table

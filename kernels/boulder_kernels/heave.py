@@ -3,7 +3,7 @@
 The paper's motion is planar and smooth: the boulder neither rises nor rubs. Here its common centre of mass may rise by
 y_b, its foot rests on a base that pushes but does not pull, and everything that slips along the boulder rubs. The
 boulder moves both ways, the lumped soil sideways only, and so the weight and the base stand in for the couple of
-Eqs 37-39. Derivation, symbols and the choice of every constant: `docs/second_opinion.md`.
+Eqs 37-39. Derivation, symbols and the choice of every constant: `docs/model.md`.
 
 A point of the boulder at (a, b) from the common centre of mass, a to the right and b upwards, is at
 

@@ -305,7 +305,7 @@ def test_command_notices_a_mirrored_film(sweep: Command, tmp_path: Path) -> None
 
 
 def test_the_pull_of_the_page_gives_the_subgrade_reaction() -> None:
-    """docs/measuring.md: beta = F d / (1e6 W tan(phi) (u d^2 / 2 - theta d^3 / 3)), held against the kernels."""
+    """docs/validation.md: beta = F d / (1e6 W tan(phi) (u d^2 / 2 - theta d^3 / 3)), held against the kernels."""
     design = design_of(oracle.RWG)
     c = constants_of(design, bk.corrected(), 0)
     x_b, theta = 2e-3, 1e-3

@@ -19,7 +19,6 @@ EQUATIONS = (*range(1, 56), 101, 102, *range(105, 109), *range(131, 138), *range
 """Those of the paper, and those added to it."""
 WAYS = ("implemented", "derived", "explained")
 SWITCHES = ("inertia", "impact_arm", "contact", "restoring", "separation")
-_ROW = re.compile(r"^\| (\d+) \|(.*)\|$", re.MULTILINE)
 _CODE = re.compile(r"`([^`]+)`")
 _NUMBERS = re.compile(r"Eqs?\.? (\d+(?:(?:, | and | to |-|–| or )\d+)*)")
 
@@ -37,14 +36,11 @@ class Entry:
 
 
 def entries(text: str) -> list[Entry]:
-    """Return the rows of the register."""
+    """Return the rows of the register: a line of names, then cells between tabs."""
     found = []
-    for number, rest in _ROW.findall(text):
-        cells = [cell.strip() for cell in rest.split("|")]
-        meaning, way, functions, tests, reading = cells
-        found.append(
-            Entry(int(number), meaning, way, tuple(_CODE.findall(functions)), tuple(_CODE.findall(tests)), reading)
-        )
+    for line in text.splitlines()[1:]:
+        number, meaning, way, functions, tests, reading = line.split("\t")
+        found.append(Entry(int(number), meaning, way, tuple(functions.split()), tuple(tests.split()), reading))
     return found
 
 

@@ -12,7 +12,7 @@ from tests.docs.mutations import MUTATIONS, Mutation
 from tests.docs.register import entries
 
 ROOT = Path(__file__).parents[2]
-REGISTER = {entry.number: entry for entry in entries((ROOT / "docs" / "equations.md").read_text(encoding="utf-8"))}
+REGISTER = {entry.number: entry for entry in entries((ROOT / "docs" / "equations.tsv").read_text(encoding="utf-8"))}
 _PASSED = re.compile(r"^(\S+?::\w+).* PASSED", re.MULTILINE)
 
 

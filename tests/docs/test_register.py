@@ -10,7 +10,7 @@ import pytest
 from tests.docs.register import EQUATIONS, entries, mentioned, problems
 
 ROOT = Path(__file__).parents[2]
-TEXT = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
+TEXT = (ROOT / "docs" / "equations.tsv").read_text(encoding="utf-8")
 
 
 def test_register_is_complete() -> None:
@@ -39,21 +39,21 @@ def changed(pattern: str, replacement: str) -> str:
 @pytest.mark.parametrize(
     ("pattern", "replacement", "problem"),
     [
-        (r"^\| 16 \|.*\n", "", "16: missing"),
-        (r"^(\| 16 \|.*\n)", r"\1\1", "16: stands twice"),
+        (r"^16\t.*\n", "", "16: missing"),
+        (r"^(16\t.*\n)", r"\1\1", "16: stands twice"),
         (r"boulder_kernels\.design\.boulder_mass", "boulder_kernels.design.boulder_weight", "there is no function"),
         (r"boulder_kernels\.design\.boulder_mass", "boulder_kernels.rock.boulder_mass", "there is no function"),
         (r"RigidWall\.response", "RigidWall.answer", "there is no function"),
         (r"test_constants\.py::test_boulder", "test_constants.py::test_rock", "there is no test"),
         (r"tests/kernels/test_vehicle\.py::", "tests/kernels/test_truck.py::", "there is no test"),
-        (r"^(\| 15 \|[^|]*\|[^|]*\|)[^|]*\|", r"\1  |", "15: no function"),
-        (r"^(\| 15 \|[^|]*\|[^|]*\|[^|]*\|)[^|]*\|", r"\1  |", "15: no test"),
-        (r"^(\| 15 \|[^|]*\|) implemented", r"\1 somehow", "15: 'somehow' is none of"),
-        (r"^(\| 29 \|.*\|).*\|$", r"\1 so. |", "29: explained, but without"),
+        (r"^(15\t[^\t]*\t[^\t]*\t)[^\t]*", r"\1", "15: no function"),
+        (r"^(15\t[^\t]*\t[^\t]*\t[^\t]*\t)[^\t]*", r"\1", "15: no test"),
+        (r"^(15\t[^\t]*\t)implemented", r"\1somehow", "15: 'somehow' is none of"),
+        (r"^(29\t.*\t).*$", r"\1so.", "29: explained, but without"),
         (r"`inertia`", "`inertness`", "unknown reading"),
         (
-            r"^(\| 49 \|[^|]*\|[^|]*\|)[^|]*\|",
-            r"\1 `boulder_kernels.numerics.sine_versine` |",
+            r"^(49\t[^\t]*\t[^\t]*\t)[^\t]*",
+            r"\1boulder_kernels.numerics.sine_versine",
             "49: boulder_kernels.numerics.sine_versine do not mention it",
         ),
     ],
@@ -64,7 +64,7 @@ def test_what_is_lost_is_seen(pattern: str, replacement: str, problem: str) -> N
 
 def test_a_test_that_is_nightly_is_seen(tmp_path: Path) -> None:
     (tmp_path / "test_rare.py").write_text("import pytest\n\n@pytest.mark.nightly\ndef test_mass():\n    pass\n")
-    text = changed(r"^(\| 15 \|[^|]*\|[^|]*\|[^|]*\|)[^|]*\|", r"\1 `test_rare.py::test_mass` |")
+    text = changed(r"^(15\t[^\t]*\t[^\t]*\t[^\t]*\t)[^\t]*", r"\1test_rare.py::test_mass")
     assert "15: test test_rare.py::test_mass is nightly" in problems(text, tmp_path)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -72,12 +73,23 @@ def test_pages_from_elsewhere_are_in_it(site: Path) -> None:
         "quick_start.html": "Which boulder, buried how deep",
         "benchmarks/index.html": "numbalsoda",
         "command_line.html": "sweep fit-vehicle",
-        "reference/python.html": "boulder_sweep.runner.run.run",
+        "python.html": "boulder_sweep.runner.run.run",
+        "settings.html": "constant of horizontal subgrade reaction of the soil",
+        "columns.html": "a verdict that changes with the uncertain inputs",
+        "model.html": "tests/kernels/test_vehicle.py::test_lever_of_the_blow",
         "reference/kernels.html": "boulder_kernels.soil.closed_form",
         "notebooks/m30_sizing.html": "configs/m30_sizing.yaml",
     }
     for name, expected in words.items():
         assert expected in (site / name).read_text(encoding="utf-8"), name
+
+
+def test_the_search_finds_water_on_the_page_of_the_soil(site: Path) -> None:
+    found = json.loads((site / "search" / "search_index.json").read_text(encoding="utf-8"))["docs"]
+    titles = {entry["location"]: entry["title"].lower() for entry in found}
+    assert [place for place, title in titles.items() if "water table" in title] == [
+        "site.html#water-table-layers-cohesion-slope"
+    ]
 
 
 @pytest.mark.nightly
@@ -139,6 +151,12 @@ def test_a_notebook_becomes_a_page(tmp_path: Path) -> None:
     assert page.endswith("```text\n3\n```\n")
     assert "<table>\n</table>" in page, "as the theme styles tables"
     assert "<Figure>" not in page
+
+
+def test_tables_on_a_phone_scroll_as_wide_as_their_words(site: Path) -> None:
+    """The sheet is with every page, and no cell breaks a name."""
+    assert all("assets/tables.css" in page.read_text(encoding="utf-8") for page in site.glob("*.html"))
+    assert "max-width: 60em" in (site / "assets" / "tables.css").read_text(encoding="utf-8")
 
 
 def test_every_command_has_its_reference() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from pathlib import Path
 
 import numpy as np
@@ -381,11 +380,6 @@ def test_the_kernels_raise_the_flags_of_the_register() -> None:
     """All but one, which takes several judgements of a design."""
     assert tuple(flag.name for flag in FLAGS) == (*rules.FLAGS, CHANGES_SIDE)
     assert set(rules.UNSTUDIED) < set(rules.FLAGS)
-
-
-def test_the_page_names_every_flag() -> None:
-    page = (Path(__file__).parents[2] / "docs" / "validity.md").read_text()
-    assert re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE) == [flag.name for flag in FLAGS]
 
 
 CONTROL = Control(0.008, 1.0, math.radians(20.0), 0, True, longest_horizon=10.0)

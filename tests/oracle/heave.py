@@ -1,6 +1,6 @@
 """The second opinion: a boulder that may rise, on a base that only pushes, held by friction (Eqs 131 to 137).
 
-Written from `docs/second_opinion.md`. Every force acts at a point of the boulder, and generalised forces are the sum of
+Written from `docs/model.md`. Every force acts at a point of the boulder, and generalised forces are the sum of
 transposed Jacobians times forces. The masses, too, are points: the boulder's own centre, which also turns, and three
 points of lumped soil, whose sums of m_n, m_n d_n and m_n d_n^2 are the integrals over the depth. The truck is
 the jerk of Eq 45.
