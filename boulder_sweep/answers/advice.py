@@ -11,6 +11,7 @@ import numpy as np
 
 from boulder_sweep.answers.lightest import DEPTH, HEIGHT, RATIO
 from boulder_sweep.answers.recommendation import OF_A_DESIGN, Design, Nearest, Recommendation
+from boulder_sweep.answers.trials import USUALLY
 from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.designs import SIDES
 from boulder_sweep.judge.robustness import MEANINGS, can_be_asked
@@ -35,8 +36,6 @@ MOST_NAMED = 6
 """Most boulders that are named one by one because they will not do."""
 ROUNDED = 0.01
 """By how much a side may be less than the usual one for having been rounded."""
-USUALLY = (0.35, 0.75)
-"""Embedments, as shares of the height, in which another boulder is looked for; the study of grades has the same."""
 
 
 class Again(NamedTuple):
@@ -126,7 +125,7 @@ def _wider(need: Need, units: str) -> list[tuple[str, ...]]:
     options: list[tuple[str, ...]] = []
     if need.sweep.table is not None or not need.sweep.model.shape.is_box or BOULDER_MASS in given:
         return []
-    ratio = given[RATIO].values if RATIO in given else np.zeros(1)
+    ratio = np.array(USUALLY) if need.sweep.depth_sought else given[RATIO].values if RATIO in given else np.zeros(1)
     if ratio.min() > USUALLY[0] or ratio.max() < USUALLY[1]:
         options.append(("--set", f"site.embedment_ratio=[{USUALLY[0]:g}, {USUALLY[1]:g}]"))
     for name in SIDES[1:]:

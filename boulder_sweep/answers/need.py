@@ -84,6 +84,11 @@ class Need(Result):
             return (*derived, *SIDES, *EMBEDMENT)
         return (*derived, *EMBEDMENT) if self.key.name in EMBEDMENT else derived
 
+    @property
+    def seeks_depth(self) -> bool:
+        """Whether a depth was found for each answer."""
+        return self.sweep.depth_sought and self.key.name not in EMBEDMENT
+
     def counts(self) -> dict[str, int]:
         """Return the number of rows of each kind of answer."""
         counted = Counter(self.arrow["found"].to_pylist())

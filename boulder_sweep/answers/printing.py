@@ -358,10 +358,11 @@ def need_lines(
     if notes:
         remarks += [*volume_lines("\n".join(shown)), *_legend(need), *_grades(need), *_outside(need)]
         remarks.append(FOOT_WORDS[need.sweep.model.foot])
-    more = [word for word, given in (("--table", table), ("--notes", notes)) if not given]
-    if again is not None and more:
-        remarks.append(f"More: {', '.join(more)}")
-    return [*lines, *wrapped(remarks)]
+    shown_too = {"--table": table, "--notes": notes}
+    given = [(option,) for option, is_given in shown_too.items() if is_given]
+    left = () if again is None else [again.asking(*given, (option,)) for option in shown_too if (option,) not in given]
+    more = ["More:", *(f"  {command}" for command in left)] if left else []
+    return [*lines, *wrapped(remarks), *more]
 
 
 def _title(need: Need) -> str:
@@ -398,7 +399,8 @@ def screen_lines(need: Need, units: str = "si") -> list[str]:
     found, rows = need.recommendation, rows_of(_shown_part(need), units)
     lines: list[Row] = list(rows)
     columns = _need_columns(need, units)
-    if found is not None and found.conditions > 1 and need.sweep.table is None and need.key.name != BOULDER_MASS.name:
+    alone = need.key.name != BOULDER_MASS.name and not need.seeks_depth
+    if found is not None and found.conditions > 1 and need.sweep.table is None and alone:
         lines, columns = _by_boulder(need, rows, units)
     count = len(lines)
     if is_yard(need):
@@ -505,12 +507,13 @@ def _outside(need: Need) -> list[str]:
 def _edges(need: Need, units: str) -> list[str]:
     """Return at which ends of the ranges in the file the lightest boulders lie."""
     from boulder_sweep.answers.keys import sweep_ranges  # loads the kernels
+    from boulder_sweep.answers.trials import USUALLY
 
     passing = need.arrow.filter(need.arrow["passes_at"].is_valid())
     if not len(passing):
         return []
     value = {name: passing[name].to_numpy() for name in (*SIDES, DEPTH, "bumper_height_m")}
-    bounds = sweep_ranges(need.sweep)
+    bounds = sweep_ranges(need.sweep) | ({RATIO: USUALLY} if need.sweep.depth_sought else {})
     unit, metre = shown_unit("m", units)
     distances = {}
     for name in (*SIDES, DEPTH, RATIO):
@@ -541,6 +544,8 @@ def _need_columns(need: Need, units: str) -> list[Column]:
         columns += [(head_of(name, units), _where_it_passes(_length(name))) for name in (*SIDES, DEPTH)]
     else:
         columns.append((head_of(key.name, units), answer_cell(key, key.answer, "found", units)))
+        if need.seeks_depth:
+            columns.append((head_of(DEPTH, units), _where_it_passes(_length(DEPTH))))
         if key.name == DEPTH:
             columns.append((("ratio", "d/H"), _where_it_passes(lambda row: f"{row[DEPTH] / row[HEIGHT]:.3f}")))
             columns.append((("above", unit), _where_it_passes(lambda row: f"{row[HEIGHT] - row[DEPTH]:.2f}")))

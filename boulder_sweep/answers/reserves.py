@@ -106,12 +106,13 @@ def reserves(sweep: Sweep, *, jobs: int | None = None, progress: ProgressCallbac
 
     Raises
     ------
-    SettingsError
-        An input has a distribution.
+    QuestionError
+        The depth is to be found.
     TypeError, ValueError
         The number of jobs is not a whole number, or out of range.
     """
     sweep = at_values(sweep)
+    sweep.need_depth()
     judges = judges_of(sweep)
     judges.final.warm_up()
     calls = (call(_table, sweep, judges, start, stop) for start, stop in ranges(sweep.n_designs, ROWS_AT_ONCE))

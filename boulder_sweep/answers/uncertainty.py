@@ -131,7 +131,7 @@ def uncertainty(
     Raises
     ------
     QuestionError
-        No input has a distribution, or an argument is out of range.
+        No input has a distribution, the depth is to be found, or an argument is out of range.
     TypeError, ValueError
         The number of jobs is not a whole number, or out of range.
     """
@@ -143,7 +143,9 @@ def uncertainty(
         raise QuestionError(f"--confidence {confidence}: must be at least 50 % and less than 100 %")
     if seed < 0:
         raise QuestionError(f"--seed {seed}: must not be negative")
-    asked = _Asked(sweep, Spread(sweep), judges_of(sweep, least_margin), width, sure, most)
+    spread = Spread(sweep)
+    sweep.need_depth()
+    asked = _Asked(sweep, spread, judges_of(sweep, least_margin), width, sure, most)
     asked.judges.final.warm_up()
     points = Points(len(asked.spread.names), seed)
     threads = Pool(jobs)

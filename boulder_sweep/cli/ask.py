@@ -225,7 +225,7 @@ def uncertainty(
 CAPACITY_EXAMPLES = """\b
 Examples:
   sweep capacity configs/crash_tests.yaml
-  sweep capacity configs/site.yaml -o withstands.parquet
+  sweep capacity configs/clayey_terrace.yaml -o withstands.parquet
 """
 
 

@@ -153,9 +153,10 @@ def say_values(sweep: Sweep, units: str | None = None) -> None:
 
 
 def take_values(sweep: Sweep, at: str | None, quiet: bool, units: str | None = None) -> Sweep:
-    """Return settings with one value for every uncertain input, and print these values."""
+    """Return settings with a depth and one value for every uncertain input, and print these values."""
     from boulder_sweep.judge.quantiles import at_values
 
+    sweep.need_depth()
     sweep = at_values(sweep, at)
     if not quiet:
         say_values(sweep, units)

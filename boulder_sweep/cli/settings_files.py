@@ -55,7 +55,7 @@ def new(file: Path | None, vehicle: str | None, units: str | None, output: Path 
     with file.open("x", encoding="utf-8") as new_file:  # no link is followed that has come since
         new_file.write(starter(name, vehicle, "us" if units == "us" else "si", str(file)))
     if is_published(vehicle):
-        show(f"{file}: {load(file).n_designs:,} designs. Edit it, then: sweep need {shlex.quote(str(file))}")
+        show(f"{file}: {load(file).n_designs:,} designs. Edit it, then:", f"  sweep need {shlex.quote(str(file))}")
     else:
         show(*_lines_to_fill_in(file, vehicle, SYSTEMS.index(units)))
     return 0
@@ -100,7 +100,8 @@ def _lines_to_fill_in(file: Path, vehicle: str, units: int) -> list[str]:
         "    deceleration of the vehicle over time (or its displacement), then",
         f"    sweep fit-vehicle PULSE.csv --mass '{mass}'",
         "  vehicle.bed_offset: from the front bumper to the front of the cargo bed",
-        f"Then: sweep check {shlex.quote(str(file))}",
+        "Then:",
+        f"  sweep check {shlex.quote(str(file))}",
     ]
 
 
@@ -137,4 +138,6 @@ def check(grid: str, overrides: tuple[str, ...]) -> int:
         return EXIT_WRONG_USE
     logs = [log_lines(data, sweep.units) for data in sweep.derived.get("soil", ()) if "log" in data]
     show(f"{grid}: valid", *console.grid_lines(sweep), *(line for lines in logs for line in ("", *lines)))
+    if sweep.depth_sought:
+        show("next, the depth:", f"  {sweep.need_command}")
     return 0

@@ -338,7 +338,7 @@ def _inputs_of(table: pa.Table, given: dict[str, Any]) -> dict[str, Any]:
     inputs: dict[str, Any] = {}
     for name in (name for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS) if name in table.column_names):
         optional = name in OPTIONAL_COLUMNS and name not in given
-        if not (optional or isinstance(given.get(name), str)):
+        if not optional and (name == DEPTH or not isinstance(given.get(name), str)):
             values = table[name].unique().to_pylist()
             inputs[name] = values if len(values) > 1 else values[0]
     return inputs

@@ -328,6 +328,7 @@ def _build(name: str, heading: Heading, units: str, entries: Entries, overrides:
         overrides=overrides,
         heading=heading,
         units=units,
+        depth_sought=entries.depth_sought,
         derived=entries.derived,
         allowed=entries.allowed,
     )
