@@ -9,7 +9,7 @@ from pathlib import Path
 
 import click
 
-from boulder_sweep.cli.options import SYSTEMS, OutputPath, grid_argument, load_sweep, set_option
+from boulder_sweep.cli.options import SYSTEMS, OutputPath, grid_argument, say_notes, set_option
 from boulder_sweep.cli.output import say, show, wrap
 
 NEW_EXAMPLES = """\b
@@ -130,9 +130,11 @@ def check(grid: str, overrides: tuple[str, ...]) -> int:
     """
     from boulder_sweep.cli import console
     from boulder_sweep.errors import EXIT_WRONG_USE
+    from boulder_sweep.settings import load
     from boulder_sweep.views.log_text import log_lines
 
-    sweep = load_sweep(grid, overrides, quiet=False)
+    sweep = load(grid, overrides)
+    say_notes(sweep)
     if why := sweep.why_none_runs():
         say(f"{grid}: no design can be computed: {why}")
         return EXIT_WRONG_USE

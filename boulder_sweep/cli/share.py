@@ -14,11 +14,11 @@ from boulder_sweep.cli.options import (
     OUTPUT,
     Quantity,
     at_option,
-    load_sweep,
+    load_given,
     refuse_missing,
     result_argument,
+    say_notes,
     set_option,
-    take_values,
     units_option,
 )
 from boulder_sweep.cli.output import say, show
@@ -296,8 +296,10 @@ def explore(
         raise click.UsageError("--set changes entries of a file: name one")
     if case is None and at is not None:
         raise click.UsageError("--at is for a file with uncertain inputs: name one")
-    sweep = example() if case is None else take_values(load_sweep(case, overrides, False, units), at, False, units)
+    sweep = example() if case is None else load_given(case, overrides, at)
     refuse_missing(sweep, case or sweep.name, design)
+    if case is not None:
+        say_notes(sweep, units)
     target = Path(page or f"{sweep.name.replace('/', '-').replace(' ', '-')}.html")
     written = write_explorer(sweep, design, target, units=units, command=_command())
     _show_page(written)

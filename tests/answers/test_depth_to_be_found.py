@@ -129,7 +129,7 @@ def test_functions_refuse_it_too(tmp_path):
         lambda: boulder_sweep.simulate(sought),
         lambda: sought.block(0, 1),
     ):
-        with pytest.raises(QuestionError, match="site.embedment_depth is to be found"):
+        with pytest.raises(QuestionError, match=r"site\.embedment_depth is to be found"):
             compute()
     assert not (tmp_path / "out").exists()
 
@@ -187,7 +187,7 @@ def test_readings_count_to_below_the_deepest_foot_that_can_stop_the_truck(tmp_pa
     assert [reading.get("left_out") for reading in soil["readings"]] == [None, None, None, BELOW_FOOT]
     row = bare_need(boulder_sweep.at_values(sweep, "mean"))
     assert len(row) == 2
-    with pytest.raises(QuestionError, match="readings of the soil below 2.8 m were left out"):
+    with pytest.raises(QuestionError, match=r"readings of the soil below 2\.8 m were left out"):
         bare_need(boulder_sweep.at_values(sweep, "mean"), least="boulder.height", between=("2.4 m", "3.9 m"))
 
 

@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import boulder_sweep
-from boulder_sweep.answers.reserves import reserves
+from boulder_sweep.answers.reserves import capacity
 from boulder_sweep.cli.main import execute
 from boulder_sweep.columns import COLUMNS
 from boulder_sweep.errors import OlderRulesWarning, ReportError
@@ -283,7 +283,7 @@ def answers(tmp_path_factory):
     uncertain = load_text(ONE_SITE.replace("SPEED", "{mean: 13.4 m/s, cov: 5 %}"), Path("one.yaml"))
     found = {
         "need": bare_need(plain),
-        "capacity": reserves(plain),
+        "capacity": capacity(plain),
         "uncertainty": boulder_sweep.uncertainty(uncertain, half_width=0.1),
     }
     for name, one in found.items():

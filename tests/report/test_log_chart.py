@@ -22,7 +22,7 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 @pytest.fixture(scope="module")
 def settings():
     """Resolved settings of the example with a log."""
-    return load(CONFIGS / "borehole_log.yaml").resolved()
+    return load(CONFIGS / "borehole_log.yaml", ["site.embedment_depth=2.55 m"]).resolved()
 
 
 def test_readings_and_layers_are_those_of_the_log(settings):
