@@ -278,11 +278,10 @@ class _Words:
             return f" No other of the {found.boulders:,} {self.kind} qualifies."
         if found.alike == found.qualified:
             return f" It is {best} of {found.qualified:,} {self.kind} that qualify."
-        worse = found.qualified - found.alike
-        are = f"{worse:,} {'is' if worse == 1 else 'are'} not robust" if design.grade == "robust" else ""
-        are = are or f"a second opinion overturns {worse:,}"
-        one = "it is the other" if found.alike == 1 else f"it is {best} of the others"
-        return f" Of {found.qualified:,} {self.kind} that qualify, {are}; {one}."
+        robust, one = design.grade == "robust", found.alike == 1
+        these = "the only one" if one else f"{best} of the {found.alike:,}"
+        are = f"that {'is' if one else 'are'} robust" if robust else "that no second opinion overturns"
+        return f" {found.qualified:,} {self.kind} qualify; this is {these} {are}."
 
     def opinions(self, design: Design) -> str:
         """Return what second opinions say of a design."""

@@ -416,20 +416,21 @@ def screen_lines(need: Need, units: str = "si") -> list[str]:
 
 
 def is_yard(need: Need) -> bool:
-    """Return whether the depths of listed stones as weighed are asked for."""
+    """Return whether the depths of listed boulders as weighed are asked for."""
     return need.sweep.table is not None and BOULDER_MASS.name in need.sweep.table.columns and need.key.name == DEPTH
 
 
 def yard_lines(need: Need) -> list[str]:
-    """Return which stones of a yard serve at the site, the shallowest first; none of other questions."""
-    if not is_yard(need):
+    """Return which boulders of a yard serve at the site, the shallowest first; none of other questions."""
+    if not is_yard(need) or len(need) == 1:
         return []
     rows = _shown_part(need).to_pylist()
     serve = sorted((row for row in rows if row["passes_at"] is not None), key=lambda row: row["passes_at"])
     names = [" ".join(str(row[name]) for name in need.sweep.plan.labels or ("design_id",)) for row in serve]
     more = "" if len(names) <= MOST_SHOWN else f" and {len(names) - MOST_SHOWN} more"
     some = f": {', '.join(names[:MOST_SHOWN])}{more}" if names else ""
-    return [f"{len(serve)} of the {counted(len(rows), 'stone')} serve at this site{some}"]
+    does = "serves" if len(serve) == 1 else "serve"
+    return [f"{len(serve)} of the {counted(len(rows), 'boulder')} {does} at this site{some}"]
 
 
 def _by_boulder(need: Need, rows: Sequence[Row], units: str) -> tuple[list[Row], list[Column]]:

@@ -68,8 +68,11 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str | None, 
         if name in given:
             raise click.UsageError(f"--at {name} is given twice; give each column one value")
         given[name] = text
+    from boulder_sweep.answers.advice import advice
     from boulder_sweep.answers.outputs import AnswerFile, result_of
     from boulder_sweep.errors import PictureError
+    from boulder_sweep.report.answers import answer_of
+    from boulder_sweep.report.rows import read_rows
     from boulder_sweep.settings.sweep import units_in
     from boulder_sweep.views.pictures import checked_kind, require_matplotlib
     from boulder_sweep.views.slices import finished_pieces
@@ -90,6 +93,8 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str | None, 
     judged = finished.judged_by
     judged = f" {judged[0].upper()}{judged[1:]}." if judged else ""
     words = {"title": settings["name"], "terms": f"{terms_line(settings, units)}{judged}"}
+    if settings["model"].get("second_opinion"):  # else the page asks them, which takes long
+        words["found"] = advice(answer_of(read_rows(location_of(out))).need, units)[0]
     shown = draw_verdict_map(finished_pieces(finished), target, at=held, sets=sets, units=units, **words, **axes)
     for name, value in held.items():
         taken = shown.fixed.get(name, value)

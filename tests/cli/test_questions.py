@@ -421,6 +421,8 @@ vehicle: {mass: 15000 lb, speed: 20 mph, spring: 3103.3 kN/m, damper: 138.91 kN*
         encoding="utf-8",
     )
     _, out, _ = sweep("need", tmp_path / "yard.yaml", "-q", "--margin", "0")
-    assert "2 of the 3 stones serve at this site: good, deep" in out
+    assert "2 of the 3 boulders serve at this site: good, deep" in out
+    _, out, _ = sweep("need", tmp_path / "yard.yaml", "-q", "--margin", "0", "--set", "vehicle.speed=28 mph")
+    assert "1 of the 3 boulders serves at this site: good" in out
     places = [out.index(f"{name} ", out.index("stone  design")) for name in ("good", "deep", "flat")]
     assert places == sorted(places)
