@@ -196,9 +196,16 @@ class _Words:
             named = f"{self.length(row[HEIGHT])} boulder"
         else:
             sides = (f"{self.length(row[name])} {ALONG[name]}" for name in self.told_apart)
-            named = f"boulder {listed(tuple(sides))}".strip()
+            named = f"boulder {self.label(row)}{listed(tuple(sides))}".strip()
         rock = self.value("boulder_density_kg_m3", row["boulder_density_kg_m3"])
         return f"the {named} of {rock}" if self.rocks else f"the {named}"
+
+    def label(self, row: Mapping[str, Any]) -> str:
+        """Return what a list of weighed boulders calls one, before its sides; empty of other files."""
+        yard = self.need.sweep.table
+        if yard is None or BOULDER_MASS not in yard.columns or self.found.conditions > 1:
+            return ""
+        return "".join(f"{row[name]}, " for name in self.need.sweep.plan.labels if row.get(name))
 
     def everywhere(self) -> str:
         """Return in which soils and before which vehicles; empty where there is one of each."""

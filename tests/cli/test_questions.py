@@ -424,5 +424,6 @@ vehicle: {mass: 15000 lb, speed: 20 mph, spring: 3103.3 kN/m, damper: 138.91 kN*
     assert "2 of the 3 boulders serve at this site: good, deep" in out
     _, out, _ = sweep("need", tmp_path / "yard.yaml", "-q", "--margin", "0", "--set", "vehicle.speed=28 mph")
     assert "1 of the 3 boulders serves at this site: good" in out
+    assert "the boulder good, 1.7 m long, 1.8 m wide and 2.8 m high (19.8 t)" in " ".join(out.split())
     places = [out.index(f"{name} ", out.index("stone  design")) for name in ("good", "deep", "flat")]
     assert places == sorted(places)
