@@ -259,7 +259,8 @@ class Question(ValueSearch):
             rows = self.open.rows(start, stop)
             first, last = range_of(self.sweep, self.key, rows, self.between)
             rows |= {SHARE: np.ones(stop - start)} if self.seeks_depth else {}
-            columns = self.trial(rows).with_values(np.arange(stop - start), last).columns
+            trial = Trial(self.key, self.judges, rows, self.sweep.criterion.min_overlap_m)
+            columns = trial.with_values(np.arange(stop - start), last).columns
             low, high = min(low, float(first.min())), max(high, float(last.max()))
             foot = max(foot, float(columns["embedment_depth_m"].to_numpy().max()))
         field = self.key.field

@@ -185,8 +185,8 @@ def test_readings_count_to_below_the_deepest_foot_that_can_stop_the_truck(tmp_pa
     (soil,) = sweep.derived["soil"]
     assert soil["foot_m"] == pytest.approx(2.4)
     assert [reading.get("left_out") for reading in soil["readings"]] == [None, None, None, BELOW_FOOT]
-    row = bare_need(boulder_sweep.at_values(sweep, "mean"))
-    assert len(row) == 2
+    assert len(bare_need(boulder_sweep.at_values(sweep, "mean"))) == 2
+    assert len(bare_need(sweep, least="boulder.width", probability=0.5)) == 2
     with pytest.raises(QuestionError, match=r"readings of the soil below 2\.8 m were left out"):
         bare_need(boulder_sweep.at_values(sweep, "mean"), least="boulder.height", between=("2.4 m", "3.9 m"))
 

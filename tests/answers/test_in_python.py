@@ -41,7 +41,7 @@ def test_numbers_of_numpy_and_bare_ones_are_values(site):
 
 def test_mistakes_of_a_mapping_are_named_by_their_entries(site):
     site["soil"]["friction_angle"] = 432
-    site["boulder"]["heigth"] = "3 m"
+    site["boulder"]["heights"] = "3 m"
     site["vehicle"]["speed"] = float("nan")
     with pytest.raises(SettingsError) as refused:
         boulder_sweep.load(site)
@@ -51,7 +51,7 @@ def test_mistakes_of_a_mapping_are_named_by_their_entries(site):
         "settings:",
     ]
     assert sorted(problem.key for problem in refused.value.problems) == [
-        "boulder.heigth",
+        "boulder.heights",
         "soil.friction_angle",
         "vehicle.speed",
     ]
