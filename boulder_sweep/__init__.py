@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from boulder_sweep.answers.need import Need as Need
     from boulder_sweep.answers.need import need as need
+    from boulder_sweep.answers.reserves import Reserves as Reserves
+    from boulder_sweep.answers.reserves import capacity as capacity
     from boulder_sweep.answers.uncertainty import Uncertainty as Uncertainty
     from boulder_sweep.answers.uncertainty import uncertainty as uncertainty
     from boulder_sweep.impact.simulation import Trajectory as Trajectory
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
 # Names are fetched at first use: the import of numba or pandas takes longer than checking a file.
 _PUBLIC = {
     "boulder_sweep.answers.need": ("Need", "need"),
+    "boulder_sweep.answers.reserves": ("Reserves", "capacity"),
     "boulder_sweep.answers.uncertainty": ("Uncertainty", "uncertainty"),
     "boulder_sweep.impact.simulation": ("Trajectory", "simulate"),
     "boulder_sweep.judge.quantiles": ("at_values",),

@@ -11,6 +11,7 @@ import numpy as np
 
 from boulder_sweep.answers.lightest import DEPTH, HEIGHT, RATIO
 from boulder_sweep.answers.recommendation import OF_A_DESIGN, Design, Nearest, Recommendation
+from boulder_sweep.answers.trials import USUALLY
 from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.designs import SIDES
 from boulder_sweep.judge.robustness import MEANINGS, can_be_asked
@@ -35,8 +36,6 @@ MOST_NAMED = 6
 """Most boulders that are named one by one because they will not do."""
 ROUNDED = 0.01
 """By how much a side may be less than the usual one for having been rounded."""
-USUALLY = (0.35, 0.75)
-"""Embedments, as shares of the height, in which another boulder is looked for; the study of grades has the same."""
 
 
 class Again(NamedTuple):
@@ -126,7 +125,7 @@ def _wider(need: Need, units: str) -> list[tuple[str, ...]]:
     options: list[tuple[str, ...]] = []
     if need.sweep.table is not None or not need.sweep.model.shape.is_box or BOULDER_MASS in given:
         return []
-    ratio = given[RATIO].values if RATIO in given else np.zeros(1)
+    ratio = np.array(USUALLY) if need.sweep.depth_sought else given[RATIO].values if RATIO in given else np.zeros(1)
     if ratio.min() > USUALLY[0] or ratio.max() < USUALLY[1]:
         options.append(("--set", f"site.embedment_ratio=[{USUALLY[0]:g}, {USUALLY[1]:g}]"))
     for name in SIDES[1:]:
@@ -197,9 +196,16 @@ class _Words:
             named = f"{self.length(row[HEIGHT])} boulder"
         else:
             sides = (f"{self.length(row[name])} {ALONG[name]}" for name in self.told_apart)
-            named = f"boulder {listed(tuple(sides))}".strip()
+            named = f"boulder {self.label(row)}{listed(tuple(sides))}".strip()
         rock = self.value("boulder_density_kg_m3", row["boulder_density_kg_m3"])
         return f"the {named} of {rock}" if self.rocks else f"the {named}"
+
+    def label(self, row: Mapping[str, Any]) -> str:
+        """Return what a list of weighed boulders calls one, before its sides; empty of other files."""
+        yard = self.need.sweep.table
+        if yard is None or BOULDER_MASS not in yard.columns or self.found.conditions > 1:
+            return ""
+        return "".join(f"{row[name]}, " for name in self.need.sweep.plan.labels if row.get(name))
 
     def everywhere(self) -> str:
         """Return in which soils and before which vehicles; empty where there is one of each."""
@@ -279,11 +285,10 @@ class _Words:
             return f" No other of the {found.boulders:,} {self.kind} qualifies."
         if found.alike == found.qualified:
             return f" It is {best} of {found.qualified:,} {self.kind} that qualify."
-        worse = found.qualified - found.alike
-        are = f"{worse:,} {'is' if worse == 1 else 'are'} not robust" if design.grade == "robust" else ""
-        are = are or f"a second opinion overturns {worse:,}"
-        one = "it is the other" if found.alike == 1 else f"it is {best} of the others"
-        return f" Of {found.qualified:,} {self.kind} that qualify, {are}; {one}."
+        robust, one = design.grade == "robust", found.alike == 1
+        these = "the only one" if one else f"{best} of the {found.alike:,}"
+        are = f"that {'is' if one else 'are'} robust" if robust else "that no second opinion overturns"
+        return f" {found.qualified:,} {self.kind} qualify; this is {these} {are}."
 
     def opinions(self, design: Design) -> str:
         """Return what second opinions say of a design."""

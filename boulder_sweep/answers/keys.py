@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boulder_sweep.answers.spread import narrowed
+from boulder_sweep.answers.trials import LEAST_RATIO
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.fields import BOULDER_MASS, UnknownNameError, named
@@ -36,9 +37,6 @@ STEPS = {
     "N*s/m": 100.0,
 }
 """Spacing of the values tried, by unit."""
-LEAST_RATIO = 0.35
-"""Smallest embedment tried where the file sets no range, as a share of the height. A boulder that is hardly embedded
-may slide a metre instead of turning, and pass; buried deeper, it is held at its foot and overturns."""
 MILDEST = {"impact_speed_m_s": 0.0, "vehicle_mass_kg": 100.0}
 """A barrier must hold every smaller value of these inputs; a search for the largest begins at these (table units)."""
 STRONGEST = ("friction_angle_deg", "embedment_depth_m", "embedment_ratio")

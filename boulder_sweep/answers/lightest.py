@@ -28,7 +28,20 @@ from boulder_sweep.answers.search import (
     search,
     searched_again,
 )
-from boulder_sweep.answers.trials import InputRows, Judges, Open, Remembered, beyond_reach, block_at, rows_at
+from boulder_sweep.answers.trials import (
+    MILLIMETRES,
+    SHARE,
+    USUALLY,
+    InputRows,
+    Judges,
+    Open,
+    Remembered,
+    beyond_reach,
+    block_at,
+    depth_within,
+    millimetres,
+    rows_at,
+)
 from boulder_sweep.designs import SIDES
 from boulder_sweep.errors import QuestionError
 
@@ -38,13 +51,9 @@ if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
     from boulder_sweep.settings import Sweep
 
-SHARE = "share"
-"""Depth between the shallowest (0) and the deepest (1) that a boulder may have, searched like a side."""
 SCALE = "scale"
 """Scale of all sides together, searched where the file gives a single boulder."""
 HEIGHT, DEPTH, RATIO = "boulder_height_m", "embedment_depth_m", "embedment_ratio"
-MILLIMETRES = 1000
-"""Sides and depths are whole millimetres."""
 SCALES = (0.5, 2.0)
 """If the file gives a single boulder, it is scaled within these bounds at constant proportions."""
 COARSE, FINE = 7, 5
@@ -97,10 +106,12 @@ class LightestQuestion:
         self.sweep, self.key, self.judges = sweep, key, judges
         self.bounds = sweep_ranges(sweep)
         self.bounds |= {name: (value, value) for name, value in sweep.constants.items()}
+        self.bounds |= {RATIO: USUALLY} if sweep.depth_sought else {}
         self.free = [side for side in SIDES if self.bounds[side][0] < self.bounds[side][1]]
         self.open = Open(sweep, (*SIDES, DEPTH))
         if not self.free and RATIO in self.bounds:  # with a free side no boulder is taller than one of the file
-            foot = self.bounds[RATIO][1] * self.bounds[HEIGHT][1] * SCALES[1]
+            tallest = self.bounds[HEIGHT][1] * SCALES[1]
+            foot = min(self.bounds[RATIO][1] * tallest, tallest - self.bounds["bumper_height_m"][0])
             refuse_deep(sweep, foot, "boulder.height a range, which bounds the search")
 
     @property
@@ -183,7 +194,7 @@ class Boulders:
             for (name, ends), offsets in zip(bounds.items(), lattices, strict=True):
                 values = chosen[name][:, None] + (ends[1] - ends[0]) / 2.0**round_ * offsets.ravel()
                 values = np.clip(values, *ends)
-                tried[name] = values if name == SHARE else _millimetres(values)
+                tried[name] = values if name == SHARE else millimetres(values)
             each = count ** len(bounds)
             index = np.repeat(np.arange(n), each)
             flat = {name: values.ravel() for name, values in tried.items()}
@@ -225,7 +236,7 @@ class Boulders:
         """Return all sides [m] from the lattice position of the one searched for (or of the scale) and the others."""
         fixed = {side: np.full(len(positions), self.asked.bounds[side][0]) for side in SIDES}
         if self.side == SCALE:
-            return {side: _millimetres(values * positions / MILLIMETRES) for side, values in fixed.items()}
+            return {side: millimetres(values * positions / MILLIMETRES) for side, values in fixed.items()}
         return fixed | {side: others[side] for side in SIDES if side in others} | {self.side: positions / MILLIMETRES}
 
     def depth(self, index: np.ndarray, height: np.ndarray, share: np.ndarray) -> np.ndarray:
@@ -233,18 +244,9 @@ class Boulders:
         bounds = self.asked.bounds
         low, high = (end * (height if RATIO in bounds else 1.0) for end in bounds[RATIO if RATIO in bounds else DEPTH])
         if np.array_equal(low, high):
-            return _millimetres(np.broadcast_to(low, height.shape))
-        deepest = np.clip(self._deepest(height, self.rows["bumper_height_m"][index]), low, high)
-        ends = np.ceil(low * MILLIMETRES - 1e-6) / MILLIMETRES, np.floor(deepest * MILLIMETRES + 1e-6) / MILLIMETRES
-        return np.clip(_millimetres(low + (deepest - low) * share), *ends)
-
-    def _deepest(self, height: np.ndarray, bumper: np.ndarray) -> np.ndarray:
-        """Return the greatest depth [m], in whole millimetres, at which the boulder's top overlaps the truck enough."""
-        overlap = self.asked.sweep.criterion.min_overlap_m
-        depth_mm = np.floor((height - bumper - overlap) * MILLIMETRES + 1e-6)
-        # By the very sums of the verdict, which may fall short by a bit where they are equal in decimals.
-        left = height - depth_mm / MILLIMETRES - bumper
-        return (depth_mm - ((left < overlap) | (left <= 0.0))) / MILLIMETRES
+            return millimetres(np.broadcast_to(low, height.shape))
+        bumper = self.rows["bumper_height_m"][index]
+        return depth_within(low, high, share, height, bumper, self.asked.sweep.criterion.min_overlap_m)
 
     def mass(self, index: np.ndarray, positions: np.ndarray, others: Sides) -> np.ndarray:
         """Mass of boulders [kg]."""
@@ -324,7 +326,7 @@ class Boulders:
                 values = np.where(rng.random(count) < 0.5, values, rng.random(count)).ravel()
                 tried[name] = values
             else:
-                tried[name] = _millimetres(values).ravel()
+                tried[name] = millimetres(values).ravel()
         masses = self.mass(index, self.positions(tried), tried)
         kept = masses < mass[index]
         return index[kept], rows_at(tried, kept), masses[kept]
@@ -353,8 +355,3 @@ def _least_of_each(index: np.ndarray, masses: np.ndarray) -> tuple[np.ndarray, n
     order = np.argsort(masses, kind="stable")
     rows, first = np.unique(index[order], return_index=True)
     return rows, order[first]
-
-
-def _millimetres(lengths: np.ndarray) -> np.ndarray:
-    """Round lengths [m] to whole millimetres."""
-    return np.rint(lengths * MILLIMETRES) / MILLIMETRES

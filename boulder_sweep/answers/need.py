@@ -8,6 +8,7 @@ run`` would judge them. If that disagrees, the row is searched again with the ac
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
@@ -36,13 +37,16 @@ from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.judge.robustness import can_be_asked
 from boulder_sweep.locations import Location
 from boulder_sweep.runner.pool import Pool, call
-from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.fields import EMBEDMENT
+from boulder_sweep.settings.loader import sweep_of
 from boulder_sweep.store.provenance import file_metadata
 from boulder_sweep.text import ProgressCallback
 
 if TYPE_CHECKING:
     import pyarrow as pa
+
+    from boulder_sweep.settings import Sweep
+    from boulder_sweep.settings.loader import Settings
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +88,11 @@ class Need(Result):
             return (*derived, *SIDES, *EMBEDMENT)
         return (*derived, *EMBEDMENT) if self.key.name in EMBEDMENT else derived
 
+    @property
+    def seeks_depth(self) -> bool:
+        """Whether a depth was found for each answer."""
+        return self.sweep.depth_sought and self.key.name not in EMBEDMENT
+
     def counts(self) -> dict[str, int]:
         """Return the number of rows of each kind of answer."""
         counted = Counter(self.arrow["found"].to_pylist())
@@ -109,10 +118,6 @@ class Need(Result):
             "recommendation": None if self.recommendation is None else self.recommendation.to_dict(),
             "rows": self.arrow.to_pylist(),
         }
-
-    def _repr_html_(self) -> str:
-        """Return the recommendation and the table of a screen, as a notebook shows them."""
-        return str(draw("notebook", "need_html", self))
 
     def write(self, path: str | Location) -> Location:
         """Write the answers to a Parquet file.
@@ -141,50 +146,8 @@ MARGIN = 0.25
 """Margin that is asked for where none is named."""
 
 
-@dataclass(frozen=True)
-class Asked:
-    """A question that can be answered. Made by `asked_of`.
-
-    Attributes
-    ----------
-    question : Question or LightestQuestion
-        The question.
-    probability : float or None
-        Probability of passing asked for.
-    prefer : str or None
-        What is least of the design that is recommended, a key of `PREFERENCES`; None for no recommendation.
-    """
-
-    question: Question | LightestQuestion
-    probability: float | None
-    prefer: str | None
-
-    def answers(self, jobs: int | None = None, progress: ProgressCallback | None = None) -> Need:
-        """Return the answers; arguments: see `need`."""
-        asked = self.question
-        judges, key = asked.judges, asked.key
-        judges.final.warm_up()
-        done = _Progress(progress, asked)
-        pieces = list(ranges(asked.count, asked.rows_at_once))
-        tables, simulated = [], 0
-        for table, count in Pool(jobs)(call(_table_of, asked, start, stop) for start, stop in pieces):
-            tables.append(table)
-            simulated += count
-            done.answered(len(table))
-        chance = self.probability
-        question = {"asked": key.answer, "margin": judges.least_margin}
-        question |= {} if chance is None else {"probability": chance}
-        question |= {"robust": True} if judges.robust else {}
-        table = joined_tables(tables, asked.sweep, judges, "boulder_sweep.need", question)
-        best = None if self.prefer is None else recommended(asked, table, self.prefer)
-        if best is not None:
-            metadata = table.schema.metadata | file_metadata({RECOMMENDATION: best.to_dict()})
-            table = table.replace_schema_metadata(metadata)
-        return Need(asked.sweep, table, key, judges.least_margin, simulated, chance, judges.robust, best)
-
-
 def need(
-    sweep: Sweep | str | Path,
+    sweep: Settings,
     least: str | None = None,
     *,
     most: str | None = None,
@@ -196,14 +159,15 @@ def need(
     prefer: str | None = "mass",
     jobs: int | None = None,
     progress: ProgressCallback | None = None,
+    ready: Callable[[], None] | None = None,
 ) -> Need:
     """Find the smallest value of an input that passes, for every combination of the others, and the design to build.
 
     Parameters
     ----------
     sweep
-        The sweep, or the path of its file. If the input asked for is an axis of its grid, the axis gives the search
-        range.
+        The sweep, the path of its file, or a mapping as of `boulder_sweep.load`. If the input asked for is an axis of
+        its grid, the axis gives the search range.
     least, most
         The input whose smallest or largest passing value is wanted; only one of the two.
         ``embedment_depth`` by default.
@@ -227,6 +191,8 @@ def need(
     progress
         Called as the search progresses, with how many rows of how many are answered; with a probability asked for,
         with how many values of how many are tried, from the threads that try them.
+    ready
+        Called once the question is known to be one that can be answered, before anything is computed.
 
     Returns
     -------
@@ -242,35 +208,7 @@ def need(
     TypeError, ValueError
         The number of jobs is not a whole number, or out of range.
     """
-    if isinstance(sweep, str | Path):
-        sweep = load(sweep)
-    asked = asked_of(
-        sweep,
-        least,
-        most=most,
-        margin=margin,
-        probability=probability,
-        seed=seed,
-        between=between,
-        robust=robust,
-        prefer=prefer,
-    )
-    return asked.answers(jobs, progress)
-
-
-def asked_of(
-    sweep: Sweep,
-    least: str | None = None,
-    *,
-    most: str | None = None,
-    margin: str | float | None = None,
-    probability: str | float | None = None,
-    seed: int = 0,
-    between: Ends = None,
-    robust: bool | None = None,
-    prefer: str | None = "mass",
-) -> Asked:
-    """Return a question, or refuse it, before anything is computed; arguments and errors: see `need`."""
+    sweep = sweep_of(sweep)
     if probability is None:
         sweep = at_values(sweep)
     if least and most:
@@ -311,9 +249,38 @@ def asked_of(
         raise QuestionError(
             "--robust and --probability cannot be used together: second opinions are not asked of the designs drawn"
         )
-    return Asked(
-        _question(sweep, key, between, judges_of(sweep, least_margin, robust=robust), chance, seed), chance, prefer
-    )
+    asked = _question(sweep, key, between, judges_of(sweep, least_margin, robust=robust), chance, seed)
+    if ready is not None:
+        ready()
+    return _answered(asked, chance, prefer, jobs, progress)
+
+
+def _answered(
+    asked: Question | LightestQuestion,
+    chance: float | None,
+    prefer: str | None,
+    jobs: int | None,
+    progress: ProgressCallback | None,
+) -> Need:
+    """Return the answers to a question; arguments: see `need`."""
+    judges, key = asked.judges, asked.key
+    judges.final.warm_up()
+    done = _Progress(progress, asked)
+    pieces = list(ranges(asked.count, asked.rows_at_once))
+    tables, simulated = [], 0
+    for table, count in Pool(jobs)(call(_table_of, asked, start, stop) for start, stop in pieces):
+        tables.append(table)
+        simulated += count
+        done.answered(len(table))
+    question = {"asked": key.answer, "margin": judges.least_margin}
+    question |= {} if chance is None else {"probability": chance}
+    question |= {"robust": True} if judges.robust else {}
+    table = joined_tables(tables, asked.sweep, judges, "boulder_sweep.need", question)
+    best = None if prefer is None else recommended(asked, table, prefer)
+    if best is not None:
+        metadata = table.schema.metadata | file_metadata({RECOMMENDATION: best.to_dict()})
+        table = table.replace_schema_metadata(metadata)
+    return Need(asked.sweep, table, key, judges.least_margin, simulated, chance, judges.robust, best)
 
 
 class _Progress:

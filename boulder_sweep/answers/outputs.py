@@ -26,7 +26,7 @@ from boulder_sweep.impact.recomputing import model_of
 from boulder_sweep.locations import Location
 from boulder_sweep.parquet import ParquetError, TableFile
 from boulder_sweep.settings import Sweep
-from boulder_sweep.settings.fields import BY_NAME, INPUTS
+from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT, INPUTS, TO_BE_FOUND
 from boulder_sweep.settings.model import Criterion
 from boulder_sweep.settings.problems import shorten
 from boulder_sweep.settings.stored import check_entries
@@ -379,6 +379,7 @@ def asked_sweep(identity: Mapping[str, Any], table: pa.Table) -> Sweep:
         criterion=Criterion(**settings["criterion"]),
         model=model_of(settings, Control(**identity["control"])),
         units=units_in(settings),
+        depth_sought=given.get(EMBEDMENT[1]) == TO_BE_FOUND,
         allowed=allowed_in(settings),
     )
 

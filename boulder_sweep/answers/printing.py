@@ -358,10 +358,11 @@ def need_lines(
     if notes:
         remarks += [*volume_lines("\n".join(shown)), *_legend(need), *_grades(need), *_outside(need)]
         remarks.append(FOOT_WORDS[need.sweep.model.foot])
-    more = [word for word, given in (("--table", table), ("--notes", notes)) if not given]
-    if again is not None and more:
-        remarks.append(f"More: {', '.join(more)}")
-    return [*lines, *wrapped(remarks)]
+    shown_too = {"--table": table, "--notes": notes}
+    given = [(option,) for option, is_given in shown_too.items() if is_given]
+    left = () if again is None else [again.asking(*given, (option,)) for option in shown_too if (option,) not in given]
+    more = ["More:", *(f"  {command}" for command in left)] if left else []
+    return [*lines, *wrapped(remarks), *more]
 
 
 def _title(need: Need) -> str:
@@ -398,7 +399,8 @@ def screen_lines(need: Need, units: str = "si") -> list[str]:
     found, rows = need.recommendation, rows_of(_shown_part(need), units)
     lines: list[Row] = list(rows)
     columns = _need_columns(need, units)
-    if found is not None and found.conditions > 1 and need.sweep.table is None and need.key.name != BOULDER_MASS.name:
+    alone = need.key.name != BOULDER_MASS.name and not need.seeks_depth
+    if found is not None and found.conditions > 1 and need.sweep.table is None and alone:
         lines, columns = _by_boulder(need, rows, units)
     count = len(lines)
     if is_yard(need):
@@ -414,20 +416,21 @@ def screen_lines(need: Need, units: str = "si") -> list[str]:
 
 
 def is_yard(need: Need) -> bool:
-    """Return whether the depths of listed stones as weighed are asked for."""
+    """Return whether the depths of listed boulders as weighed are asked for."""
     return need.sweep.table is not None and BOULDER_MASS.name in need.sweep.table.columns and need.key.name == DEPTH
 
 
 def yard_lines(need: Need) -> list[str]:
-    """Return which stones of a yard serve at the site, the shallowest first; none of other questions."""
-    if not is_yard(need):
+    """Return which boulders of a yard serve at the site, the shallowest first; none of other questions."""
+    if not is_yard(need) or len(need) == 1:
         return []
     rows = _shown_part(need).to_pylist()
     serve = sorted((row for row in rows if row["passes_at"] is not None), key=lambda row: row["passes_at"])
     names = [" ".join(str(row[name]) for name in need.sweep.plan.labels or ("design_id",)) for row in serve]
     more = "" if len(names) <= MOST_SHOWN else f" and {len(names) - MOST_SHOWN} more"
     some = f": {', '.join(names[:MOST_SHOWN])}{more}" if names else ""
-    return [f"{len(serve)} of the {counted(len(rows), 'stone')} serve at this site{some}"]
+    does = "serves" if len(serve) == 1 else "serve"
+    return [f"{len(serve)} of the {counted(len(rows), 'boulder')} {does} at this site{some}"]
 
 
 def _by_boulder(need: Need, rows: Sequence[Row], units: str) -> tuple[list[Row], list[Column]]:
@@ -505,12 +508,13 @@ def _outside(need: Need) -> list[str]:
 def _edges(need: Need, units: str) -> list[str]:
     """Return at which ends of the ranges in the file the lightest boulders lie."""
     from boulder_sweep.answers.keys import sweep_ranges  # loads the kernels
+    from boulder_sweep.answers.trials import USUALLY
 
     passing = need.arrow.filter(need.arrow["passes_at"].is_valid())
     if not len(passing):
         return []
     value = {name: passing[name].to_numpy() for name in (*SIDES, DEPTH, "bumper_height_m")}
-    bounds = sweep_ranges(need.sweep)
+    bounds = sweep_ranges(need.sweep) | ({RATIO: USUALLY} if need.sweep.depth_sought else {})
     unit, metre = shown_unit("m", units)
     distances = {}
     for name in (*SIDES, DEPTH, RATIO):
@@ -541,6 +545,8 @@ def _need_columns(need: Need, units: str) -> list[Column]:
         columns += [(head_of(name, units), _where_it_passes(_length(name))) for name in (*SIDES, DEPTH)]
     else:
         columns.append((head_of(key.name, units), answer_cell(key, key.answer, "found", units)))
+        if need.seeks_depth:
+            columns.append((head_of(DEPTH, units), _where_it_passes(_length(DEPTH))))
         if key.name == DEPTH:
             columns.append((("ratio", "d/H"), _where_it_passes(lambda row: f"{row[DEPTH] / row[HEIGHT]:.3f}")))
             columns.append((("above", unit), _where_it_passes(lambda row: f"{row[HEIGHT] - row[DEPTH]:.2f}")))

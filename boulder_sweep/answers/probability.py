@@ -16,7 +16,12 @@ from boulder_sweep.answers.chance import SCRAMBLINGS, Points, Sampled, chance
 from boulder_sweep.answers.draws import WORST, Draws
 from boulder_sweep.answers.keys import Ends, Key, range_of
 from boulder_sweep.answers.lightest import DEPTH, RATIO, Boulders, LightestQuestion, Sides
-from boulder_sweep.answers.questions import CHECKED_AT_ONCE, Answers, Question, Trial
+from boulder_sweep.answers.questions import (
+    CHECKED_AT_ONCE,
+    Answers,
+    Question,
+    Trial,
+)
 from boulder_sweep.answers.search import BEYOND, FAILS, HOLDS, Search
 from boulder_sweep.answers.spread import Spread
 from boulder_sweep.answers.trials import (
@@ -137,9 +142,9 @@ class ProbabilityQuestion(Question):
         super().__init__(sweep, key, between, judges)
         self.sampling = Sampling(Spread(sweep, key.name), judges, probability, seed)
 
-    def trial(self, rows: InputRows) -> Trial:
-        """Return the object that tries values in some rows."""
-        return ProbabilityTrial(self, rows)
+    def trial(self, rows: InputRows, *, roughly: bool = False) -> Trial:
+        """Return the object that tries values in some rows, roughly by few points."""
+        return ProbabilityTrial(self, rows, self.sampling.few if roughly else self.sampling.points)
 
     def graded(self, judged: Judged, block: DesignBlock) -> Judged:
         """Return the outcomes at the means, without a grade."""
@@ -161,9 +166,9 @@ class ProbabilityQuestion(Question):
 class ProbabilityTrial(Trial):
     """Tries values of the input in some rows: whether the designs sampled with them pass often enough."""
 
-    def __init__(self, asked: ProbabilityQuestion, rows: InputRows) -> None:
-        super().__init__(asked.key, asked.judges, rows)
-        self.asked, self.draws = asked, asked.sampling.draws(rows)
+    def __init__(self, asked: ProbabilityQuestion, rows: InputRows, points: np.ndarray) -> None:
+        super().__init__(asked.key, asked.judges, rows, asked.sweep.criterion.min_overlap_m)
+        self.asked, self.draws, self.points = asked, asked.sampling.draws(rows), points
 
     def contradicted(self, result: Search) -> np.ndarray:
         """Return no rows: the designs drawn near a limit are judged with the accuracy of the sweep anyway."""
@@ -171,18 +176,24 @@ class ProbabilityTrial(Trial):
 
     def chances(self, positions: np.ndarray) -> Sampled:
         """Return the probabilities of passing at some values, one for each row."""
-        sampled = self.asked.sampling.chances(self.draws, {self.key.name: self.key.values(positions)})
+        inputs = self._inputs(self.block(np.arange(len(positions)), positions), positions)
+        sampled = self.asked.sampling.chances(self.draws, inputs)
         self.simulated += int(sampled.points.sum())
         return sampled
 
     def _codes(self, index: np.ndarray, positions: np.ndarray, *, quick: bool) -> np.ndarray:
         block, judged = self.judged(index, positions, quick=True)
         sampling = self.asked.sampling
-        codes = sampling.codes(self.draws, index, {self.key.name: self.key.values(positions)}, sampling.points)
-        self.simulated += DRAWN * len(index)
-        if self.asked.tried is not None:
+        codes = sampling.codes(self.draws, index, self._inputs(block, positions), self.points)
+        self.simulated += len(self.points) * len(index)
+        if self.asked.tried is not None and self.points is sampling.points:
             self.asked.tried(len(index))
         return np.where(beyond_reach(block, judged), BEYOND, codes)
+
+    def _inputs(self, block: DesignBlock, positions: np.ndarray) -> InputRows:
+        """Return what is tried of the designs of a block: the values, and the depths where they are searched, too."""
+        depths = {DEPTH: block.columns[DEPTH].to_numpy()} if self.asked.seeks_depth else {}
+        return {self.key.name: self.key.values(positions)} | depths
 
 
 class LikelyLightestQuestion(LightestQuestion):

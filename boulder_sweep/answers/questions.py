@@ -27,16 +27,21 @@ from boulder_sweep.answers.search import (
     steady,
 )
 from boulder_sweep.answers.trials import (
+    SHARE,
+    USUALLY,
     InputRows,
     Judges,
     Open,
     Remembered,
     beyond_reach,
     block_at,
+    depth_within,
     ranges,
+    rows_at,
     too_low,
     uncertain_rows,
 )
+from boulder_sweep.designs import block_of
 from boulder_sweep.judge.judged import UNDECIDED, with_rows
 from boulder_sweep.settings.fields import EMBEDMENT
 from boulder_sweep.settings.soil_readings import covered_depth
@@ -51,6 +56,10 @@ SHALLOW, SLIDES_M = 0.45, 0.1
 that pass, in stretches of 1 % of the value and less,"""
 FINE_CELLS = 400
 """and pieces into which its range is then cut."""
+DEPTH = EMBEDMENT[1]
+COARSE_DEPTHS, FINE_DEPTHS, DEPTH_ROUNDS = 7, 5, 5
+"""Number of depths, where it is to be found: on the first lattice, on each finer one, and of finer ones, each half as
+wide as the one before: in the end they are 1/128 of the range apart, some 10 mm."""
 
 if TYPE_CHECKING:
     from boulder_sweep.answers.chance import Sampled
@@ -122,9 +131,9 @@ class ValueSearch:
     def __init__(self, sweep: Sweep, key: Key, judges: Judges) -> None:
         self.sweep, self.key, self.judges = sweep, key, judges
 
-    def trial(self, rows: InputRows) -> Trial:
-        """Return the object that tries values in some rows."""
-        return Trial(self.key, self.judges, rows)
+    def trial(self, rows: InputRows, *, roughly: bool = False) -> Trial:
+        """Return the object that tries values in some rows; `roughly` where it is to compare depths alone."""
+        return Trial(self.key, self.judges, rows, self.sweep.criterion.min_overlap_m)
 
     def lattice(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the first and the last position that are searched between the ends of ranges."""
@@ -147,7 +156,7 @@ class ValueSearch:
         chances = trial.chances(result.shown)
         return Answers(
             block,
-            self._kinds(rows, result, judged, chances, high if not self.key.most else low),
+            self._kinds(trial, result, judged, chances, high if not self.key.most else low),
             np.where(result.has_fails, self.key.values(result.fails), np.nan),
             np.where(result.has_holds, self.key.values(result.holds), np.nan),
             self.graded(judged, block),
@@ -186,7 +195,7 @@ class ValueSearch:
         return shorter(result, steady(searched_again(whole, result, some, result.holds, last, self.cells)), last)
 
     def _kinds(
-        self, rows: InputRows, result: Search, judged: Judged, chances: Sampled | None, end: np.ndarray
+        self, trial: Trial, result: Search, judged: Judged, chances: Sampled | None, end: np.ndarray
     ) -> np.ndarray:
         """Return the kinds of the answers of some rows, codes of `WORDS`, shape (n,).
 
@@ -196,7 +205,7 @@ class ValueSearch:
         kind = result.kind.copy()
         none = np.flatnonzero(~result.has_holds & (kind != NOT_MONOTONE))
         if len(none):
-            last = block_at(rows, none, **{self.key.name: end[none]})
+            last = trial.with_values(none, end[none])
             kind[none] = np.where(too_low(last, self.sweep.criterion.min_overlap_m), BLOCKED, NEVER)
             kind[none[self.undecided(judged, chances)[none]]] = UNKNOWN
         return kind
@@ -230,7 +239,8 @@ class Question(ValueSearch):
     def __init__(self, sweep: Sweep, key: Key, between: Ends, judges: Judges) -> None:
         super().__init__(sweep, key, judges)
         self.between = between
-        self.open = Open(sweep, (key.name,))
+        self.seeks_depth = sweep.depth_sought and key.name not in EMBEDMENT
+        self.open = Open(sweep, (key.name, DEPTH) if self.seeks_depth else (key.name,))
         pieces = (self.open.rows(start, stop) for start, stop in ranges(self.count, CHECKED_AT_ONCE))
         refuse_narrow(sweep, key, pieces, between)  # also refuses a wrong range, before anything is computed
         if covered_depth(sweep.derived) < math.inf:
@@ -248,7 +258,9 @@ class Question(ValueSearch):
         for start, stop in ranges(self.count, CHECKED_AT_ONCE):
             rows = self.open.rows(start, stop)
             first, last = range_of(self.sweep, self.key, rows, self.between)
-            columns = block_at(rows, np.arange(stop - start), **{self.key.name: last}).columns
+            rows |= {SHARE: np.ones(stop - start)} if self.seeks_depth else {}
+            trial = Trial(self.key, self.judges, rows, self.sweep.criterion.min_overlap_m)
+            columns = trial.with_values(np.arange(stop - start), last).columns
             low, high = min(low, float(first.min())), max(high, float(last.max()))
             foot = max(foot, float(columns["embedment_depth_m"].to_numpy().max()))
         field = self.key.field
@@ -268,15 +280,56 @@ class Question(ValueSearch):
     def answered(self, start: int, stop: int) -> Answers:
         """Answer the rows ``[start, stop)``."""
         rows = uncertain_rows(self.open.sweep, self.open.rows(start, stop), start, stop)
-        answers = self.answers_of(rows, *range_of(self.sweep, self.key, rows, self.between))
+        ends, tried = range_of(self.sweep, self.key, rows, self.between), 0
+        if self.seeks_depth:
+            shares, tried = self._best_depths(rows, *ends)
+            rows |= {SHARE: shares}
+        answers = self.answers_of(rows, *ends)
+        answers = replace(answers, simulated=answers.simulated + tried)
         return replace(answers, block=replace(answers.block, labels=self.open.labels(start, stop)))
+
+    def _best_depths(self, rows: InputRows, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, int]:
+        """Return the depths, as `SHARE`, at which the answers of n designs are the best, and how many were simulated.
+
+        Depths lie on a lattice that is refined around the best of each row; of equally good ones the deepest is taken,
+        and where nothing passes the deepest of all.
+        """
+        n, simulated = len(low), 0
+        first, last = self.lattice(low, high)
+        best, chosen = np.full(n, -np.inf), np.full(n, 0.5)
+        for round_ in range(DEPTH_ROUNDS + 1):
+            count = FINE_DEPTHS if round_ else COARSE_DEPTHS
+            shares = np.clip(chosen[:, None] + np.linspace(0.5, -0.5, count) / 2.0**round_, 0.0, 1.0)
+            index = np.repeat(np.arange(n), count)
+            trial = self.trial(rows_at(rows, index) | {SHARE: shares.ravel()}, roughly=True)
+            result = search(trial.coarse, first[index], last[index], self.cells)
+            result = steady(result) if self.key.is_steady else result
+            simulated += trial.simulated
+            value = np.where(result.has_holds, result.holds if self.key.most else -result.holds, -np.inf)
+            column = value.reshape(n, count).argmax(axis=1)
+            found = value.reshape(n, count)[np.arange(n), column]
+            chosen = np.where(found > best, shares[np.arange(n), column], chosen)
+            best = np.maximum(best, found)
+        return np.where(np.isfinite(best), chosen, 1.0), simulated
 
 
 class Trial:
-    """Tries values of the input in some rows and counts the simulations."""
+    """Tries values of the input in some rows and counts the simulations.
 
-    def __init__(self, key: Key, judges: Judges, rows: InputRows) -> None:
-        self.key, self.judges, self.rows = key, judges, rows
+    Parameters
+    ----------
+    key
+        The input.
+    judges
+        How designs are judged.
+    rows
+        The other inputs; with `SHARE` in place of the depth, which then follows from the height.
+    least_overlap_m
+        By how much a boulder must overlap the bumper [m].
+    """
+
+    def __init__(self, key: Key, judges: Judges, rows: InputRows, least_overlap_m: float) -> None:
+        self.key, self.judges, self.rows, self.least_overlap_m = key, judges, rows, least_overlap_m
         self.simulated = 0
         self.slides = np.zeros(len(next(iter(rows.values()))), dtype=bool)
         """Rows of which some value that passes makes a shallow boulder slide, shape (n,)."""
@@ -305,8 +358,19 @@ class Trial:
         return block, judged
 
     def block(self, index: np.ndarray, positions: np.ndarray) -> DesignBlock:
+        """Return the designs with the values at some positions."""
+        return self.with_values(index, self.key.values(positions))
+
+    def with_values(self, index: np.ndarray, values: np.ndarray) -> DesignBlock:
         """Return the designs with these values."""
-        return block_at(self.rows, index, **{self.key.name: self.key.values(positions)})
+        inputs = {self.key.name: values}
+        if SHARE not in self.rows:
+            return block_at(self.rows, index, **inputs)
+        rows = rows_at(self.rows, index) | inputs
+        height, bumper, share = rows["boulder_height_m"], rows["bumper_height_m"], rows.pop(SHARE)
+        low, high = (end * height for end in USUALLY)
+        depth = depth_within(low, high, share, height, bumper, self.least_overlap_m)
+        return block_of(rows | {DEPTH: depth})
 
     def contradicted(self, result: Search) -> np.ndarray:
         """Return the rows of a quick search that the accuracy of the sweep does not confirm, shape (m,)."""

@@ -297,10 +297,12 @@ class _Boulders:
     def _sizes(self, rows: np.ndarray) -> list[dict[str, float]]:
         """Return what to try of a boulder that has an answer in all its rows: the value that all of them need.
 
-        Of the lightest boulders, which differ from row to row, each is tried.
+        Of depths that were found beside it, and of the lightest boulders, which differ from row to row, each is tried.
         """
         if isinstance(self.asked, Question):
-            return [{self.asked.key.name: float(self.passes[rows].max())}]
+            depths = [{DEPTH: depth} for depth in np.unique(self._column(DEPTH)[rows]).tolist()]
+            needed = {self.asked.key.name: float(self.passes[rows].max())}
+            return [needed | depth for depth in depths] if self.asked.seeks_depth else [needed]
         names = (*SIDES, DEPTH)
         sizes = np.unique(np.stack([self._column(name)[rows] for name in names]), axis=1)
         return [dict(zip(names, column.tolist(), strict=True)) for column in sizes.T]
@@ -343,8 +345,8 @@ class _Boulders:
 
     def holding(self, rows: np.ndarray, sizes: dict[str, float]) -> Design | None:
         """Return what was tried as a design; None where it fails in a row. Rows that it is the answer to are known."""
-        one = isinstance(self.asked, Question)
-        own = {name: self.passes if one else self._column(name) for name in sizes}
+        key = self.asked.key.name
+        own = {name: self.passes if name == key else self._column(name) for name in sizes}
         known = np.logical_and.reduce([own[name][rows] == value for name, value in sizes.items()])
         others = rows[~known]
         judged = self.judged(others, rows_at(self.given, others), sizes, self.asked.judges) if len(others) else []

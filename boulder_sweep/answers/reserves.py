@@ -29,12 +29,14 @@ from boulder_sweep.designs import block_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import Location
 from boulder_sweep.runner.pool import Pool, call
+from boulder_sweep.settings.loader import sweep_of
 from boulder_sweep.text import ProgressCallback
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
     from boulder_sweep.settings import Sweep
+    from boulder_sweep.settings.loader import Settings
 
 ROWS_AT_ONCE = 512
 MPH = 0.44704
@@ -69,7 +71,7 @@ RESERVES = (
 
 @dataclass(frozen=True, eq=False)
 class Reserves(Result):
-    """What the designs of a sweep withstand: inputs, outcome and withstood values of each. Made by `reserves`."""
+    """What the designs of a sweep withstand: inputs, outcome and withstood values of each. Made by `capacity`."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data."""
@@ -86,13 +88,13 @@ class Reserves(Result):
         return write_parquet(self.arrow, path)
 
 
-def reserves(sweep: Sweep, *, jobs: int | None = None, progress: ProgressCallback | None = None) -> Reserves:
+def capacity(sweep: Settings, *, jobs: int | None = None, progress: ProgressCallback | None = None) -> Reserves:
     """Find what every design of a sweep withstands.
 
     Parameters
     ----------
     sweep
-        The sweep.
+        The sweep, the path of its file, or a mapping as of `boulder_sweep.load`.
     jobs
         Threads; all cores by default.
     progress
@@ -106,17 +108,18 @@ def reserves(sweep: Sweep, *, jobs: int | None = None, progress: ProgressCallbac
 
     Raises
     ------
-    SettingsError
-        An input has a distribution.
+    QuestionError
+        The depth is to be found.
     TypeError, ValueError
         The number of jobs is not a whole number, or out of range.
     """
-    sweep = at_values(sweep)
+    sweep = at_values(sweep_of(sweep))
+    sweep.need_depth()
     judges = judges_of(sweep)
     judges.final.warm_up()
     calls = (call(_table, sweep, judges, start, stop) for start, stop in ranges(sweep.n_designs, ROWS_AT_ONCE))
     tables = collected(Pool(jobs)(calls), sweep.n_designs, progress)
-    return Reserves(sweep, joined_tables(tables, sweep, judges, "boulder_sweep.answers.reserves"))
+    return Reserves(sweep, joined_tables(tables, sweep, judges, "boulder_sweep.capacity"))
 
 
 def classes(

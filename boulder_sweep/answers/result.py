@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_sweep.columns import DESIGN_ID, REASONS
+from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.quantities import QUANTITIES, quantities
 from boulder_sweep.locations import Location, location_of, put, replacing
@@ -54,6 +55,10 @@ class Result:
 
     def __len__(self) -> int:
         return len(self.arrow)
+
+    def _repr_html_(self) -> str:
+        """Return what the command prints, as a notebook shows it."""
+        return str(draw("notebook", "html_of", self))
 
     @property
     def frame(self) -> pd.DataFrame:

@@ -29,6 +29,16 @@ ends below the impact height of the file."""
 ROUNDING_M = 1e-9
 """What sums of heights may be off by [m]."""
 PLACEHOLDER = 0.5
+SHARE = "share"
+"""Depth between the shallowest (0) and the deepest (1) that a boulder may have, searched like a side."""
+MILLIMETRES = 1000
+"""Sides and depths are whole millimetres."""
+LEAST_RATIO = 0.35
+"""Smallest embedment tried where the file sets no range, as a share of the height. A boulder that is hardly embedded
+may slide a metre instead of turning, and pass; buried deeper, it is held at its foot and overturns."""
+USUALLY = (LEAST_RATIO, 0.75)
+"""Embedments, as shares of the height, in which a depth is searched beside another input; the study of grades has the
+same."""
 SEARCHED = ("verdict", "reason", "margin", "time_to_limit_s", "max_displacement_m")
 GRADED = ("robustness", "stands_under")
 """Outcomes that searches look at; others are not worked out for the many designs that are only tried."""
@@ -59,7 +69,10 @@ class Open:
             table = DesignList(table.file, kept, table.labels) if kept else None
         axes = tuple(axis for axis in sweep.axes if axis.name not in self._left_out)
         cases = tuple(Open(case, names).sweep for case in sweep.cases)
-        self.sweep: Sweep = dataclasses.replace(sweep, axes=axes, constants=constants, table=table, cases=cases)
+        sought = sweep.depth_sought and fields.EMBEDMENT[1] not in self._left_out
+        self.sweep: Sweep = dataclasses.replace(
+            sweep, axes=axes, constants=constants, table=table, cases=cases, depth_sought=sought
+        )
 
     @property
     def count(self) -> int:
@@ -115,6 +128,42 @@ class Judges:
         if self.robust:
             passes &= standing(judged)
         return passes & (judged["margin"] >= self.least_margin) if self.least_margin > 0.0 else passes
+
+
+def depth_within(
+    low: np.ndarray | float,
+    high: np.ndarray | float,
+    share: np.ndarray,
+    height: np.ndarray,
+    bumper: np.ndarray,
+    least_overlap_m: float,
+) -> np.ndarray:
+    """Return depths [m], whole millimetres, from shares between the shallowest (0) and the deepest (1), shape (n,).
+
+    Parameters
+    ----------
+    low, high
+        The least and the greatest depth [m] that may be tried. The deepest is less where the truck would go over the
+        boulder.
+    share
+        The shares.
+    height, bumper
+        Heights of the boulders, and of the bumpers over the ground [m].
+    least_overlap_m
+        By how much the boulder must overlap the bumper [m].
+    """
+    deepest_mm = np.floor((height - bumper - least_overlap_m) * MILLIMETRES + 1e-6)
+    # By the very sums of the verdict, which may fall short by a bit where they are equal in decimals.
+    left = height - deepest_mm / MILLIMETRES - bumper
+    deepest_mm -= (left < least_overlap_m) | (left <= 0.0)
+    deepest = np.clip(deepest_mm / MILLIMETRES, low, high)
+    ends = np.ceil(low * MILLIMETRES - 1e-6) / MILLIMETRES, np.floor(deepest * MILLIMETRES + 1e-6) / MILLIMETRES
+    return np.clip(millimetres(low + (deepest - low) * share), *ends)
+
+
+def millimetres(lengths: np.ndarray) -> np.ndarray:
+    """Round lengths [m] to whole millimetres."""
+    return np.rint(lengths * MILLIMETRES) / MILLIMETRES
 
 
 class Remembered:

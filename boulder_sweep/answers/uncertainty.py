@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +29,7 @@ from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.locations import Location
 from boulder_sweep.runner.pool import Pool
+from boulder_sweep.settings.loader import sweep_of
 from boulder_sweep.store.provenance import PREFIX
 from boulder_sweep.text import ProgressCallback
 
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from boulder_sweep.settings import Sweep
+    from boulder_sweep.settings.loader import Settings
 
 ROWS_AT_ONCE = 256
 STRATA = 8
@@ -97,7 +100,7 @@ class Uncertainty(Result):
 
 
 def uncertainty(
-    sweep: Sweep,
+    sweep: Settings,
     *,
     half_width: str | float = 0.01,
     confidence: str | float = 0.95,
@@ -106,13 +109,14 @@ def uncertainty(
     most: int = 1 << 16,
     jobs: int | None = None,
     progress: ProgressCallback | None = None,
+    ready: Callable[[], None] | None = None,
 ) -> Uncertainty:
     """Estimate the probability of passing for every design of a sweep with uncertain inputs.
 
     Parameters
     ----------
     sweep
-        The sweep; some of its inputs have distributions.
+        The sweep, the path of its file, or a mapping as of `boulder_sweep.load`; some inputs have distributions.
     half_width
         Largest half-width of the interval; sampling continues until it is reached.
     confidence
@@ -127,14 +131,17 @@ def uncertainty(
         Threads; all cores by default.
     progress
         Called as the sampling progresses.
+    ready
+        Called once the question is known to be one that can be answered, before anything is computed.
 
     Raises
     ------
     QuestionError
-        No input has a distribution, or an argument is out of range.
+        No input has a distribution, the depth is to be found, or an argument is out of range.
     TypeError, ValueError
         The number of jobs is not a whole number, or out of range.
     """
+    sweep = sweep_of(sweep)
     width, sure = share(half_width, "--half-width"), share(confidence, "--confidence")
     least_margin = margin_asked(margin)
     if not 1e-6 <= width <= 0.5:
@@ -143,7 +150,11 @@ def uncertainty(
         raise QuestionError(f"--confidence {confidence}: must be at least 50 % and less than 100 %")
     if seed < 0:
         raise QuestionError(f"--seed {seed}: must not be negative")
-    asked = _Asked(sweep, Spread(sweep), judges_of(sweep, least_margin), width, sure, most)
+    spread = Spread(sweep)
+    sweep.need_depth()
+    asked = _Asked(sweep, spread, judges_of(sweep, least_margin), width, sure, most)
+    if ready is not None:
+        ready()
     asked.judges.final.warm_up()
     points = Points(len(asked.spread.names), seed)
     threads = Pool(jobs)

@@ -16,7 +16,7 @@ from boulder_sweep.cli.options import (
     grid_argument,
     jobs_option,
     json_option,
-    load_sweep,
+    load_given,
     margin_option,
     quiet_option,
     refuse_missing,
@@ -25,7 +25,6 @@ from boulder_sweep.cli.options import (
     say_notes,
     say_percents,
     set_option,
-    take_values,
     units_option,
 )
 from boulder_sweep.cli.output import say, show, working
@@ -109,24 +108,27 @@ def need(
     criterion.min_overlap), `undecided` if the last value tried is, and `never` if neither.
     """
     from boulder_sweep.answers.advice import Again
-    from boulder_sweep.answers.need import asked_of
+    from boulder_sweep.answers.need import need as answer
     from boulder_sweep.answers.printing import need_lines
     from boulder_sweep.judge.quantiles import at_values
+    from boulder_sweep.settings import load
 
     refuse_units_of_json(units, as_json)
     if question["probability"] is not None and at is not None:
         raise click.UsageError("--at and --probability cannot be used together")
-    sweep = load_sweep(grid, overrides, quiet=True)
+    sweep = load(grid, overrides)
     units = units or sweep.units
     if question["probability"] is None:
         sweep = at_values(sweep, at)
-    asked = asked_of(sweep, **question)
     refuse_unwritable(out, picture)
-    if not quiet:
-        say_notes(sweep, units)
-        say_percents(margin=question["margin"], probability=question["probability"])
+
+    def say_how() -> None:
+        if not quiet:
+            say_notes(sweep, units)
+            say_percents(margin=question["margin"], probability=question["probability"])
+
     with working(quiet, of="designs" if question["probability"] is None else "values") as progress:
-        result = asked.answers(jobs, progress)
+        result = answer(sweep, **question, jobs=jobs, progress=progress, ready=say_how)
     if as_json:
         show(json.dumps(result.to_dict()))
     else:
@@ -200,16 +202,21 @@ def uncertainty(
     """
     from boulder_sweep.answers.printing import uncertainty_lines
     from boulder_sweep.answers.uncertainty import uncertainty as estimate
+    from boulder_sweep.settings import load
 
     refuse_units_of_json(units, as_json)
-    sweep = load_sweep(grid, overrides, quiet, units)
+    sweep = load(grid, overrides)
     units = units or sweep.units
     refuse_missing(sweep, grid, design)
     refuse_unwritable(out, picture)
-    if not quiet:
-        say_percents(margin=question["margin"], confidence=question["confidence"], half_width=question["half_width"])
+
+    def say_how() -> None:
+        if not quiet:
+            say_notes(sweep, units)
+            say_percents(**{name: question[name] for name in ("margin", "confidence", "half_width")})
+
     with working(quiet) as progress:
-        result = estimate(sweep, **question, progress=progress)
+        result = estimate(sweep, **question, progress=progress, ready=say_how)
     show(*([json.dumps(result.to_dict())] if as_json else uncertainty_lines(result, units=units)))
     if not quiet:
         drawn = sum(result.arrow["p_pass_designs"].to_pylist())
@@ -225,7 +232,7 @@ def uncertainty(
 CAPACITY_EXAMPLES = """\b
 Examples:
   sweep capacity configs/crash_tests.yaml
-  sweep capacity configs/site.yaml -o withstands.parquet
+  sweep capacity configs/clayey_terrace.yaml -o withstands.parquet
 """
 
 
@@ -254,14 +261,16 @@ def capacity(
     simulated; the standard rates by test.
     """
     from boulder_sweep.answers.printing import reserve_lines
-    from boulder_sweep.answers.reserves import reserves
+    from boulder_sweep.answers.reserves import capacity as withstood
 
     refuse_units_of_json(units, as_json)
-    sweep = take_values(load_sweep(grid, overrides, quiet, units), at, quiet, units)
+    sweep = load_given(grid, overrides, at)
     units = units or sweep.units
     refuse_unwritable(out)
+    if not quiet:
+        say_notes(sweep, units)
     with working(quiet) as progress:
-        result = reserves(sweep, jobs=jobs, progress=progress)
+        result = withstood(sweep, jobs=jobs, progress=progress)
     show(*([json.dumps(result.to_dict())] if as_json else reserve_lines(result, units=units)))
     if out is not None:
         result.write(out)

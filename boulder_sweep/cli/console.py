@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.columns import BY_NAME, VERDICTS, WAY_OUT
+from boulder_sweep.settings.fields import TO_BE_FOUND
 from boulder_sweep.settings.model import FOOT_WORDS, RESISTANCES
 from boulder_sweep.settings.shown_units import Shown, shown_column, shown_settings, shown_unit
 from boulder_sweep.stones.rock import ROCK_KG_M3
@@ -24,6 +25,8 @@ def grid_lines(sweep: Sweep) -> list[str]:
     count = counted(sweep.n_designs, "design")
     soil = sweep.model.ground.words_in(shown_unit("m", sweep.units), shown_unit("kPa", sweep.units))
     ground = [f"  {words}" for words in (soil, sweep.model.shape.words) if words]
+    if sweep.depth_sought:
+        ground.insert(0, f"  {'embedment_depth_m':<26}{TO_BE_FOUND:>15}")
     if sweep.table is not None:
         carried = f", with {', '.join(sweep.table.labels)}" if sweep.table.labels else ""
         return [f"{sweep.name}: {count} from {sweep.table.file}{carried}", *_uncertain_lines(sweep), *ground]

@@ -102,17 +102,15 @@ def talk_options(function: Command) -> Command:
     return command
 
 
-def load_sweep(
-    path: str, overrides: Sequence[str], quiet: bool, units: str | None = None, *, second_opinion: bool = False
-) -> Sweep:
-    """Load settings and print the notes on them; see `say_notes`."""
+def load_given(path: str, overrides: Sequence[str], at: str | None = None, *, second_opinion: bool = False) -> Sweep:
+    """Load settings for a command that needs a depth and one value for every uncertain input; nothing is said."""
+    from boulder_sweep.judge.quantiles import at_values
     from boulder_sweep.settings import load
     from boulder_sweep.settings.loader import SECOND_OPINION
 
     sweep = load(path, (*overrides, SECOND_OPINION) if second_opinion else overrides)
-    if not quiet:
-        say_notes(sweep, units)
-    return sweep
+    sweep.need_depth()
+    return at_values(sweep, at)
 
 
 def say_notes(sweep: Sweep, units: str | None = None) -> None:
@@ -150,16 +148,6 @@ def say_values(sweep: Sweep, units: str | None = None) -> None:
 
     if sweep.taken_at:
         say("\n".join(wrap(f"note: {words_of(sweep, units or sweep.units)}")))
-
-
-def take_values(sweep: Sweep, at: str | None, quiet: bool, units: str | None = None) -> Sweep:
-    """Return settings with one value for every uncertain input, and print these values."""
-    from boulder_sweep.judge.quantiles import at_values
-
-    sweep = at_values(sweep, at)
-    if not quiet:
-        say_values(sweep, units)
-    return sweep
 
 
 def refuse_missing(sweep: Sweep, path: str, number: int) -> None:

@@ -21,11 +21,12 @@ from boulder_sweep.cli.options import (
     at_option,
     grid_argument,
     json_option,
+    load_given,
     quantity_of,
     quiet_option,
     refuse_unwritable,
+    say_values,
     set_option,
-    take_values,
 )
 from boulder_sweep.cli.output import say, show, working
 
@@ -79,12 +80,13 @@ def tradeoff(
     sums over elements, both readings of the paper: errors, changed verdicts, and CPU time per design. With -o the table
     is written as Parquet, and a picture.
     """
-    from boulder_sweep.settings import load
     from boulder_sweep.tradeoff.study import measure
 
     if math.isnan(seconds):
         raise click.UsageError("--seconds nan: give a number of seconds")
-    sweep = take_values(load(grid, overrides), at, quiet)
+    sweep = load_given(grid, overrides, at)
+    if not quiet:
+        say_values(sweep)
     if out is not None:
         from boulder_sweep.views.pictures import make_folder, require_matplotlib
 

@@ -16,11 +16,11 @@ from boulder_sweep.cli.options import (
     at_option,
     grid_argument,
     json_option,
-    load_sweep,
+    load_given,
     refuse_units_of_json,
+    say_notes,
     second_opinion_option,
     set_option,
-    take_values,
     talk_options,
     units_option,
 )
@@ -85,7 +85,9 @@ def run(
     if options["scheduler"] and options["backend"] != DASK:
         raise click.UsageError("--scheduler needs --backend dask")
     chosen = overrides if accuracy is None else (*overrides, f"--accuracy={accuracy}")
-    sweep = take_values(load_sweep(grid, chosen, quiet, second_opinion=second_opinion), at, quiet)
+    sweep = load_given(grid, chosen, at, second_opinion=second_opinion)
+    if not quiet:
+        say_notes(sweep)
     target = location_of(out or f"{sweep.name.replace(' ', '-')}.sweep")
     if dry_run:
         return _dry_run(sweep, target, options, as_json)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import click
 
-from boulder_sweep.cli.options import SYSTEMS, OutputPath, grid_argument, load_sweep, set_option
+from boulder_sweep.cli.options import SYSTEMS, OutputPath, grid_argument, say_notes, set_option
 from boulder_sweep.cli.output import say, show, wrap
 
 NEW_EXAMPLES = """\b
@@ -55,7 +55,7 @@ def new(file: Path | None, vehicle: str | None, units: str | None, output: Path 
     with file.open("x", encoding="utf-8") as new_file:  # no link is followed that has come since
         new_file.write(starter(name, vehicle, "us" if units == "us" else "si", str(file)))
     if is_published(vehicle):
-        show(f"{file}: {load(file).n_designs:,} designs. Edit it, then: sweep need {shlex.quote(str(file))}")
+        show(f"{file}: {load(file).n_designs:,} designs. Edit it, then:", f"  sweep need {shlex.quote(str(file))}")
     else:
         show(*_lines_to_fill_in(file, vehicle, SYSTEMS.index(units)))
     return 0
@@ -100,7 +100,8 @@ def _lines_to_fill_in(file: Path, vehicle: str, units: int) -> list[str]:
         "    deceleration of the vehicle over time (or its displacement), then",
         f"    sweep fit-vehicle PULSE.csv --mass '{mass}'",
         "  vehicle.bed_offset: from the front bumper to the front of the cargo bed",
-        f"Then: sweep check {shlex.quote(str(file))}",
+        "Then:",
+        f"  sweep check {shlex.quote(str(file))}",
     ]
 
 
@@ -129,12 +130,16 @@ def check(grid: str, overrides: tuple[str, ...]) -> int:
     """
     from boulder_sweep.cli import console
     from boulder_sweep.errors import EXIT_WRONG_USE
+    from boulder_sweep.settings import load
     from boulder_sweep.views.log_text import log_lines
 
-    sweep = load_sweep(grid, overrides, quiet=False)
+    sweep = load(grid, overrides)
+    say_notes(sweep)
     if why := sweep.why_none_runs():
         say(f"{grid}: no design can be computed: {why}")
         return EXIT_WRONG_USE
     logs = [log_lines(data, sweep.units) for data in sweep.derived.get("soil", ()) if "log" in data]
     show(f"{grid}: valid", *console.grid_lines(sweep), *(line for lines in logs for line in ("", *lines)))
+    if sweep.depth_sought:
+        show("next, the depth:", f"  {sweep.need_command}")
     return 0

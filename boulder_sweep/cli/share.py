@@ -14,11 +14,11 @@ from boulder_sweep.cli.options import (
     OUTPUT,
     Quantity,
     at_option,
-    load_sweep,
+    load_given,
     refuse_missing,
     result_argument,
+    say_notes,
     set_option,
-    take_values,
     units_option,
 )
 from boulder_sweep.cli.output import say, show
@@ -68,8 +68,11 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str | None, 
         if name in given:
             raise click.UsageError(f"--at {name} is given twice; give each column one value")
         given[name] = text
+    from boulder_sweep.answers.advice import advice
     from boulder_sweep.answers.outputs import AnswerFile, result_of
     from boulder_sweep.errors import PictureError
+    from boulder_sweep.report.answers import answer_of
+    from boulder_sweep.report.rows import read_rows
     from boulder_sweep.settings.sweep import units_in
     from boulder_sweep.views.pictures import checked_kind, require_matplotlib
     from boulder_sweep.views.slices import finished_pieces
@@ -90,6 +93,8 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str | None, 
     judged = finished.judged_by
     judged = f" {judged[0].upper()}{judged[1:]}." if judged else ""
     words = {"title": settings["name"], "terms": f"{terms_line(settings, units)}{judged}"}
+    if settings["model"].get("second_opinion"):  # else the page asks them, which takes long
+        words["found"] = advice(answer_of(read_rows(location_of(out))).need, units)[0]
     shown = draw_verdict_map(finished_pieces(finished), target, at=held, sets=sets, units=units, **words, **axes)
     for name, value in held.items():
         taken = shown.fixed.get(name, value)
@@ -296,8 +301,10 @@ def explore(
         raise click.UsageError("--set changes entries of a file: name one")
     if case is None and at is not None:
         raise click.UsageError("--at is for a file with uncertain inputs: name one")
-    sweep = example() if case is None else take_values(load_sweep(case, overrides, False, units), at, False, units)
+    sweep = example() if case is None else load_given(case, overrides, at)
     refuse_missing(sweep, case or sweep.name, design)
+    if case is not None:
+        say_notes(sweep, units)
     target = Path(page or f"{sweep.name.replace('/', '-').replace(' ', '-')}.html")
     written = write_explorer(sweep, design, target, units=units, command=_command())
     _show_page(written)

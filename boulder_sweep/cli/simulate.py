@@ -15,11 +15,11 @@ from boulder_sweep.cli.options import (
     OUTPUT,
     at_option,
     json_option,
-    load_sweep,
+    load_given,
     refuse_missing,
     refuse_unwritable_history,
+    say_notes,
     set_option,
-    take_values,
     talk_options,
     units_option,
 )
@@ -91,9 +91,11 @@ def simulate(
         sweep, designs = again.sweep, again.designs
         reason = again.stored["reason"] if again.trajectory is None else ""
     else:
-        sweep = take_values(load_sweep(case, overrides, quiet, units), at, quiet, units)
+        sweep = load_given(case, overrides, at)
         refuse_missing(sweep, case, number)
         refuse_unwritable_history(plot, trajectory, energy, animate)
+        if not quiet:
+            say_notes(sweep, units)
         designs, reason = sweep.n_designs, sweep.block(number, number + 1).reasons[0]
     in_json = units or "si"
     units = units or sweep.units

@@ -17,13 +17,12 @@ from boulder_sweep.cli.options import (
     Quantity,
     at_option,
     json_option,
-    load_sweep,
     margin_option,
     quantity_of,
     quiet_option,
     refuse_unwritable,
+    say_notes,
     set_option,
-    take_values,
 )
 from boulder_sweep.cli.output import say, show, working
 from boulder_sweep.stones.rock import ROCK_KG_M3
@@ -129,15 +128,20 @@ def _find_placing(
 ) -> Placing:
     """Find the best ways to stand at a site, among all or among some."""
     from boulder_sweep.answers.placing import placed
+    from boulder_sweep.judge.quantiles import at_values
+    from boulder_sweep.settings import load
 
     said = False
 
     def with_boulder(block: str) -> Sweep:
         """Return the site with a boulder; what is to be said of it is said once."""
         nonlocal said
-        said, silent = True, quiet or said
-        sweep = load_sweep(site, (*overrides, block), silent)
-        return sweep if at is None else take_values(sweep, at, silent)
+        sweep = load(site, (*overrides, block))
+        sweep = sweep if at is None else at_values(sweep, at)
+        if not (quiet or said):
+            say_notes(sweep)
+        said = True
+        return sweep
 
     if not any(standing.has_foot for standing in standings or scan.standings):
         raise click.UsageError("no way to stand has a flat foot; bed the stone in concrete")

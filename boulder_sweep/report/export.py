@@ -131,7 +131,10 @@ def _tables(finished: Exportable, units: str) -> Iterator[tuple[list[Shown], pa.
     """Yield the rows piece by piece in the requested units."""
     import pyarrow as pa
 
+    answers = finished.answers() if isinstance(finished, AnswerFile) and finished.kind == NEED else None
     for table in finished.tables():
+        if isinstance(answers, Need):
+            table = _without_tried(table, answers)
         if finished.judged_by:
             told = {
                 "unit": "",
@@ -146,6 +149,20 @@ def _tables(finished: Exportable, units: str) -> Iterator[tuple[list[Shown], pa.
                 values = in_unit(table.column(index).to_numpy(), column.size)
                 table = table.set_column(index, column.name, pa.array(values, from_pandas=True))
         yield columns, table.rename_columns([column.name for column in columns])
+
+
+def _without_tried(table: pa.Table, answers: Need) -> pa.Table:
+    """Return answers without the values tried last in rows that have no answer, and what came of these."""
+    import pyarrow.compute as pc
+
+    names, key = table.column_names, answers.key.name
+    tried = {key, *answers.derived, *names[names.index("passes_within") :]} - {"verdict", "reason"}
+    tried -= set() if key.startswith("boulder_") else {BOULDER_MASS}
+    passes = table["passes_at"].is_valid()
+    for name in tried & {*names}:
+        index = names.index(name)
+        table = table.set_column(index, table.field(index), pc.if_else(passes, table[name], None))
+    return table
 
 
 def _with_quantities(table: pa.Table, settings: Mapping[str, Any]) -> pa.Table:

@@ -91,7 +91,7 @@ def curves(panel: str) -> list[figure]:
         plot.add_layout(beside, "right")
         # The page shows this one in place of the other on narrow screens.
         below = Legend(items=beside.items, visible=False, location="top_left", spacing=4, margin=0)
-        below.label_text_font_size, below.glyph_width, below.glyph_height = "12px", 14, 14
+        below.glyph_width, below.glyph_height = 14, 14
         plot.add_layout(below, "below")
     figures = [rotation, displacement, force, energy]
     for plot in figures:

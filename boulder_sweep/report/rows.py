@@ -25,7 +25,7 @@ from boulder_sweep.judge.quantities import NEEDED, quantities_by
 from boulder_sweep.locations import Location
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.shape import Shape
-from boulder_sweep.store.reading import FinishedRows, read_row
+from boulder_sweep.store.reading import FinishedRows
 from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
@@ -242,7 +242,8 @@ class ResultRows:
         IndexError
             The table does not have this row (yet).
         """
-        table = self.finished.row(number) if isinstance(self.finished, AnswerFile) else read_row(self.folder, number)
+        finished = self.finished
+        table = finished.row(number) if isinstance(finished, AnswerFile) else finished.asked(number)
         row: dict[str, Any] = table.to_pylist()[0]
         if BOULDER_MASS in row and BOULDER_MASS not in self.settings["inputs"]:
             del row[BOULDER_MASS]  # answers tell it whether it was given or not
@@ -338,7 +339,7 @@ def _inputs_of(table: pa.Table, given: dict[str, Any]) -> dict[str, Any]:
     inputs: dict[str, Any] = {}
     for name in (name for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS) if name in table.column_names):
         optional = name in OPTIONAL_COLUMNS and name not in given
-        if not (optional or isinstance(given.get(name), str)):
+        if not optional and (name == DEPTH or not isinstance(given.get(name), str)):
             values = table[name].unique().to_pylist()
             inputs[name] = values if len(values) > 1 else values[0]
     return inputs

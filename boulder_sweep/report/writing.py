@@ -360,7 +360,7 @@ def printed(html: str) -> bytes:
             "--no-pdf-header-footer",
             "--window-size=1200,900",
             f"--print-to-pdf={target}",
-            page.as_uri(),
+            f"{page.as_uri()}#paper",
         ]
         for settled in SETTLED_MS:
             budget = f"--virtual-time-budget={settled}"

@@ -56,6 +56,8 @@ class Entries:
         Names of the named sets of a block that is a list of them.
     table : DesignList or None
         The table named in the file.
+    depth_sought : bool
+        Whether the depth is to be found.
     derived : dict of str to Any
         What inputs were worked out of, by the key of the file.
     allowed : tuple of str
@@ -72,6 +74,7 @@ class Entries:
         self.misspelled: set[str] = set()
         self.sets: dict[str, tuple[str, ...]] = {}
         self.table: DesignList | None = None
+        self.depth_sought = False
         self.derived: dict[str, Any] = {}
         self.cautions: list[str] = []
         self.allowed: tuple[str, ...] = ()
@@ -84,12 +87,14 @@ class Entries:
         self._read_allowed()
         self._read_list()
         self._unfold()
-        for section in fields.SECTIONS:
-            if section == "soil":  # which of its readings count depends on the boulder and the site
+        for section in sorted(fields.SECTIONS, key="soil".__eq__):
+            if section == "soil":  # which of its readings count depends on the boulder, the site and the vehicle
                 self._unfold_soils()
             self._read_block(section)
             if section == "boulder":
                 self._read_profile()
+        order = [*fields.SECTIONS]
+        self.leaves = dict(sorted(self.leaves.items(), key=lambda leaf: order.index(fields.BY_NAME[leaf[0]].section)))
         both = {"friction_angle_deg", "subgrade_reaction_MN_m3"}
         if any(both <= set(soil) for soil in self.derived.get("soil", ())):
             self.settings.setdefault("correlation", CORRELATION)
@@ -133,10 +138,16 @@ class Entries:
         return read_log(node, hole, self._folder_of(node.position))
 
     def _deepest_foot(self) -> float:
-        """Return the deepest foot of all designs [m]; infinity where mistakes leave it unknown."""
+        """Return the deepest foot of all designs [m]; infinity where mistakes leave it unknown.
+
+        A depth that is to be found is searched down to where the truck goes over the boulder.
+        """
         height, depth, ratio = (self._largest(name) for name in ("boulder_height_m", *reversed(fields.EMBEDMENT)))
         if depth.size:
             return float(depth.max())
+        if self.depth_sought and height.size:
+            bumper = fields.BY_NAME["bumper_height_m"]
+            return float(height.max() - min(self.values(bumper.name), default=bumper.default))
         if not height.size or not ratio.size:
             return math.inf
         in_rows = {"boulder_height_m", fields.EMBEDMENT[0]} <= self.listed
@@ -226,7 +237,9 @@ class Entries:
                 continue
             self.given.add(field.path)
             with self.reporting(field.path):
-                if field in fields.INPUTS:
+                if field.name == fields.EMBEDMENT[1] and _is_to_be_found(inner.value):
+                    self.depth_sought = True
+                elif field in fields.INPUTS:
                     self.leaves[field.name] = read_input(inner.value, field)
                 else:
                     self.settings[field.name] = read_setting(inner.value, field)
@@ -351,6 +364,11 @@ class Entries:
     def report(self, path: str, message: str) -> None:
         """Report what is wrong with an entry, where it stands."""
         self.problems.add(self.position_of(path), path, message)
+
+
+def _is_to_be_found(node: Node) -> bool:
+    """Return whether an entry leaves its value to be found."""
+    return isinstance(node, Scalar) and " ".join(node.text.lower().split()) == fields.TO_BE_FOUND
 
 
 def _one_of_set(node: Node, field: fields.Field) -> Input:

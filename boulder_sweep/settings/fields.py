@@ -244,6 +244,8 @@ BOULDER_MASS = BY_NAME["boulder_mass_kg"]
 """The mass of the boulder: an input where a file gives it; else it follows from four others."""
 EMBEDMENT = ("embedment_ratio", "embedment_depth_m")
 """Exactly one of these is given."""
+TO_BE_FOUND = "to be found"
+"""What a file gives for the depth where a question is to find it."""
 
 MAX_ELEMENTS = 1_000_000
 """Most soil elements per design."""

@@ -5,7 +5,9 @@ Every mistake is reported at once.
 
 from __future__ import annotations
 
+import json
 import re
+from collections.abc import Mapping as MappingABC
 from collections.abc import Sequence
 from dataclasses import fields as fields_of
 from dataclasses import replace
@@ -70,14 +72,22 @@ MAX_OVERRIDE = 20_000
 
 Part = TypeVar("Part", Criterion, Model, SolverSettings)
 
+Settings = Sweep | str | Path | MappingABC[str, Any]
+"""A sweep, the path of its file, or what such a file would hold."""
 
-def load(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
-    """Read and check a file of settings.
+
+_IN_MEMORY = Path("settings")
+"""What messages call settings that are no file."""
+
+
+def load(settings: str | Path | MappingABC[str, Any], overrides: Sequence[str] = ()) -> Sweep:
+    """Read and check settings.
 
     Parameters
     ----------
-    path : str or Path
-        YAML file.
+    settings : str, Path, or mapping
+        YAML file, or what one would hold: ``{"boulder": {"height": [2.6, 3.0], "density": "162 pcf", ...}, ...}``.
+        Files that a mapping names lie in the current directory.
     overrides : sequence of str
         ``key.path=value`` entries that replace entries of the file, as ``--set`` gives them.
 
@@ -91,7 +101,9 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Sweep:
     SettingsError
         With every mistake of the file and of the overrides.
     """
-    path = Path(path)
+    if isinstance(settings, MappingABC):
+        return _load_mapping(settings, overrides)
+    path = Path(settings)
     return load_text(_read_text(path), path, overrides)
 
 
@@ -101,6 +113,30 @@ def load_text(text: str, path: Path, overrides: Sequence[str] = ()) -> Sweep:
     root = parse(text, str(path), problems)
     if root is None:
         raise SettingsError(problems.in_order())
+    return _checked(root, path, overrides, problems)
+
+
+def sweep_of(settings: Settings) -> Sweep:
+    """Return settings as a sweep: itself, or as `load` reads a file or a mapping."""
+    return settings if isinstance(settings, Sweep) else load(settings)
+
+
+def _load_mapping(settings: MappingABC[str, Any], overrides: Sequence[str]) -> Sweep:
+    """Check settings that are no file."""
+    problems = ProblemList()
+    root = parse(json.dumps(settings, default=_plain, ensure_ascii=False), str(_IN_MEMORY), problems)
+    assert root is not None  # JSON is YAML
+    _move(root, Position(str(_IN_MEMORY)))  # lines and columns of it would tell nothing
+    return replace(_checked(root, _IN_MEMORY, overrides, problems), path=None)
+
+
+def _plain(value: Any) -> Any:
+    """Return an array, a number of NumPy or a path as plain data."""
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)
+
+
+def _checked(root: Mapping, path: Path, overrides: Sequence[str], problems: ProblemList) -> Sweep:
+    """Read and check a tree."""
     apply_overrides(root, overrides, problems)
     units = _read_units(root, problems)
     entries = Entries(root, path, problems)
@@ -328,6 +364,7 @@ def _build(name: str, heading: Heading, units: str, entries: Entries, overrides:
         overrides=overrides,
         heading=heading,
         units=units,
+        depth_sought=entries.depth_sought,
         derived=entries.derived,
         allowed=entries.allowed,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from typing import Literal, NamedTuple
 
-from boulder_sweep.settings.fields import EMBEDMENT, INPUTS, SECTIONS, Field, fields_of
+from boulder_sweep.settings.fields import EMBEDMENT, INPUTS, SECTIONS, TO_BE_FOUND, Field, fields_of
 from boulder_sweep.settings.shown_units import SYSTEMS, shown_unit
 from boulder_sweep.settings.values import describe
 from boulder_sweep.text import printable
@@ -65,7 +65,7 @@ _EXAMPLES: dict[str, tuple[str, str]] = {
     "boulder.taper": ("0.8",) * 2,
     "boulder.scan": ("{file: rock.ply, up: a, facing: b}",) * 2,
     "site.embedment_ratio": ("{from: 0.45, to: 0.75, step: 0.05}",) * 2,
-    "site.embedment_depth": ("2 m", "6.5 ft"),
+    "site.embedment_depth": (TO_BE_FOUND,) * 2,
     "site.impact_height": ("0.9 m", "3 ft"),
     "soil.density": ("1860 kg/m^3", "116 pcf"),
     "soil.friction_angle": ("[36 deg, 40 deg]",) * 2,
@@ -87,7 +87,7 @@ _HEAD = """\
 #
 #   sweep check {file}     is the file valid, how many designs has it?
 #   sweep need {file}      which of these boulders, buried how deep?
-#   sweep run {file}       simulate them all into one table
+#   sweep run {file}       simulate them all into one table, with an embedment_ratio in place of the depth
 #
 # Every entry takes one value, a list [a, b], or a range {{from, to, step}} or {{from, to, count}}, in SI or US units.
 # Every combination of lists and ranges is a design. Lines that begin with # are optional: what they show is the
@@ -128,7 +128,7 @@ def _line(field: Field, vehicle: str, units: int) -> str:
     path = field.path
     example = _EXAMPLES[path][units] if path in _EXAMPLES else default_text(field, SYSTEMS[units])
     value = of_class.get(path, example)
-    needed = path in of_class or (field in INPUTS and (not field.optional or field.name == EMBEDMENT[0]))
+    needed = path in of_class or (field in INPUTS and (not field.optional or field.name == EMBEDMENT[1]))
     sign = "" if needed else "# "
     empty = "" if value else "fill in: "
     return f"  {sign}{field.key}: {value}".ljust(58) + f"  # {empty}{field.meaning}"

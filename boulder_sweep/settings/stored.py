@@ -15,7 +15,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from boulder_sweep.parquet import MOST_ROWS
 from boulder_sweep.settings.distributions import Distribution
-from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT, INPUTS, MAX_ELEMENTS
+from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT, INPUTS, MAX_ELEMENTS, TO_BE_FOUND
 from boulder_sweep.settings.model import (
     ACCURACIES,
     PRESETS,
@@ -44,6 +44,7 @@ _WORDS = {
     "preset": {*PRESETS, "mixed"},
     "second_opinion": {*SECOND_OPINIONS},
     "impact_height_m": {IMPACT_HEIGHT_RULE},
+    "embedment_depth_m": {TO_BE_FOUND},
 }
 """Words that an entry may hold, where its declaration lists none."""
 _OTHER_BOUNDS = {
@@ -243,7 +244,7 @@ def _inconsistencies(settings: dict[str, Any]) -> Iterator[str]:
     for name in [name for part in (inputs, settings.get("distributions", {})) for name in part if name not in _NAMES]:
         yield f"inputs.{name} is no input"
     for name, value in inputs.items():
-        if isinstance(value, str) and name != "impact_height_m":
+        if isinstance(value, str) and name not in ("impact_height_m", "embedment_depth_m"):
             yield f"inputs.{name} is no number"
     for names in _ALWAYS:
         if not {*names} & inputs.keys():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import shlex
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -13,8 +14,9 @@ import numpy as np
 
 from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.designs import LEAST_SOLIDITY, SIDES, UNUSUAL, DesignBlock, DesignPlan, Label, Source
+from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings.distributions import Distribution, SetDistributions
-from boulder_sweep.settings.fields import ALLOW_UNUSUAL, BY_NAME, HELD, INPUTS
+from boulder_sweep.settings.fields import ALLOW_UNUSUAL, BY_NAME, EMBEDMENT, HELD, INPUTS, TO_BE_FOUND
 from boulder_sweep.settings.model import CLOSED_FORM, Criterion, Model, SolverSettings
 from boulder_sweep.settings.problems import Problem
 from boulder_sweep.settings.shown_units import SYSTEMS
@@ -24,6 +26,8 @@ from boulder_sweep.settings.vehicle import APPROACH, approach_words
 
 _AT_ONCE = 65_536
 """Designs looked at together."""
+_SOME_RATIO = 0.5
+"""Embedment over height of designs whose depth is to be found, for what does not depend on it."""
 MAX_LISTED = 1000
 """Longest axis that `Sweep.resolved` lists value by value."""
 
@@ -170,6 +174,8 @@ class Sweep:
         What inputs were worked out of, by the key of the file: the run-up that gives a speed.
     units : str
         In which results are shown, ``si`` or ``us``; rows do not depend on it.
+    depth_sought : bool
+        Whether the depth is to be found: questions search it, and no design can be computed without one.
     allowed : tuple of str
         Dotted keys whose values may be far from usual; a listed design with another such value cannot be computed. A
         sweep that no file describes may take any.
@@ -195,6 +201,7 @@ class Sweep:
     heading: Heading = NO_HEADING
     derived: dict[str, Any] = field(default_factory=dict)
     units: str = SYSTEMS[0]
+    depth_sought: bool = False
     allowed: tuple[str, ...] = HELD
 
     @cached_property
@@ -215,7 +222,11 @@ class Sweep:
                     rows |= is_unusual(values, BY_NAME[name])
             if rows.any():
                 given[UNUSUAL] = Source(rows.astype(np.float64), (0,))
-        return DesignPlan(self.lengths, given, labels, [case.plan for case in self.cases])
+        # Pilot runs and estimates of the cost take some depth; `block` gives no design without its own.
+        some_depth = {EMBEDMENT[0]: Source(np.array([_SOME_RATIO]))} if self.depth_sought else {}
+        plan = DesignPlan(self.lengths, given | some_depth, labels, [case.plan for case in self.cases])
+        plan.given = given
+        return plan
 
     def is_held(self, name: str) -> bool:
         """Return whether an input is held to its usual range: a value far outside it is not computed."""
@@ -238,11 +249,40 @@ class Sweep:
         ------
         IndexError
             The rows are not within the sweep.
+        QuestionError
+            The depth is to be found.
         """
+        self.need_depth()
         return self.plan.block(start, stop)
 
+    def need_depth(self) -> None:
+        """Refuse what takes the depth as given, where it is to be found.
+
+        Raises
+        ------
+        QuestionError
+            Says which command finds it.
+        """
+        if self.depth_sought:
+            raise QuestionError(
+                f"{BY_NAME[EMBEDMENT[1]].path} is {TO_BE_FOUND}, and one that is given is needed here. This command "
+                f"finds it:\n  {self.need_command}"
+            )
+
+    @property
+    def need_command(self) -> str:
+        """The command that asks ``sweep need`` of this file, with the entries that replaced some of it."""
+        if self.path is None:
+            return "boulder_sweep.need(sweep)"
+        words = ["sweep", "need", str(self.path)]
+        for entry in self.overrides:
+            words += [] if entry.startswith("--") else ["--set", entry]
+        return shlex.join(words)
+
     def why_none_runs(self) -> str:
-        """Return why no design can be computed, by the first one; empty where one can."""
+        """Return why no design can be computed, by the first one; empty where one can, or the depth is to be found."""
+        if self.depth_sought:
+            return ""
         for start in range(0, self.n_designs, _AT_ONCE):
             if not self.block(start, min(start + _AT_ONCE, self.n_designs)).reasons.codes.all():
                 return ""
@@ -338,11 +378,12 @@ class Sweep:
         varying = {name: values for axis in self.axes for name, values in axis.columns.items()}
         if self.table is not None:
             varying |= self.table.columns
+        single = self.constants | ({EMBEDMENT[1]: TO_BE_FOUND} if self.depth_sought else {})
         named = (entry.name for entry in INPUTS)
         return {
-            name: _listed(varying[name]) if name in varying else self.constants[name]
+            name: _listed(varying[name]) if name in varying else single[name]
             for name in named
-            if name in varying or name in self.constants
+            if name in varying or name in single
         }
 
 

@@ -16,7 +16,7 @@ def settings_file(path: object) -> str:
     """Say that a path at which a result is expected is a settings file, and what to do; empty for another."""
     if not str(path).lower().endswith((".yaml", ".yml")):
         return ""
-    return f"{path} is a settings file; run it first: sweep run {shlex.quote(str(path))}"
+    return f"{path} is a settings file; run it first:\n  sweep run {shlex.quote(str(path))}"
 
 
 class StoreError(BoulderSweepError):

@@ -146,6 +146,7 @@ def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS) -
     """
     begun = time.monotonic()
     sweep = at_values(sweep)
+    sweep.need_depth()
     sample = sampled_designs(sweep, designs)
     if not sample.size:
         raise NothingToMeasureError(

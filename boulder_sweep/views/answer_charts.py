@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from boulder_sweep.answers.advice import advice
 from boulder_sweep.columns import BY_NAME as COLUMNS
 from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.errors import PictureError
@@ -104,9 +105,10 @@ def draw_design_chart(need: Need, path: str | Path, *, units: str = "si") -> Non
             _curve(axes, need, rows.sort_values(across), across, style, words, units)
         axes.set_xlabel(label(across, units))
         axes.set_ylabel(_answer_label(need, units))
+        _mark(axes, need, across, held, units)
         axes.legend(loc="best")
         headline(fig, f"{need.sweep.name}: {_title(need)}")
-        caption(fig, _caption(need, held, units))
+        caption(fig, "\n".join([*advice(need, units)[:1], _caption(need, held, units)]))
 
 
 def draw_answers(answers: Reserves | Uncertainty, path: str | Path, *, units: str = "si") -> None:
@@ -231,6 +233,20 @@ def _curve(
     axes.plot(x, y, color=colour, linestyle=dashes, label=words or need.sweep.model.preset.replace("_", " "))
     axes.plot(x[~bound], y[~bound], "o", color=colour, markersize=4)
     axes.plot(x[bound], y[bound], "o", color=colour, markersize=4, markerfacecolor="white")
+
+
+def _mark(axes: Axes, need: Need, across: str, held: Mapping[str, float | str], units: str) -> None:
+    """Mark the design that is recommended, where the chart shows its boulder."""
+    found = need.recommendation
+    design = None if found is None else found.design
+    if design is None or across not in design.sizes:
+        return
+    if any(name in design.sizes and design.sizes[name] != value for name, value in held.items()):
+        return
+    value = design.rows[0].get(need.key.name, design.sizes.get(need.key.name))
+    if value is not None:
+        at = design.sizes[across] / size_of(across, units), value / sized(need.key.field.unit, units)[1]
+        axes.plot(*at, "*", color=BLACK, markersize=12, label="recommended", zorder=5)
 
 
 def _title(need: Need) -> str:

@@ -57,6 +57,7 @@ def draw_verdict_map(
     *,
     title: str = "",
     terms: str = "",
+    found: str = "",
     across: str | None = None,
     up: str | None = None,
     columns: str | None = None,
@@ -78,6 +79,8 @@ def draw_verdict_map(
         Name of the study.
     terms
         What a pass means, for the caption.
+    found
+        Which design is recommended, in sentences: the beginning of the caption.
     across, up, columns, rows, at, sets
         What is shown, see `boulder_sweep.views.slices.plane`.
     units
@@ -102,7 +105,9 @@ def draw_verdict_map(
         )
     n_columns, n_rows = len(shown.column_values), len(shown.row_values)
     width = max(2.2 * n_columns + 1.9, 5.2) + LEGEND_IN * (n_columns <= NARROW)
-    caption = _caption(shown, terms, int(CHARACTERS_PER_INCH * width), units)
+    characters = int(CHARACTERS_PER_INCH * width)
+    caption = _caption(shown, terms, characters, units)
+    caption = "\n".join([*textwrap.wrap(found, characters), caption])
     height = max(1.9 * n_rows + 1.45, 3.45) + CAPTION_LINE_IN * (caption.count("\n") + 1)
     with pictures.figure(path, width, height) as fig:
         grid = fig.subplots(n_rows, n_columns, sharex=True, sharey=True, squeeze=False)

@@ -10,7 +10,7 @@ from scipy.special import ndtri
 from boulder_sweep import load, need, uncertainty
 from boulder_sweep.answers.advice import Again
 from boulder_sweep.answers.printing import need_lines, reserve_lines, uncertainty_lines
-from boulder_sweep.answers.reserves import reserves
+from boulder_sweep.answers.reserves import capacity
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.distributions import Distribution, SetDistributions
@@ -32,8 +32,8 @@ def least_of_site(root: Path) -> str:
 
 
 def capacity_of_site(root: Path) -> str:
-    """Return what the taller designs of the site withstand as a terminal shows it."""
-    return _fenced(reserve_lines(reserves(load(root / SITE, ["boulder.height=[3.4, 3.6] m"]))))
+    """Return what the designs of the site withstand at one depth as a terminal shows it."""
+    return _fenced(reserve_lines(capacity(load(root / SITE, ["site.embedment_depth=1.9 m"]))))
 
 
 def uncertainty_of_site(root: Path) -> str:

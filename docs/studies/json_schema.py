@@ -19,6 +19,7 @@ from boulder_sweep.settings.fields import (
     INPUTS,
     MAX_ELEMENTS,
     SECTIONS,
+    TO_BE_FOUND,
     Field,
 )
 from boulder_sweep.settings.model import (
@@ -143,7 +144,8 @@ def _entry(field: Field) -> Schema:
     step = _object({"from": value, "to": value, "step": _ref(_named(field.unit))}, ("from", "to", "step"))
     count = _object({"from": value, "to": value, "count": _ref("count")}, ("from", "to", "count"))
     spread = _ref(f"{_named(field.unit)}_distribution")
-    return {"anyOf": [value, _list(value), _ref("list_as_text"), step, count, spread]}
+    to_be_found = [_words(TO_BE_FOUND)] if field.name == EMBEDMENT[1] else []
+    return {"anyOf": [value, _list(value), _ref("list_as_text"), step, count, spread, *to_be_found]}
 
 
 def _mean(unit: str) -> Schema:

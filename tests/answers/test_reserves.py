@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from boulder_sweep.answers.printing import reserve_lines
-from boulder_sweep.answers.reserves import CLASSES, ISO_MASS_KG, ISO_SPEEDS, RESERVES, Reserve, classes, reserves
+from boulder_sweep.answers.reserves import CLASSES, ISO_MASS_KG, ISO_SPEEDS, RESERVES, Reserve, capacity, classes
 from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
@@ -31,7 +31,7 @@ def passes(frame: pd.DataFrame, **inputs: np.ndarray) -> np.ndarray:
 @pytest.fixture(scope="module", params=[240, pytest.param(400, marks=pytest.mark.nightly)])
 def reserves_of_many(request: pytest.FixtureRequest) -> pd.DataFrame:
     """What random designs withstand."""
-    return reserves(random_designs(request.param)).frame
+    return capacity(random_designs(request.param)).frame
 
 
 def with_constants(sweep: Sweep, **values: float) -> Sweep:
@@ -53,7 +53,7 @@ def test_a_design_passes_at_what_it_withstands_and_not_beyond(reserves_of_many: 
 @pytest.mark.parametrize("reserve", RESERVES)
 def test_the_answers_are_those_of_the_same_questions(reserve: Reserve) -> None:
     sweep = shallow_designs(24)
-    found, key = reserves(sweep).frame, reserve.key
+    found, key = capacity(sweep).frame, reserve.key
     asked = bare_need(sweep, **{"most" if key.most else "least": key.field.path}).frame
     for column, same in (
         (reserve.column, key.answer),
@@ -75,7 +75,7 @@ def shallow_designs(count: int) -> Sweep:
 
 def test_everything_passes_up_to_what_a_shallow_boulder_withstands() -> None:
     """Also at speeds that no search has tried; of angles from the strongest soil downwards."""
-    found = reserves(shallow_designs(120)).frame
+    found = capacity(shallow_designs(120)).frame
     assert set(found.speed_found) == {"found"}, "beyond a speed that overturns it nothing passes"
     assert (found.soil_found == "not_monotone").sum() >= 1
     rng = np.random.default_rng(0)
@@ -99,7 +99,7 @@ vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*
 
 def test_a_boulder_that_a_slower_truck_overturns_has_no_class() -> None:
     """It passes at 30 mph by sliding, and overturns at 12.6 m/s; in better soil it overturns at 30 mph, too."""
-    found = reserves(load_text(SLIDES, Path("slides.yaml")))
+    found = capacity(load_text(SLIDES, Path("slides.yaml")))
     row = found.frame.iloc[0]
     assert row.withstands_speed_m_s < 12.6
     assert row.speed_fails_at == pytest.approx(row.withstands_speed_m_s + 0.01)
@@ -113,7 +113,7 @@ def test_a_boulder_that_a_slower_truck_overturns_has_no_class() -> None:
 
 
 def test_reserves_of_designs_that_pass_are_on_the_worse_side() -> None:
-    frame = reserves(site(site="embedment_depth: [1.8, 2.1] m")).frame
+    frame = capacity(site(site="embedment_depth: [1.8, 2.1] m")).frame
     held, failed = frame[frame.verdict == "pass"], frame[frame.reason == "overturns"]
     assert len(held)
     assert len(failed)
@@ -134,14 +134,14 @@ def test_speeds_of_iso_22343_are_named_for_trucks_of_7200_kg_only() -> None:
     mass = np.array([7200.0] * 5 + [6800.0])
     named = ["48 km/h", "64 km/h", "64 km/h", "80 km/h", None]
     assert classes(speed, mass, ISO_SPEEDS, ISO_MASS_KG) == [None, *named]
-    frame = reserves(with_constants(site(), vehicle_mass_kg=7200.0)).frame
+    frame = capacity(with_constants(site(), vehicle_mass_kg=7200.0)).frame
     assert set(frame.simulated_iso_speed.dropna()) == {"48 km/h"}
     assert frame.simulated_class.isna().all()
-    assert reserves(site()).frame.simulated_iso_speed.isna().all()
+    assert capacity(site()).frame.simulated_iso_speed.isna().all()
 
 
 def test_crash_tests() -> None:
-    found = reserves(load(CONFIGS / "crash_tests.yaml"))
+    found = capacity(load(CONFIGS / "crash_tests.yaml"))
     abg, rwg = found.frame.to_dict("records")
     assert abg["withstands_speed_m_s"] < 13.0
     assert rwg["withstands_speed_m_s"] > 14.0
@@ -165,7 +165,7 @@ def test_a_design_that_passes_beyond_the_usual_range_withstands_its_own_value(
 ) -> None:
     strong = site(height="3.2 m", site="embedment_depth: 2.2 m", friction="44 deg")
     mild = {"impact_speed_m_s": 2.0, "vehicle_mass_kg": 100.0}
-    found = reserves(with_constants(strong, **(mild | {column: value})))
+    found = capacity(with_constants(strong, **(mild | {column: value})))
     (row,) = found.frame.to_dict("records")
     assert row["verdict"] == "pass"
     (own,) = (reserve for reserve in RESERVES if reserve.key.name == column)
@@ -177,18 +177,18 @@ def test_a_design_that_passes_beyond_the_usual_range_withstands_its_own_value(
 
 def test_a_design_that_fails_in_the_strongest_soil_withstands_none() -> None:
     fast = {"impact_speed_m_s": 22.0}
-    frame = reserves(with_constants(site(friction="59.5 deg", site="embedment_depth: 1.2 m"), **fast)).frame
+    frame = capacity(with_constants(site(friction="59.5 deg", site="embedment_depth: 1.2 m"), **fast)).frame
     assert (frame.verdict == "fail").all()
     assert frame.withstands_friction_angle_deg.isna().all()
     assert set(frame.soil_found) <= {"never", "blocked_by_overlap", "not_monotone"}
 
 
 def test_only_the_end_of_what_is_tried_is_marked() -> None:
-    text = "\n".join(reserve_lines(reserves(site())))
+    text = "\n".join(reserve_lines(capacity(site())))
     assert "≥" not in text
     assert "≤" not in text
 
 
 def test_threads_do_not_matter() -> None:
-    one, two = (reserves(site(), jobs=jobs) for jobs in (1, 2))
+    one, two = (capacity(site(), jobs=jobs) for jobs in (1, 2))
     assert one.arrow.equals(two.arrow)

@@ -17,6 +17,8 @@ CONFIG = Path(__file__).parents[2] / "configs" / "site.yaml"
 
 BARE = ("--margin", "0", "--any")
 """Asks for the bare least depth."""
+SHALLOW = ("--set", "site.embedment_depth=1.9 m")
+"""A depth in place of the one that is to be found."""
 
 
 def table_of(out):
@@ -38,7 +40,7 @@ def test_lines_fit_the_terminal(sweep, words, shown):
 def test_the_answer_is_at_most_a_screen_and_the_boulder_stands_first(sweep):
     _, out, _ = sweep("need", CONFIG, "-q")
     assert out.startswith("Bury the 3.4 m boulder (24.5 t) 2.433 m deep: it passes in both soils with 34 %")
-    assert out.endswith("More: --table, --notes\n")
+    assert out.endswith(f"More:\n  sweep need {CONFIG} --table\n  sweep need {CONFIG} --notes\n")
     assert len(out.splitlines()) <= 24
     assert sum(line.startswith("→") for line in out.splitlines()) == 1
 
@@ -64,17 +66,18 @@ def test_notes_say_what_words_mean_and_only_notes_do(sweep):
 
 
 def test_defaults_are_a_quarter_to_spare_and_every_second_opinion(sweep):
-    default, said = (sweep("need", CONFIG, "-q", *words)[1] for words in ((), ("--margin", "25 %", "--robust")))
+    asked = ((), ("--margin", "25 %", "--robust"), ("--any",), ("--margin", "0"))
+    default, said, any_, bare = (sweep("need", CONFIG, "-q", *words)[1].partition("\nMore:")[0] for words in asked)
     assert default == said
-    assert default != sweep("need", CONFIG, "-q", "--any")[1]
-    assert default != sweep("need", CONFIG, "-q", "--margin", "0")[1]
+    assert default not in (any_, bare)
 
 
 @pytest.mark.parametrize("command", ["need", "uncertainty"])
 def test_a_bare_number_above_one_is_per_cent_and_that_is_said(sweep, command):
     file = CONFIG if command == "need" else CONFIG.with_name("uncertain_site.yaml")
     one, other = (sweep(command, file, "--margin", margin) for margin in ("25", "25 %"))
-    assert one[:2] == other[:2]
+    assert one[0] == other[0]
+    assert one[1].replace("--margin 25", "--margin '25 %'") == other[1]
     assert "note: --margin 25 is read as 25 %\n" in one[2]
     assert "is read as" not in other[2]
 
@@ -87,7 +90,7 @@ def test_the_lightest_boulder_says_at_which_ends_it_lies(sweep):
     assert "H is" not in out
     _, out, _ = sweep("need", CONFIG, "-q", "--least", "mass", *wide, "--units", "us")
     assert "edges: W is the least, 4.593 ft (1 of 1); " in out
-    _, out, _ = sweep("need", CONFIG, "-q", "--least", "mass", *one, "--set", "boulder.height=3.4 m")
+    _, out, _ = sweep("need", CONFIG, "-q", "--least", "mass", *one, *SHALLOW, "--set", "boulder.height=3.4 m")
     assert "at no end of one" in out.replace("\n  ", " ")
 
 
@@ -229,11 +232,11 @@ def test_a_need_that_nothing_decides_names_the_reason(sweep, weighed, words):
 
 
 def test_lines_json_and_parquet(sweep, tmp_path):
-    code, out, _ = sweep("capacity", CONFIG)
+    code, out, _ = sweep("capacity", CONFIG, *SHALLOW)
     assert code == 0
     assert all(len(line) <= 80 for line in out.splitlines())
     assert "simulated" in out
-    code, out, _ = sweep("capacity", CONFIG, "--json", "-o", tmp_path / "w.parquet")
+    code, out, _ = sweep("capacity", CONFIG, *SHALLOW, "--json", "-o", tmp_path / "w.parquet")
     rows = json.loads(out)["rows"]
     frame = pd.read_parquet(tmp_path / "w.parquet")
     assert code == 0
@@ -317,8 +320,8 @@ ASKED = {
     "nothing passes at any margin": ("abg",),
     "at the unfavourable ends": ("uncertain_site", "--at", "p10"),
     "a depth between": ("site", *LOW, "--between", "1.5 m", "1.8 m"),
-    "the mass, at the depth of the file": ("site", "--least", "mass"),
-    "the height, at the depth of the file": ("site", "--least", "height", "--units", "us"),
+    "the mass, at the depth of the file": ("site", "--least", "mass", *SHALLOW),
+    "the height, at the depth of the file": ("site", "--least", "height", "--units", "us", *SHALLOW),
     "the mass in ranges that are wide, and a fast truck": (
         *("site", "--least", "mass", "--set", "boulder.height=[3 m, 4 m]", "--set", "boulder.width=[1.68 m, 2.5 m]"),
         *("--set", "site.embedment_ratio=[0.35, 0.75]", "--set", "vehicle.speed=45 mph", "--margin", "75 %"),
@@ -329,9 +332,14 @@ KEPT = ("--units", "--prefer", "--at", "--probability")
 
 
 def suggested(out: str) -> list[list[str]]:
-    """Return the commands that an answer suggests, each of which has a line of its own after words."""
+    """Return the commands by which an answer leads on, each of which has a line of its own after words."""
     lines = out.splitlines()
     return [shlex.split(line) for before, line in pairwise(lines) if before.startswith("next, ")]
+
+
+def more(out: str) -> list[list[str]]:
+    """Return the commands that print more of an answer, at its end."""
+    return [shlex.split(line) for line in out.partition("\nMore:\n")[2].splitlines()]
 
 
 @pytest.mark.parametrize("words", ASKED.values(), ids=ASKED)
@@ -342,7 +350,7 @@ def test_every_command_is_run_and_leads_on(sweep, tmp_path, monkeypatch, words):
     commands = suggested(out)
     assert code == 0
     assert commands
-    assert out.count("sweep ") == len(commands), "nothing else looks like a command"
+    assert out.count("sweep ") == len(commands) + len(more(out)), "nothing else looks like a command"
     for program, *command in commands:
         assert program == "sweep"
         options = [word for word in command if word.startswith("--") and word != "--set"]
@@ -373,7 +381,25 @@ def test_a_probability_is_kept(sweep, tmp_path, monkeypatch):
 def test_where_something_qualifies_nothing_is_asked_next(sweep):
     _, out, _ = sweep("need", CONFIGS / "site.yaml", "-q")
     assert suggested(out) == []
-    assert "sweep " not in out
+    assert out.count("sweep ") == len(more(out)) == 2
+    for option, command in zip(("--table", "--notes"), more(out), strict=True):
+        assert command == ["sweep", "need", str(CONFIGS / "site.yaml"), option]
+
+
+def test_more_of_an_answer_repeats_all_that_was_asked(sweep, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(CONFIGS / "site.yaml", "my site.yaml")
+    asked = ("--units", "us", "--margin", "10%", "--any", "--prefer", "depth", "--set", "vehicle.speed=31 mph")
+    first = sweep("need", "my site.yaml", "-q", *asked)[1]
+    commands = more(first)
+    assert len(commands) == 2
+    for program, *command in commands:
+        code, out, err = sweep(*command, "-q")
+        assert (program, code, err) == ("sweep", 0, "")
+        assert out.splitlines()[:2] == first.splitlines()[:2]
+        (last,) = more(out)
+        assert sorted(last[-2:]) == ["--notes", "--table"]
+        assert more(sweep(*last[1:], "-q")[1]) == []
 
 
 YARD = """stone,boulder_length_cm,boulder_width_cm,boulder_height_cm,boulder_mass_t
@@ -395,6 +421,9 @@ vehicle: {mass: 15000 lb, speed: 20 mph, spring: 3103.3 kN/m, damper: 138.91 kN*
         encoding="utf-8",
     )
     _, out, _ = sweep("need", tmp_path / "yard.yaml", "-q", "--margin", "0")
-    assert "2 of the 3 stones serve at this site: good, deep" in out
+    assert "2 of the 3 boulders serve at this site: good, deep" in out
+    _, out, _ = sweep("need", tmp_path / "yard.yaml", "-q", "--margin", "0", "--set", "vehicle.speed=28 mph")
+    assert "1 of the 3 boulders serves at this site: good" in out
+    assert "the boulder good, 1.7 m long, 1.8 m wide and 2.8 m high (19.8 t)" in " ".join(out.split())
     places = [out.index(f"{name} ", out.index("stone  design")) for name in ("good", "deep", "flat")]
     assert places == sorted(places)

@@ -99,8 +99,9 @@ def test_a_result_is_exported_and_compared(sweep, possible_grid):
 
 def test_the_passes_that_are_lost_are_counted_and_listed_with_their_inputs(sweep, grid):
     site = Path(__file__).parents[2] / "configs" / "site.yaml"
-    sweep("run", site, "-q", "-o", "a.sweep", "--set", "soil.friction_angle=40 deg")
-    sweep("run", site, "-q", "-o", "b.sweep", "--set", "soil.friction_angle=34 deg")
+    deep = ("--set", "site.embedment_depth=1.9 m")
+    sweep("run", site, "-q", "-o", "a.sweep", *deep, "--set", "soil.friction_angle=40 deg")
+    sweep("run", site, "-q", "-o", "b.sweep", *deep, "--set", "soil.friction_angle=34 deg")
     code, out, err = sweep("compare", "a.sweep", "b.sweep", "--units", "us")
     assert (code, err) == (0, "")
     lines = out.splitlines()

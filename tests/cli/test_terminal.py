@@ -231,7 +231,7 @@ COMPILING = "compiling kernels"
 KERNEL = "a_kernel"
 CONFIGS = Path(__file__).parents[2] / "configs"
 SITE = CONFIGS / "site.yaml"
-ONE = ("--set", "boulder.height=3.4 m", "--set", "soil.friction_angle=40 deg")
+ONE = ("--set", "boulder.height=3.4 m", "--set", "soil.friction_angle=40 deg", "--set", "site.embedment_depth=1.9 m")
 
 
 def after_compiling(kernel):

@@ -12,23 +12,25 @@ from docs.studies.example_pulse import example_pulse
 CONFIGS = Path(__file__).parents[2] / "configs"
 SITE = CONFIGS / "site.yaml"
 US = ("--units", "us")
+DEEP = "site.embedment_depth=1.9 m"
+"""In place of the depth that is to be found."""
 WORDS = {
     "new": ("made.yaml", "--yes"),
-    "run": (SITE,),
+    "run": (SITE, "--set", DEEP),
     "check": (CONFIGS / "m30_sizing.yaml",),
     "stone": (CONFIGS.parent / "docs" / "examples" / "rock.ply", "--mass", "23.5 t"),
     "need": (SITE, *US),
     "uncertainty": (CONFIGS / "uncertain_site.yaml", "--half-width", "0.2", *US),
-    "capacity": (SITE, *US),
-    "simulate": (SITE, "--design", "11"),
+    "capacity": (SITE, *US, "--set", DEEP),
+    "simulate": (SITE, "--design", "11", "--set", DEEP),
     "examples": ("configs",),
     "doctor": (),
-    "explore": (SITE, "-o", "page.html"),
+    "explore": (SITE, "-o", "page.html", "--set", DEEP),
     "plot": ("site.sweep",),
     "report": ("site.sweep",),
     "export": ("site.sweep", "-o", "site.csv"),
     "compare": ("site.sweep", "other.sweep"),
-    "tradeoff": (SITE, "--designs", "8", "--seconds", "1e9"),
+    "tradeoff": (SITE, "--designs", "8", "--seconds", "1e9", "--set", DEEP),
     "validate": (),
     "fit-vehicle": ("pulse.csv", "--mass", "6800 kg"),
 }
@@ -43,8 +45,8 @@ def folder(tmp_path_factory):
     from boulder_sweep import load, run
 
     folder = tmp_path_factory.mktemp("width")
-    run(load(SITE), folder / "site.sweep")
-    run(load(SITE, ["vehicle.speed=40 mph"]), folder / "other.sweep")
+    run(load(SITE, [DEEP]), folder / "site.sweep")
+    run(load(SITE, [DEEP, "vehicle.speed=40 mph"]), folder / "other.sweep")
     (folder / "pulse.csv").write_text(example_pulse())
     return folder
 

@@ -27,7 +27,7 @@ import pyarrow.parquet as pq
 
 import boulder_sweep
 from boulder_sweep.answers.outputs import AnswerFile
-from boulder_sweep.answers.reserves import reserves
+from boulder_sweep.answers.reserves import capacity
 from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning, ReportError
 from boulder_sweep.report.answers import answer_of
 from boulder_sweep.report.asked import answers_table
@@ -241,7 +241,7 @@ QUESTIONS: dict[str, Callable[[], Any]] = {
     "mass": lambda: bare_need(site(height="[2.6, 3.6] m", friction="[38, 40] deg"), "mass"),
     "speed": lambda: bare_need(site(height="[3.0, 3.4] m"), most="speed"),
     "chance": lambda: bare_need(site(**UNCERTAIN, height="3.4 m"), probability=0.9),
-    "capacity": lambda: reserves(site(height="[3.0, 3.4] m")),
+    "capacity": lambda: capacity(site(height="[3.0, 3.4] m")),
     "uncertainty": lambda: boulder_sweep.uncertainty(site(**UNCERTAIN, height="[3.0, 3.4] m"), half_width=0.2),
 }
 GONE = "(gone)"

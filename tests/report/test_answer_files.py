@@ -18,7 +18,7 @@ import pytest
 import boulder_sweep
 from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.outputs import AnswerFile
-from boulder_sweep.answers.reserves import reserves
+from boulder_sweep.answers.reserves import capacity
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report
 from boulder_sweep.report.answers import answer_of
@@ -46,7 +46,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "speed": bare_need(site(height="[3.0, 3.4] m"), most="speed"),
         "chance": bare_need(site(**UNCERTAIN, height="3.4 m"), probability=0.9),
         "sets": bare_need(load_text(SETS, folder / "sets.yaml"), margin=0.1),
-        "capacity": reserves(site(height="[3.0, 3.4] m")),
+        "capacity": capacity(site(height="[3.0, 3.4] m")),
         "uncertainty": boulder_sweep.uncertainty(site(**UNCERTAIN, height="[3.0, 3.4] m"), half_width=0.2),
         "one": bare_need(site(height="3.4 m", friction="40 deg")),
         "nothing": bare_need(site(height="2.0 m", friction="36 deg")),
@@ -225,7 +225,7 @@ def test_an_answer_file_does_not_differ_from_itself(files: dict[str, Path]) -> N
 
 
 def test_the_command_says_what_changed(files: dict[str, Path], tmp_path: Path, sweep: Command) -> None:
-    reserves(site(height="[3.0, 3.4] m").__class__(**_slower())).write(tmp_path / "slower.parquet")
+    capacity(site(height="[3.0, 3.4] m").__class__(**_slower())).write(tmp_path / "slower.parquet")
     code, out, _ = sweep("compare", files["capacity"], tmp_path / "slower.parquet", "--units", "us", "--show", "1")
     assert code == 0
     assert "differs  impact speed: 30 -> 25 mph" in out

@@ -22,7 +22,7 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 @pytest.fixture(scope="module")
 def settings():
     """Resolved settings of the example with a log."""
-    return load(CONFIGS / "borehole_log.yaml").resolved()
+    return load(CONFIGS / "borehole_log.yaml", ["site.embedment_depth=2.55 m"]).resolved()
 
 
 def test_readings_and_layers_are_those_of_the_log(settings):
@@ -67,7 +67,7 @@ def test_soil_without_a_log_has_no_figure():
 
 def test_the_page_shows_the_figure(tmp_path):
     out = tmp_path / "log.sweep"
-    run(load(CONFIGS / "borehole_log.yaml"), out, jobs=1)
+    run(load(CONFIGS / "borehole_log.yaml", ["site.embedment_depth=2.55 m"]), out, jobs=1)
     page = write_report(out, tmp_path / "page.html").read_text(encoding="utf-8")
     figure = re.search(r'<figure class="log">.*?</figure>', page, re.DOTALL)
     assert figure is not None

@@ -13,7 +13,7 @@ import boulder_sweep
 from benchmarks.flips import RANGES
 from benchmarks.late import shallow
 from boulder_sweep.answers.placing import placed
-from boulder_sweep.answers.reserves import reserves
+from boulder_sweep.answers.reserves import capacity
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.report import write_explorer
 from boulder_sweep.settings import Sweep
@@ -122,7 +122,7 @@ def test_the_page_judges_alike(asked, tmp_path, opened):
 
 def test_capacity_states_the_row_and_what_it_says_follows_from_it(asked):
     _, table = asked
-    found = reserves(asked[0]).frame
+    found = capacity(asked[0]).frame
     assert told(found) == told(table)
     own, withstood = found.impact_speed_m_s.astype(float), found.withstands_speed_m_s
     assert not (withstood >= own)[found.verdict != "pass"].any()
@@ -177,7 +177,7 @@ def test_uncertain_soil_is_judged_alike_by_all(tmp_path):
     table = ran(sweep, tmp_path)
     stated = pd.DataFrame([boulder_sweep.simulate(sweep, k).summary() for k in range(len(table))])
     assert told(stated) == told(table)
-    assert told(reserves(sweep).frame) == told(table)
+    assert told(capacity(sweep).frame) == told(table)
     assert table.validity.str.contains("changes_side").sum() >= 2
     judged = [ran(case, tmp_path).verdict for case in (at_values(sweep, "mean"), *at_values(sweep).cases)]
     passes = (table.verdict == "pass").to_numpy()

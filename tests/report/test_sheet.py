@@ -227,3 +227,45 @@ def test_the_sheet_fits_on_one_page(files: dict[str, Path], name: str, units: st
     )
     assert min(sizes) >= 10.6  # 8 pt
     assert page.complaints == []
+
+
+def test_what_is_written_beside_figures_is_printed_in_8_pt(files: dict[str, Path], tmp_path: Path, opened: Any) -> None:
+    page = opened(write_report(files["depth"], tmp_path / "page.html", heading=HEADING))
+    written = """
+        page.plots.document.roots().flatMap((figure) => [...figure.left, ...figure.below, ...figure.right])
+            .flatMap((one) => one.type === "Legend" ? [one.label_text_font_size]
+                : [one.axis_label_text_font_size, one.major_label_text_font_size])
+            .map((size) => parseFloat(size.value ?? size) * page.shrunk)
+    """
+    assert min(page.evaluate(written)) < 10.6  # as on the screen
+    page.tab.goto(f"{(tmp_path / 'page.html').as_uri()}#paper")
+    page.tab.reload()
+    page.wait_for_selector("html[data-ready]", state="attached")
+    assert min(page.evaluate(written)) >= 10.6  # 8 pt
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    page.emulate_media(media="print")
+    assert min(page.evaluate(written)) >= 10.6
+    beside = page.evaluate(
+        "[...document.querySelectorAll('.chosen .scene svg text, .legend li, .section figcaption, caption, .plots h3')]"
+        ".filter((one) => one.getClientRects().length && one.textContent.trim() && !one.matches('.hidden'))"
+        ".map((one) => one.matches('svg *') ? one.getBoundingClientRect().height"
+        "    : parseFloat(getComputedStyle(one).fontSize) * page.shrunk)"
+    )
+    assert len(beside) > 5
+    assert min(beside) >= 10.6
+    assert page.complaints == []
+
+
+def test_the_browser_that_prints_writes_for_paper(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(writing, "browser", lambda: "chromium")
+    opened: list[str] = []
+
+    def ended(_: str, words: list[str], said: Path) -> tuple[int, str]:
+        opened.append(words[-1])
+        (said.parent / "page.pdf").write_bytes(b"%PDF")
+        return 0, ""
+
+    monkeypatch.setattr(writing, "_ended", ended)
+    assert writing.printed("<title>site</title>") == b"%PDF"
+    (address,) = opened
+    assert address.endswith("page.html#paper")

@@ -24,7 +24,8 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 
 def test_it_stands_for_plain_entries(tmp_path):
     """A file with readings and a street, and one with the constants that follow: equal settings and equal rows."""
-    sweep = load(CONFIGS / "borehole.yaml")
+    deep = ["site.embedment_depth=2.3 m"]
+    sweep = load(CONFIGS / "borehole.yaml", deep)
     spread = {name: own.to_dict() for name, own in sweep.distributions.items()}
     angle, density, reaction = (
         spread[name] for name in ("friction_angle_deg", "soil_density_kg_m3", "subgrade_reaction_MN_m3")
@@ -42,7 +43,7 @@ def test_it_stands_for_plain_entries(tmp_path):
     way = tail.index("  approach:"), tail.index("\n", tail.index("  approach:"))
     tail = f"{tail[: way[0]]}  speed: {sweep.constants['impact_speed_m_s']!r} m/s{tail[way[1] :]}"
     (tmp_path / "plain.yaml").write_text(head + soil + tail)
-    plain = load(tmp_path / "plain.yaml")
+    plain = load(tmp_path / "plain.yaml", deep)
     resolved = sweep.resolved()
     derived = resolved.pop("derived")
     assert resolved == plain.resolved()

@@ -116,7 +116,7 @@ def test_a_result_on_an_object_store(out):
     [
         ("gone", "there is no .*gone; the result of a run is a folder"),
         ("empty", "is not the result of a sweep: no rows of it are finished"),
-        ("x.yaml", r"x\.yaml is a settings file; run it first: sweep run"),
+        ("x.yaml", r"x\.yaml is a settings file; run it first:\n  sweep run"),
         ("x.csv", r"x\.csv is a file; the result of a run is a folder$"),
         ("x.parquet", "is a file; the result of a run is a folder; `sweep report`, .* take a file of answers"),
         ("part", r"is a file; the result of a run is a folder: name the folder it lies in, .*out$"),

@@ -356,7 +356,10 @@ class Page {
     });
     byId("csv").addEventListener("click", () => download(this.csv(), "designs.csv"));
     byId("copy").addEventListener("click", () => this.copy());
-    byId("print").addEventListener("click", () => window.print());
+    byId("print").addEventListener("click", () => {
+      this.writeForPaper();
+      setTimeout(() => window.print(), PAUSE); // figures are drawn anew only between events
+    });
     byId("units").addEventListener("change", () => {
       byId("units").focus(); // a box that is being typed into keeps its text, but not its unit
       this.units.system = byId("units").value;
@@ -373,14 +376,12 @@ class Page {
     window.addEventListener("beforeprint", () => {
       opened = [...document.querySelectorAll("details")].filter((one) => !one.open);
       for (const one of opened) one.open = true;
-      const width = byId("live").clientWidth;
-      document.documentElement.style.setProperty("--screen", `${width}px`);
-      const size = Math.min(PAPER.width / width, 1);
+      document.documentElement.style.setProperty("--screen", `${byId("live").clientWidth}px`);
+      const size = this.shrunk;
       document.documentElement.style.setProperty("--paper", String(size));
       const above = document.querySelector("header")?.offsetHeight ?? 0;
       document.documentElement.style.setProperty("--sheet", `${PAPER[/** @type {"si" | "us"} */ (data.units)] / size - above}px`);
       this.printing = true;
-      this.plots.write(LEAST_PX / size);
       this.paint();
     });
     window.addEventListener("afterprint", () => {
@@ -395,6 +396,16 @@ class Page {
         byId("live").scrollIntoView();
       });
     }
+  }
+
+  /** By how much the page is made smaller to fit the paper. @returns {number} at most 1 */
+  get shrunk() {
+    return Math.min(PAPER.width / byId("live").clientWidth, 1);
+  }
+
+  /** Write beside figures so large that it can be read on paper. */
+  writeForPaper() {
+    this.plots.write(LEAST_PX / this.shrunk);
   }
 
   /** Put on the colours that the reader or the system wants; on paper those of the light. */
@@ -450,6 +461,7 @@ async function main() {
   page.paint();
   page.refresh();
   Object.assign(window, { page });
+  if (location.hash === "#paper") page.writeForPaper();
   document.title = `${data.title}: boulder-sweep`;
   document.documentElement.dataset.ready = "yes";
 }

@@ -70,11 +70,13 @@ class Plots {
     }
   }
 
-  /** Write beside axes in a size. @param {number} pixels */
+  /** Write axes and legends in a size. @param {number} pixels */
   write(pixels) {
+    const size = `${pixels}px`;
     for (const figure of this.document.roots()) {
-      for (const axis of [...figure.left, ...figure.below].filter((part) => part.type !== "Legend")) {
-        axis.axis_label_text_font_size = axis.major_label_text_font_size = `${pixels}px`;
+      for (const part of [...figure.left, ...figure.below, ...figure.right]) {
+        if (part.type === "Legend") part.label_text_font_size = size;
+        else part.axis_label_text_font_size = part.major_label_text_font_size = size;
       }
     }
   }

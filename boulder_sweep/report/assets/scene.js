@@ -56,7 +56,7 @@ class SideView {
     this.shape("boulder", corners.map(place));
     this.line("limit", [s.line, 0], [s.line, 2.5]);
     this.text("limit", s.line + 0.08, 2.5, `${s.rating}: limit`);
-    this.text("limit", s.line + 0.08, 2.18, "of the cargo bed");
+    this.text("limit", s.line + 0.08, 2.04, "of the cargo bed");
     this.truck(s, x_v, motion.time.length > 0 ? at("v_v") : s.speed, at("F_v"));
 
     const peak = Math.max(0, ...(motion.columns.F_v ?? []));
