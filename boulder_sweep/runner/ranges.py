@@ -34,7 +34,7 @@ _PLAIN_S, _LAYERED_S, _OUTLINED_S = 1e-5, 4e-5, 6e-5
 """Cost of a row on one core [s]: of a box in uniform soil, in layers, and of a boulder of several pieces in them."""
 _STEP_S, _LOCATED_STEP_S, _LOCATED = 0.012, 0.006, 3.0
 """Steps at which these hold; where steps end at the yield, rows take three times as long at half the step."""
-_OPINION_S = 1e-4
+_OPINION_S = 2e-5
 """Cost of a second opinion [s]."""
 _TRIES = 2
 _FAILURES_BUDGET = 5_000
