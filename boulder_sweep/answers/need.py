@@ -298,7 +298,7 @@ def asked_of(
     if chance is not None and not 0.0 < chance < 1.0:
         raise QuestionError(f"--probability {probability}: must be more than 0 and less than 100 %")
     if robust is None:
-        robust = chance is None and can_be_asked(sweep)
+        robust = chance is None and can_be_asked(sweep) and bool(sweep.model.second_opinion)
     if margin is None:
         margin = MARGIN if chance is None else 0.0
     least_margin = margin_asked(margin)
@@ -306,6 +306,10 @@ def asked_of(
         raise QuestionError(
             "--robust: second opinions know boxes of rock of given density, dry, level, uniform soil without cohesion "
             "and corrected readings only"
+        )
+    if robust and not sweep.model.second_opinion:
+        raise QuestionError(
+            "--robust needs second opinions: leave out --no-second-opinion, or second_opinion: none in the file"
         )
     if robust and chance is not None:
         raise QuestionError(

@@ -24,6 +24,7 @@ from boulder_sweep.cli.options import (
     refuse_unwritable,
     say_notes,
     say_percents,
+    second_opinion_option,
     set_option,
     take_values,
     units_option,
@@ -41,7 +42,19 @@ Examples:
   sweep need configs/uncertain_site.yaml --probability 0.95 --least mass
   sweep need configs/site.yaml --most speed --between '5 m/s' '40 m/s'
 """
-REPEATED = ("units", "least", "most", "margin", "probability", "between", "robust", "prefer", "at", "overrides")
+REPEATED = (
+    "units",
+    "least",
+    "most",
+    "margin",
+    "probability",
+    "between",
+    "robust",
+    "second_opinion",
+    "prefer",
+    "at",
+    "overrides",
+)
 """Parameters of `need` that decide the answer, which a further question repeats where they were given."""
 
 
@@ -64,6 +77,7 @@ REPEATED = ("units", "least", "most", "margin", "probability", "between", "robus
     help="Count only passes that stand under every second opinion, with the margin, or any pass [robust where second "
     "opinions know such designs, and without --probability].",
 )
+@second_opinion_option
 @click.option(
     "--prefer",
     type=click.Choice(("mass", "depth", "excavation")),
@@ -90,6 +104,7 @@ def need(
     jobs: int | None,
     quiet: bool,
     overrides: tuple[str, ...],
+    second_opinion: bool | None,
     as_json: bool,
     table: bool,
     notes: bool,
@@ -116,7 +131,7 @@ def need(
     refuse_units_of_json(units, as_json)
     if question["probability"] is not None and at is not None:
         raise click.UsageError("--at and --probability cannot be used together")
-    sweep = load_sweep(grid, overrides, quiet=True)
+    sweep = load_sweep(grid, overrides, quiet=True, second_opinion=second_opinion)
     units = units or sweep.units
     if question["probability"] is None:
         sweep = at_values(sweep, at)
@@ -178,6 +193,7 @@ Examples:
 @click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table; samples next to it.")
 @click.option("--plot", "picture", type=OUTPUT, metavar="F.png", help="Picture (.png, .svg or .pdf) of one design.")
 @click.option("--design", type=click.IntRange(min=0), default=0, metavar="ID", help="The design of --plot [0].")
+@second_opinion_option
 @quiet_option
 @units_option
 @set_option
@@ -187,6 +203,7 @@ def uncertainty(
     out: str | None,
     picture: str | None,
     design: int,
+    second_opinion: bool | None,
     units: str | None,
     quiet: bool,
     overrides: tuple[str, ...],
@@ -202,7 +219,7 @@ def uncertainty(
     from boulder_sweep.answers.uncertainty import uncertainty as estimate
 
     refuse_units_of_json(units, as_json)
-    sweep = load_sweep(grid, overrides, quiet, units)
+    sweep = load_sweep(grid, overrides, quiet, units, second_opinion=second_opinion)
     units = units or sweep.units
     refuse_missing(sweep, grid, design)
     refuse_unwritable(out, picture)
@@ -235,11 +252,13 @@ Examples:
 @click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table of all designs.")
 @quiet_option
 @units_option
+@second_opinion_option
 @at_option
 @set_option
 @json_option
 def capacity(
     grid: str,
+    second_opinion: bool | None,
     at: str | None,
     jobs: int | None,
     out: str | None,
@@ -257,7 +276,8 @@ def capacity(
     from boulder_sweep.answers.reserves import reserves
 
     refuse_units_of_json(units, as_json)
-    sweep = take_values(load_sweep(grid, overrides, quiet, units), at, quiet, units)
+    sweep = load_sweep(grid, overrides, quiet, units, second_opinion=second_opinion)
+    sweep = take_values(sweep, at, quiet, units)
     units = units or sweep.units
     refuse_unwritable(out)
     with working(quiet) as progress:

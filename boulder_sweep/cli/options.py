@@ -82,9 +82,10 @@ units_option = click.option("--units", type=click.Choice(SYSTEMS), help="Units s
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="No notes.")
 margin_option = click.option("--margin", default="0", metavar="SHARE", help="Least margin to the limits, e.g. '25 %'.")
 second_opinion_option = click.option(
-    "--second-opinion",
-    is_flag=True,
-    help="Simulate every pass again with friction, vertical motion and weaker laws: robust or sensitive?",
+    "--second-opinion/--no-second-opinion",
+    default=None,
+    help="Simulate every pass again with friction, vertical motion and weaker laws: robust or sensitive? [as in the "
+    "file, where nothing is said: yes]",
 )
 
 
@@ -103,13 +104,15 @@ def talk_options(function: Command) -> Command:
 
 
 def load_sweep(
-    path: str, overrides: Sequence[str], quiet: bool, units: str | None = None, *, second_opinion: bool = False
+    path: str, overrides: Sequence[str], quiet: bool, units: str | None = None, *, second_opinion: bool | None = None
 ) -> Sweep:
-    """Load settings and print the notes on them; see `say_notes`."""
+    """Load settings, with second opinions or without if either is asked, and print the notes; see `say_notes`."""
     from boulder_sweep.settings import load
-    from boulder_sweep.settings.loader import SECOND_OPINION
+    from boulder_sweep.settings.loader import NO_SECOND_OPINION, SECOND_OPINION
 
-    sweep = load(path, (*overrides, SECOND_OPINION) if second_opinion else overrides)
+    if second_opinion is not None:
+        overrides = (*overrides, SECOND_OPINION if second_opinion else NO_SECOND_OPINION)
+    sweep = load(path, overrides)
     if not quiet:
         say_notes(sweep, units)
     return sweep

@@ -68,7 +68,7 @@ def run(
     out: str | None,
     overrides: tuple[str, ...],
     accuracy: str | None,
-    second_opinion: bool,
+    second_opinion: bool | None,
     at: str | None,
     dry_run: bool,
     as_json: bool,

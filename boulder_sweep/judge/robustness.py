@@ -204,7 +204,14 @@ def standing(judged: Judged) -> np.ndarray:
 
 
 def with_second_opinions(
-    judged: Judged, passes: Designs, laws: tuple[str, ...], present: str, limits: Any, longest_s: float
+    judged: Judged,
+    passes: Designs,
+    laws: tuple[str, ...],
+    present: str,
+    limits: Any,
+    longest_s: float,
+    *,
+    told: bool = True,
 ) -> Judged:
     """Return judged rows with passes simulated again.
 
@@ -220,6 +227,8 @@ def with_second_opinions(
         Designs of those that pass.
     laws, present, limits, longest_s
         As of `stands`.
+    told
+        Whether passes that `DECISIVE` overturns are simulated under another law, only to tell whether they stand there.
     """
     passing = np.flatnonzero(judged.verdict == PASS)
     grade, under = judged["robustness"].copy(), judged["stands_under"].copy()
@@ -243,7 +252,7 @@ def with_second_opinions(
         for law in SECOND_OPINIONS:
             if law != DECISIVE:
                 weaker = with_law(passes.table, law, present).K_epsilon < resistance
-                ask(law, np.flatnonzero(turned | weaker))
+                ask(law, np.flatnonzero(turned | weaker if told else weaker & ~turned))
     grade[passing[turned]] = SENSITIVE
     if DECISIVE in laws:
         studied = are_studied(passes, limits)
