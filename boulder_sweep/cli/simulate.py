@@ -89,7 +89,7 @@ def simulate(
     number, again, location = design or 0, None, location_of(case)
     if _is_result(location):
         if overrides or at is not None or second_opinion is not None:
-            given = "--set, --at and --[no-]second-opinion"
+            given = "--set, --at and --second-opinion"
             raise click.UsageError(f"{given} change the settings of a file; {case} is the result of a run")
         refuse_unwritable_history(plot, trajectory, energy, animate)
         again = _computed_again(location, number, quiet or as_json)
