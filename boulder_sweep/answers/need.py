@@ -311,10 +311,6 @@ def asked_of(
         raise QuestionError(
             "--robust needs second opinions: leave out --no-second-opinion, or second_opinion: none in the file"
         )
-    if robust and chance is not None:
-        raise QuestionError(
-            "--robust and --probability cannot be used together: second opinions are not asked of the designs drawn"
-        )
     return Asked(
         _question(sweep, key, between, judges_of(sweep, least_margin, robust=robust), chance, seed), chance, prefer
     )
@@ -393,5 +389,5 @@ def _table_of(asked: Question | LightestQuestion, start: int, stop: int) -> tupl
         *to_build(answers.block, asked.sweep),
     ]
     if answers.chances is not None:
-        columns += chance_columns(answers.chances, "chance of passing at the answer, or at the value tried last")
+        columns += chance_columns(answers.chances, " at the answer, or at the value tried last")
     return rows_table(start, answers.block, answers.judged, columns, at=1 + len(INPUTS)), answers.simulated
