@@ -100,7 +100,7 @@ class Design:
             EXCAVATED.name: self.excavated_m3,
             "margin": self.margin if self.chance is None else None,
             "p_pass": self.chance,
-            "p_robust": self.chance_robust,
+            **({} if self.chance_robust is None else {"p_robust": self.chance_robust}),
             "robustness": self.grade,
             "validity": SEPARATOR.join(self.flags),
             "rows": self.rows,

@@ -145,10 +145,10 @@ def uncertainty(
         raise QuestionError(f"--confidence {confidence}: must be at least 50 % and less than 100 %")
     if seed < 0:
         raise QuestionError(f"--seed {seed}: must not be negative")
-    graded = can_be_asked(sweep) and bool(sweep.model.second_opinion)
+    spread, graded = Spread(sweep), can_be_asked(sweep) and bool(sweep.model.second_opinion)
     judges = judges_of(sweep, least_margin, robust=graded)
     judges.final.warm_up()
-    asked = _Asked(sweep, Spread(sweep), judges.of_any_pass(), judges if graded else None, width, sure, most)
+    asked = _Asked(sweep, spread, judges.of_any_pass(), judges if graded else None, width, sure, most)
     points = Points(len(asked.spread.names), seed)
     threads = Pool(jobs)
     pieces = ranges(sweep.n_designs, ROWS_AT_ONCE)
