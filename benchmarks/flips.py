@@ -195,7 +195,9 @@ def outcomes(cases: Mapping[str, Case], configs: tuple[str, ...], every: int = 1
             files[title] = folder / f"{number}.yaml"
             files[title].write_text(f"name: flips\ntable: {number}.parquet\n{case.settings}\n")
         for title, file in files.items():
-            out, sweep = folder / f"{file.stem}.sweep", load(file)
+            # The other cases freeze what passes are worth without being asked.
+            asked = SECOND_OPINIONS in cases[title].settings if title in cases else False
+            out, sweep = folder / f"{file.stem}.sweep", load(file, [] if asked else ["model.second_opinion=none"])
             run(sweep, out)
             frame = read(out)
             found = frame[SETTLED_BY].astype("string").fillna("").astype(str)

@@ -269,7 +269,9 @@ class _Words:
         row, margin = design.rows[0], self.need.least_margin
         build = f"ury {self.boulder(row)} ({self.mass(row)}) {self.depth(design)}: it passes{self.everywhere()}"
         if design.chance is not None:
-            holds = f" with a probability of {100.0 * design.chance:.1f}{NO_BREAK_SPACE}%"
+            chance = design.chance_robust if self.need.robust and design.chance_robust is not None else design.chance
+            holds = f" {MODELS}" if self.need.robust else ""
+            holds += f" with a probability of {100.0 * chance:.1f}{NO_BREAK_SPACE}%"
             holds += f" and {percent(margin)} to spare" if margin else ""
         else:
             holds = f" with {percent(design.margin)} to spare{self.opinions(design)}"

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import betaincinv, ndtri, stdtrit
@@ -96,6 +97,24 @@ class Sampled:
     points: np.ndarray
     unknown: np.ndarray
     cause: np.ndarray
+
+
+class Chances(NamedTuple):
+    """Chances of n rows of passing, and of a pass that stands under the second opinion that decides."""
+
+    passing: Sampled
+    robust: Sampled | None
+    """None where second opinions are not asked."""
+
+    @property
+    def asked(self) -> Sampled:
+        """The chance that a question about a probability is about."""
+        return self.passing if self.robust is None else self.robust
+
+    @property
+    def points(self) -> int:
+        """Designs drawn for all of them."""
+        return sum(int(one.points.sum()) for one in self if one is not None)
 
 
 def chance(

@@ -236,7 +236,7 @@ def need(
     if chance is not None and not 0.0 < chance < 1.0:
         raise QuestionError(f"--probability {probability}: must be more than 0 and less than 100 %")
     if robust is None:
-        robust = chance is None and can_be_asked(sweep)
+        robust = chance is None and can_be_asked(sweep) and bool(sweep.model.second_opinion)
     if margin is None:
         margin = MARGIN if chance is None else 0.0
     least_margin = margin_asked(margin)
@@ -245,9 +245,9 @@ def need(
             "--robust: second opinions know boxes of rock of given density, dry, level, uniform soil without cohesion "
             "and corrected readings only"
         )
-    if robust and chance is not None:
+    if robust and not sweep.model.second_opinion:
         raise QuestionError(
-            "--robust and --probability cannot be used together: second opinions are not asked of the designs drawn"
+            "--robust needs second opinions: leave out --no-second-opinion, or second_opinion: none in the file"
         )
     asked = _question(sweep, key, between, judges_of(sweep, least_margin, robust=robust), chance, seed)
     if ready is not None:
@@ -356,5 +356,5 @@ def _table_of(asked: Question | LightestQuestion, start: int, stop: int) -> tupl
         *to_build(answers.block, asked.sweep),
     ]
     if answers.chances is not None:
-        columns += chance_columns(answers.chances, "chance of passing at the answer, or at the value tried last")
+        columns += chance_columns(answers.chances, " at the answer, or at the value tried last")
     return rows_table(start, answers.block, answers.judged, columns, at=1 + len(INPUTS)), answers.simulated

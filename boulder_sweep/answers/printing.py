@@ -147,6 +147,17 @@ def reasons_in(table: pa.Table) -> set[str | None]:
     return {reason for name in columns for reason in table[name].unique().to_pylist()}
 
 
+def robust_columns(table: pa.Table) -> list[Column]:
+    """Return the columns of the chance of a robust pass and its interval, where second opinions were asked."""
+    if "p_robust" not in table.column_names:
+        return []
+    return [
+        (("P(robust)", ""), lambda row: f"{row['p_robust']:.4f}"),
+        (("from", ""), lambda row: f"{row['p_robust_low']:.4f}"),
+        (("to", ""), lambda row: f"{row['p_robust_high']:.4f}"),
+    ]
+
+
 def undecided_columns(table: pa.Table) -> list[Column]:
     """Return the column of the share of the designs drawn that is undecided, where some are."""
     if not any(table["p_undecided"].to_pylist()):
@@ -204,6 +215,7 @@ def uncertainty_lines(result: Uncertainty, units: str = "si") -> list[str]:
         (("P(pass)", ""), lambda row: f"{row['p_pass']:.4f}"),
         (("from", ""), lambda row: f"{row['p_pass_low']:.4f}"),
         (("to", ""), lambda row: f"{row['p_pass_high']:.4f}"),
+        *robust_columns(result.arrow),
         *undecided_columns(result.arrow),
         (("decided", "by"), lambda row: row["p_pass_driver"] or "-"),
         (("designs", "drawn"), lambda row: f"{row['p_pass_designs']:,}"),
@@ -377,7 +389,7 @@ def _title(need: Need) -> str:
 def _shown_part(need: Need) -> pa.Table:
     """Return the columns that lines are made of: rows of all would take longer to make than to search."""
     needed = {*HEADS, *need.sweep.plan.labels, "design_id", "boulder_mass_kg", "passes_at", "robustness"}
-    needed |= {"margin", "p_pass", "p_undecided", "p_undecided_reason", EXCAVATED.name, BACKFILLED.name}
+    needed |= {"margin", "p_pass", "p_robust", "p_undecided", "p_undecided_reason", EXCAVATED.name, BACKFILLED.name}
     needed |= {need.key.answer, "found"}
     return need.arrow.select([name for name in need.arrow.column_names if name in needed])
 
@@ -552,7 +564,9 @@ def _need_columns(need: Need, units: str) -> list[Column]:
             columns.append((("above", unit), _where_it_passes(lambda row: f"{row[HEIGHT] - row[DEPTH]:.2f}")))
         columns.append(_mass(units))
     if "p_pass" in need.arrow.column_names:
-        columns.append((("P(pass)", ""), _chance))
+        columns.append((("P(pass)", ""), _chance("p_pass")))
+        if need.robust:
+            columns.append((("P(robust)", ""), _chance("p_robust")))
         columns += undecided_columns(need.arrow)
     else:
         columns.append((("margin", ""), _where_it_passes(_margin)))
@@ -570,8 +584,9 @@ def _length(name: str) -> Cell:
     return lambda row: f"{row[name]:.3f}"
 
 
-def _chance(row: Row) -> str:
-    return "" if row["passes_at"] is None and not row["p_undecided"] else f"{row['p_pass']:.3f}"
+def _chance(name: str) -> Cell:
+    """Return a formatter for a probability at the answer."""
+    return lambda row: "" if row["passes_at"] is None and not row["p_undecided"] else f"{row[name]:.3f}"
 
 
 def _margin(row: Row) -> str:

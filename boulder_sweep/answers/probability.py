@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_sweep.answers.chance import SCRAMBLINGS, Points, Sampled, chance
+from boulder_sweep.answers.chance import SCRAMBLINGS, Chances, Points, Sampled, chance
 from boulder_sweep.answers.draws import WORST, Draws
 from boulder_sweep.answers.keys import Ends, Key, range_of
 from boulder_sweep.answers.lightest import DEPTH, RATIO, Boulders, LightestQuestion, Sides
@@ -56,7 +56,7 @@ AT_ONCE = 1 << 18
 
 
 class Sampling:
-    """Designs drawn with some inputs set, of which enough must pass.
+    """Designs drawn with some inputs set, of which enough must pass, or be robust if the judges ask for it.
 
     All rows and values use the same points, so that the share that passes depends on the inputs alone.
 
@@ -109,14 +109,19 @@ class Sampling:
             codes[start:stop] = np.where((known == 1).mean(axis=1) >= self.probability, HOLDS, failing)
         return codes
 
-    def chances(self, draws: Draws, inputs: InputRows) -> Sampled:
-        """Return the probabilities of passing of all rows with inputs set, from the points and more where needed."""
-
-        def event(index: np.ndarray, z: np.ndarray) -> np.ndarray:
-            return draws.drawn(index, z, **rows_at(inputs, index))[1]
-
+    def chances(self, draws: Draws, inputs: InputRows) -> Chances:
+        """Return the probabilities of all rows with inputs set, from the points and more where needed."""
         count, points = len(next(iter(inputs.values()))), Points(len(self.spread.names), self.seed)
-        return chance(event, count, points, half_width=HALF_WIDTH, first=DRAWN // SCRAMBLINGS)
+
+        def sampled(draws: Draws) -> Sampled:
+            def event(index: np.ndarray, z: np.ndarray) -> np.ndarray:
+                return draws.drawn(index, z, **rows_at(inputs, index))[1]
+
+            return chance(event, count, points, half_width=HALF_WIDTH, first=DRAWN // SCRAMBLINGS)
+
+        if not self.judges.robust:
+            return Chances(sampled(draws), None)
+        return Chances(sampled(replace(draws, judges=self.judges.of_any_pass())), sampled(draws))
 
 
 class ProbabilityQuestion(Question):
@@ -150,10 +155,11 @@ class ProbabilityQuestion(Question):
         """Return the outcomes at the means, without a grade."""
         return ungraded(judged)
 
-    def undecided(self, judged: Judged, chances: Sampled | None) -> np.ndarray:
+    def undecided(self, judged: Judged, chances: Chances | None) -> np.ndarray:
         """Return where enough designs would pass if those that are undecided did, bool, shape (n,)."""
         assert chances is not None
-        return (chances.unknown > 0.0) & (chances.estimate + chances.unknown >= self.sampling.probability)
+        asked = chances.asked
+        return (asked.unknown > 0.0) & (asked.estimate + asked.unknown >= self.sampling.probability)
 
     def values_to_try(self) -> int:
         """Return how many values are tried in all, if every row changes once from failing to passing."""
@@ -174,12 +180,12 @@ class ProbabilityTrial(Trial):
         """Return no rows: the designs drawn near a limit are judged with the accuracy of the sweep anyway."""
         return np.empty(0, dtype=np.int64)
 
-    def chances(self, positions: np.ndarray) -> Sampled:
-        """Return the probabilities of passing at some values, one for each row."""
+    def chances(self, positions: np.ndarray) -> Chances:
+        """Return the probabilities at some values, one for each row."""
         inputs = self._inputs(self.block(np.arange(len(positions)), positions), positions)
-        sampled = self.asked.sampling.chances(self.draws, inputs)
-        self.simulated += int(sampled.points.sum())
-        return sampled
+        chances = self.asked.sampling.chances(self.draws, inputs)
+        self.simulated += chances.points
+        return chances
 
     def _codes(self, index: np.ndarray, positions: np.ndarray, *, quick: bool) -> np.ndarray:
         block, judged = self.judged(index, positions, quick=True)
@@ -237,7 +243,7 @@ class LikelyLightestQuestion(LightestQuestion):
         answers = super().answered(start, stop)
         sizes = {name: answers.block.columns[name].to_numpy() for name in (*SIDES, DEPTH)}
         chances = self.sampling.chances(self.sampling.draws(self.given(start, stop)), sizes)
-        simulated = answers.simulated + int(chances.points.sum())
+        simulated = answers.simulated + chances.points
         return replace(answers, judged=ungraded(answers.judged), chances=chances, simulated=simulated)
 
 

@@ -62,7 +62,7 @@ COARSE_DEPTHS, FINE_DEPTHS, DEPTH_ROUNDS = 7, 5, 5
 wide as the one before: in the end they are 1/128 of the range apart, some 10 mm."""
 
 if TYPE_CHECKING:
-    from boulder_sweep.answers.chance import Sampled
+    from boulder_sweep.answers.chance import Chances
     from boulder_sweep.designs import DesignBlock
     from boulder_sweep.judge.judged import Judged
     from boulder_sweep.settings import Sweep
@@ -102,14 +102,14 @@ class Answers(Brackets):
         All passing intervals, for rows that are not monotone.
     simulated : int
         Designs simulated on the way.
-    chances : Sampled or None
-        Probabilities of passing at the answers, if one was asked for.
+    chances : Chances or None
+        Probabilities at the answers, if one was asked for.
     """
 
     judged: Judged
     stretches: list[str | None]
     simulated: int
-    chances: Sampled | None = None
+    chances: Chances | None = None
 
 
 class ValueSearch:
@@ -169,7 +169,7 @@ class ValueSearch:
         """Return the outcomes at the answers with their grades."""
         return self.judges.final.graded(judged, block)
 
-    def undecided(self, judged: Judged, chances: Sampled | None) -> np.ndarray:
+    def undecided(self, judged: Judged, chances: Chances | None) -> np.ndarray:
         """Return where designs that are no answers would be if what is undecided passed, bool, shape (n,)."""
         return judged.verdict == UNDECIDED
 
@@ -195,7 +195,7 @@ class ValueSearch:
         return shorter(result, steady(searched_again(whole, result, some, result.holds, last, self.cells)), last)
 
     def _kinds(
-        self, trial: Trial, result: Search, judged: Judged, chances: Sampled | None, end: np.ndarray
+        self, trial: Trial, result: Search, judged: Judged, chances: Chances | None, end: np.ndarray
     ) -> np.ndarray:
         """Return the kinds of the answers of some rows, codes of `WORDS`, shape (n,).
 
@@ -383,8 +383,8 @@ class Trial:
         # Rows that are not monotone have several brackets, all of which must be certified.
         return np.flatnonzero(wrong | (result.kind == NOT_MONOTONE))
 
-    def chances(self, positions: np.ndarray) -> Sampled | None:
-        """Return the probabilities of passing at some values, one for each row; None if none is asked for."""
+    def chances(self, positions: np.ndarray) -> Chances | None:
+        """Return the probabilities at some values, one for each row; None if none is asked for."""
         return None
 
     def _codes(self, index: np.ndarray, positions: np.ndarray, *, quick: bool) -> np.ndarray:

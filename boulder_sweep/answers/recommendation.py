@@ -78,6 +78,11 @@ class Design:
         return min((row["p_pass"] for row in self.rows if "p_pass" in row), default=None)
 
     @property
+    def chance_robust(self) -> float | None:
+        """Least probability of a pass that stands under the second opinion that decides; None where none was asked."""
+        return min((row["p_robust"] for row in self.rows if "p_robust" in row), default=None)
+
+    @property
     def grade(self) -> str | None:
         """Worst grade, one of `GRADES`; None where there is none."""
         return max((row["robustness"] for row in self.rows), key=RANKS.__getitem__)
@@ -95,6 +100,7 @@ class Design:
             EXCAVATED.name: self.excavated_m3,
             "margin": self.margin if self.chance is None else None,
             "p_pass": self.chance,
+            **({} if self.chance_robust is None else {"p_robust": self.chance_robust}),
             "robustness": self.grade,
             "validity": SEPARATOR.join(self.flags),
             "rows": self.rows,
@@ -371,10 +377,10 @@ class _Boulders:
             judged = judges.final.graded(judged, block)
         else:
             chances = self.sampling.chances(self.sampling.draws(given), inputs)
-            if (chances.high < self.sampling.probability).any():
+            if (chances.asked.high < self.sampling.probability).any():
                 return None
             judged = ungraded(judged)
-            columns += chance_columns(chances, "chance of passing")
+            columns += chance_columns(chances)
         return rows_table(0, block, judged, columns).to_pylist()
 
     def nearest(self, asked: Question) -> Nearest:

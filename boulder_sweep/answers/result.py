@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
-    from boulder_sweep.answers.chance import Sampled
+    from boulder_sweep.answers.chance import Chances
     from boulder_sweep.answers.trials import Judges
     from boulder_sweep.designs import DesignBlock
     from boulder_sweep.judge.judged import Judged
@@ -68,19 +68,31 @@ class Result:
         return frame
 
 
-def chance_columns(sampled: Sampled, meaning: str) -> list[TableColumn]:
-    """Return the columns of probabilities of passing, the first with a meaning of its own."""
+def chance_columns(chances: Chances, where: str = "") -> list[TableColumn]:
+    """Return the columns of the chances of passing, and of a robust pass if they are known; `where` they hold."""
     from boulder_sweep.store.part import word_array
 
     low = "lower end of the interval of p_pass"
     high = "upper end of the interval of p_pass, at which all that is undecided passes"
     reason = "commonest reason of the designs drawn that are undecided; null where none is"
-    return [
-        ("p_pass", "1", meaning, sampled.estimate),
+    sampled, robust = chances
+    columns: list[TableColumn] = [
+        ("p_pass", "1", f"chance that the design passes{where}", sampled.estimate),
         ("p_pass_low", "1", low, sampled.low),
         ("p_pass_high", "1", high, sampled.high),
         ("p_undecided", "1", "chance that the design is undecided", sampled.unknown),
         ("p_undecided_reason", "", reason, word_array(sampled.cause - 1, REASONS[1:])),
+    ]
+    if robust is None:
+        return columns
+    stands = (
+        "stands under the second opinion that decides: robust, or open only because outside the ranges of the study"
+    )
+    return [
+        *columns,
+        ("p_robust", "1", f"chance that the design passes{where}, and {stands}", robust.estimate),
+        ("p_robust_low", "1", "lower end of the interval of p_robust", robust.low),
+        ("p_robust_high", "1", "upper end of the interval of p_robust, as of p_pass_high", robust.high),
     ]
 
 

@@ -122,6 +122,12 @@ class Judges:
     least_margin: float = 0.0
     robust: bool = False
 
+    def of_any_pass(self) -> Judges:
+        """Return the same, to count any pass."""
+        final = dataclasses.replace(self.final, second_opinion=())
+        coarse = final if self.coarse is self.final else dataclasses.replace(self.coarse, second_opinion=())
+        return dataclasses.replace(self, coarse=coarse, final=final, robust=False)
+
     def holds(self, judged: Judged) -> np.ndarray:
         """Return whether rows pass with the requested margin and robustness, bool, shape (n,)."""
         passes = judged.verdict == PASS
@@ -215,13 +221,15 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0, *, robust: bool = False) 
     """
     accuracy = accuracy_of(sweep)
     final = dataclasses.replace(evaluation_of(sweep, accuracy), least_margin=least_margin)
+    final = dataclasses.replace(final, askable=final.askable and bool(sweep.model.second_opinion))
     coarse = evaluation_of(sweep, Accuracy("fast", steps_of(sweep)["fast"], error_estimate=False))
     searched = coarse.limits._replace(guarded=False)
     # A late row is found by the quick solution, too, and confirmed by the other.
     control = coarse.control._replace(longest_horizon=final.control.longest_horizon)
     coarse = dataclasses.replace(coarse, only=SEARCHED, least_margin=least_margin, limits=searched, control=control)
     if robust:
-        final, coarse = final.asked(), dataclasses.replace(coarse.asked(), only=(*SEARCHED, *GRADED))
+        final = final.asked()
+        coarse = dataclasses.replace(coarse.asked(), only=(*SEARCHED, *GRADED), deciding_laws_only=True)
     else:  # asked of the answers alone
         final, coarse = (dataclasses.replace(each, second_opinion=()) for each in (final, coarse))
     if not accuracy.error_estimate and accuracy.steps.step_s >= coarse.control.h:

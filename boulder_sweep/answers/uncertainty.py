@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_sweep.answers.chance import FIRST, SCRAMBLINGS, Points, chance
+from boulder_sweep.answers.chance import FIRST, SCRAMBLINGS, Chances, Event, Points, Sampled, chance
 from boulder_sweep.answers.draws import Draws
 from boulder_sweep.answers.keys import margin_asked, share
 from boulder_sweep.answers.result import (
@@ -27,6 +27,7 @@ from boulder_sweep.answers.trials import Judges, judges_of, ranges, uncertain_ro
 from boulder_sweep.designs import block_of
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
+from boulder_sweep.judge.robustness import can_be_asked
 from boulder_sweep.locations import Location
 from boulder_sweep.runner.pool import Pool
 from boulder_sweep.settings.loader import sweep_of
@@ -56,7 +57,8 @@ class Uncertainty(Result):
     ----------
     sweep, arrow
         As of `Result`: inputs with the means of the uncertain ones, the outcome at these means, the chance of passing
-        with its interval, and the most influential input.
+        and of a robust pass (`p_robust`, unless second opinions are left out or do not know such designs), with their
+        intervals, and the most influential input.
     samples : pyarrow.Table
         Designs drawn: number of the design, uncertain inputs, distance to failing; none where there are more than
         `MOST_SAMPLED` designs.
@@ -150,12 +152,13 @@ def uncertainty(
         raise QuestionError(f"--confidence {confidence}: must be at least 50 % and less than 100 %")
     if seed < 0:
         raise QuestionError(f"--seed {seed}: must not be negative")
-    spread = Spread(sweep)
+    spread, graded = Spread(sweep), can_be_asked(sweep) and bool(sweep.model.second_opinion)
     sweep.need_depth()
-    asked = _Asked(sweep, spread, judges_of(sweep, least_margin), width, sure, most)
+    judges = judges_of(sweep, least_margin, robust=graded)
+    asked = _Asked(sweep, spread, judges.of_any_pass(), judges if graded else None, width, sure, most)
     if ready is not None:
         ready()
-    asked.judges.final.warm_up()
+    judges.final.warm_up()
     points = Points(len(asked.spread.names), seed)
     threads = Pool(jobs)
     pieces = ranges(sweep.n_designs, ROWS_AT_ONCE)
@@ -181,9 +184,15 @@ class _Asked:
     sweep: Sweep
     spread: Spread
     judges: Judges
+    robust: Judges | None
+    """Those that count only robust passes; None where second opinions are not asked."""
     half_width: float
     confidence: float
     most: int
+
+    def sampled(self, event: Event, rows: int, points: Points) -> Sampled:
+        """Return the probabilities of an event."""
+        return chance(event, rows, points, half_width=self.half_width, confidence=self.confidence, most=self.most)
 
     def draws(self, start: int, stop: int, parallel: Pool) -> Draws:
         """Return what samples the designs of the rows ``[start, stop)``."""
@@ -205,14 +214,20 @@ def _rows(asked: _Asked, points: Points, parallel: Pool, start: int, stop: int) 
             first.append(distance.reshape(n, -1))
         return known
 
-    sampled = chance(event, n, points, half_width=asked.half_width, confidence=asked.confidence, most=asked.most)
+    def stands(index: np.ndarray, z: np.ndarray) -> np.ndarray:
+        return robust.drawn(index, z)[1]
+
+    sampled, graded = asked.sampled(event, n, points), None
+    if asked.robust is not None:
+        robust = replace(draws, judges=asked.robust)
+        graded = asked.sampled(stands, n, points)
     z = points.upto(FIRST).reshape(FIRST * SCRAMBLINGS, -1)
     driver = drivers(z, first[0])
     block = replace(block_of(draws.rows), labels=asked.sweep.block(start, stop).labels)
     judged = ungraded(asked.judges.final(block))
     driver_meaning = "most influential of the uncertain inputs; null where they change nothing"
     columns: list[TableColumn] = [
-        *chance_columns(sampled, "chance that the design passes"),
+        *chance_columns(Chances(sampled, graded)),
         ("p_pass_driver", "", driver_meaning, word_array(driver, tuple(asked.spread.words))),
         ("p_pass_designs", "1", "designs drawn for p_pass", sampled.points),
     ]

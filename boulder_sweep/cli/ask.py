@@ -24,8 +24,10 @@ from boulder_sweep.cli.options import (
     refuse_unwritable,
     say_notes,
     say_percents,
+    second_opinion_option,
     set_option,
     units_option,
+    with_or_without,
 )
 from boulder_sweep.cli.output import say, show, working
 from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
@@ -40,7 +42,19 @@ Examples:
   sweep need configs/uncertain_site.yaml --probability 0.95 --least mass
   sweep need configs/site.yaml --most speed --between '5 m/s' '40 m/s'
 """
-REPEATED = ("units", "least", "most", "margin", "probability", "between", "robust", "prefer", "at", "overrides")
+REPEATED = (
+    "units",
+    "least",
+    "most",
+    "margin",
+    "probability",
+    "between",
+    "robust",
+    "second_opinion",
+    "prefer",
+    "at",
+    "overrides",
+)
 """Parameters of `need` that decide the answer, which a further question repeats where they were given."""
 
 
@@ -63,6 +77,7 @@ REPEATED = ("units", "least", "most", "margin", "probability", "between", "robus
     help="Count only passes that stand under every second opinion, with the margin, or any pass [robust where second "
     "opinions know such designs, and without --probability].",
 )
+@second_opinion_option
 @click.option(
     "--prefer",
     type=click.Choice(("mass", "depth", "excavation")),
@@ -89,6 +104,7 @@ def need(
     jobs: int | None,
     quiet: bool,
     overrides: tuple[str, ...],
+    second_opinion: bool | None,
     as_json: bool,
     table: bool,
     notes: bool,
@@ -116,7 +132,7 @@ def need(
     refuse_units_of_json(units, as_json)
     if question["probability"] is not None and at is not None:
         raise click.UsageError("--at and --probability cannot be used together")
-    sweep = load(grid, overrides)
+    sweep = load(grid, with_or_without(overrides, second_opinion))
     units = units or sweep.units
     if question["probability"] is None:
         sweep = at_values(sweep, at)
@@ -180,6 +196,7 @@ Examples:
 @click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table; samples next to it.")
 @click.option("--plot", "picture", type=OUTPUT, metavar="F.png", help="Picture (.png, .svg or .pdf) of one design.")
 @click.option("--design", type=click.IntRange(min=0), default=0, metavar="ID", help="The design of --plot [0].")
+@second_opinion_option
 @quiet_option
 @units_option
 @set_option
@@ -189,6 +206,7 @@ def uncertainty(
     out: str | None,
     picture: str | None,
     design: int,
+    second_opinion: bool | None,
     units: str | None,
     quiet: bool,
     overrides: tuple[str, ...],
@@ -205,7 +223,7 @@ def uncertainty(
     from boulder_sweep.settings import load
 
     refuse_units_of_json(units, as_json)
-    sweep = load(grid, overrides)
+    sweep = load(grid, with_or_without(overrides, second_opinion))
     units = units or sweep.units
     refuse_missing(sweep, grid, design)
     refuse_unwritable(out, picture)
@@ -242,11 +260,13 @@ Examples:
 @click.option("-o", "--output", "out", type=OUTPUT, metavar="F.parquet", help="Table of all designs.")
 @quiet_option
 @units_option
+@second_opinion_option
 @at_option
 @set_option
 @json_option
 def capacity(
     grid: str,
+    second_opinion: bool | None,
     at: str | None,
     jobs: int | None,
     out: str | None,
@@ -264,7 +284,7 @@ def capacity(
     from boulder_sweep.answers.reserves import capacity as withstood
 
     refuse_units_of_json(units, as_json)
-    sweep = load_given(grid, overrides, at)
+    sweep = load_given(grid, with_or_without(overrides, second_opinion), at)
     units = units or sweep.units
     refuse_unwritable(out)
     if not quiet:

@@ -90,7 +90,7 @@ def robustness_lines(reasons: Mapping[str, int]) -> list[str]:
         return []
     lines = [f"pass   is {NOT_A_RATING}", *_indent(f"robust: {IN_WORDS}", "       ")]
     if "pass/open" in reasons:
-        words = "open: not asked (--second-opinion asks), or outside the ranges of their study (docs/confidence.md)"
+        words = "open: not asked, or outside the ranges of their study (docs/confidence.md)"
         lines += _indent(words, "       ")
     return lines
 

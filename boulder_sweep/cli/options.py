@@ -82,9 +82,10 @@ units_option = click.option("--units", type=click.Choice(SYSTEMS), help="Units s
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="No notes.")
 margin_option = click.option("--margin", default="0", metavar="SHARE", help="Least margin to the limits, e.g. '25 %'.")
 second_opinion_option = click.option(
-    "--second-opinion",
-    is_flag=True,
-    help="Simulate every pass again with friction, vertical motion and weaker laws: robust or sensitive?",
+    "--second-opinion/--no-second-opinion",
+    default=None,
+    help="Simulate every pass again with friction, vertical motion and weaker laws: robust or sensitive? [as in the "
+    "file, where nothing is said: yes]",
 )
 
 
@@ -102,13 +103,21 @@ def talk_options(function: Command) -> Command:
     return command
 
 
-def load_given(path: str, overrides: Sequence[str], at: str | None = None, *, second_opinion: bool = False) -> Sweep:
+def with_or_without(overrides: Sequence[str], second_opinion: bool | None) -> Sequence[str]:
+    """Return overrides with second opinions or without, as the user says; None for what the file says."""
+    from boulder_sweep.settings.loader import NO_SECOND_OPINION, SECOND_OPINION
+
+    if second_opinion is None:
+        return overrides
+    return (*overrides, SECOND_OPINION if second_opinion else NO_SECOND_OPINION)
+
+
+def load_given(path: str, overrides: Sequence[str], at: str | None = None) -> Sweep:
     """Load settings for a command that needs a depth and one value for every uncertain input; nothing is said."""
     from boulder_sweep.judge.quantiles import at_values
     from boulder_sweep.settings import load
-    from boulder_sweep.settings.loader import SECOND_OPINION
 
-    sweep = load(path, (*overrides, SECOND_OPINION) if second_opinion else overrides)
+    sweep = load(path, overrides)
     sweep.need_depth()
     return at_values(sweep, at)
 

@@ -23,6 +23,7 @@ from boulder_sweep.cli.options import (
     set_option,
     talk_options,
     units_option,
+    with_or_without,
 )
 from boulder_sweep.cli.output import Notes, progress, say, show, wrap
 from boulder_sweep.errors import Interrupted
@@ -68,7 +69,7 @@ def run(
     out: str | None,
     overrides: tuple[str, ...],
     accuracy: str | None,
-    second_opinion: bool,
+    second_opinion: bool | None,
     at: str | None,
     dry_run: bool,
     as_json: bool,
@@ -85,7 +86,7 @@ def run(
     if options["scheduler"] and options["backend"] != DASK:
         raise click.UsageError("--scheduler needs --backend dask")
     chosen = overrides if accuracy is None else (*overrides, f"--accuracy={accuracy}")
-    sweep = load_given(grid, chosen, at, second_opinion=second_opinion)
+    sweep = load_given(grid, with_or_without(chosen, second_opinion), at)
     if not quiet:
         say_notes(sweep)
     target = location_of(out or f"{sweep.name.replace(' ', '-')}.sweep")

@@ -18,6 +18,7 @@ from boulder_sweep.cli.options import (
     refuse_missing,
     result_argument,
     say_notes,
+    second_opinion_option,
     set_option,
     units_option,
 )
@@ -194,6 +195,7 @@ Examples:
     metavar="N",
     help="Show this design in full (may be repeated) [default: the one that is recommended].",
 )
+@second_opinion_option
 @click.option("--project", metavar="TEXT", help="Heading of the report; wins over report.project in the file.")
 @click.option("--client", metavar="TEXT", help="The same of the client,")
 @click.option("--site", metavar="TEXT", help="the site,")
@@ -202,7 +204,14 @@ Examples:
 @click.option("--author", metavar="TEXT", help="who made it,")
 @click.option("--checked-by", metavar="TEXT", help="and who checked it.")
 @units_option
-def report(out: str, page: str | None, designs: tuple[int, ...], units: str | None, **heading: str | None) -> int:
+def report(
+    out: str,
+    page: str | None,
+    designs: tuple[int, ...],
+    second_opinion: bool | None,
+    units: str | None,
+    **heading: str | None,
+) -> int:
     """Write the result in OUT as one HTML file: the answer, the map, and the simulator, which runs in the page.
 
     OUT is the folder of a run, or a file that -o of `sweep need`, `capacity` or `uncertainty` wrote: the answers then
@@ -220,7 +229,15 @@ def report(out: str, page: str | None, designs: tuple[int, ...], units: str | No
             raise click.UsageError(f"--{key.replace('_', '-')} {wrong}")
     folder = location_of(out)
     target = checked_page(page) if page else beside(location_of(out.removesuffix(".parquet")), ".html")
-    written = write_report(folder, target, designs=designs, units=units, command=_command(), heading=Heading(**given))
+    written = write_report(
+        folder,
+        target,
+        designs=designs,
+        units=units,
+        command=_command(),
+        heading=Heading(**given),
+        second_opinion=second_opinion is not False,
+    )
     _show_page(written)
     return 0
 

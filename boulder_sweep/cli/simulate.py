@@ -19,9 +19,11 @@ from boulder_sweep.cli.options import (
     refuse_missing,
     refuse_unwritable_history,
     say_notes,
+    second_opinion_option,
     set_option,
     talk_options,
     units_option,
+    with_or_without,
 )
 from boulder_sweep.cli.output import say, show, working, wrap
 from boulder_sweep.errors import EXIT_SOME_ROWS_FAILED
@@ -30,6 +32,7 @@ from boulder_sweep.locations import Location, location_of
 if TYPE_CHECKING:
     from boulder_sweep.impact.recomputing import Recomputed
     from boulder_sweep.impact.trajectory import Trajectory
+    from boulder_sweep.settings import Sweep
     from boulder_sweep.settings.model import Model
 
 SIMULATE_EXAMPLES = """\b
@@ -54,6 +57,7 @@ Examples:
 )
 @click.option("--all", "every", is_flag=True, help="Print every column as well.")
 @click.option("--animate", type=OUTPUT, metavar="F.gif", help="Animate the side view.")
+@second_opinion_option
 @units_option
 @at_option
 @set_option
@@ -67,6 +71,7 @@ def simulate(
     energy: str | None,
     every: bool,
     animate: str | None,
+    second_opinion: bool | None,
     units: str | None,
     at: str | None,
     overrides: tuple[str, ...],
@@ -84,14 +89,15 @@ def simulate(
 
     number, again, location = design or 0, None, location_of(case)
     if _is_result(location):
-        if overrides or at is not None:
-            raise click.UsageError(f"--set and --at change the settings of a file; {case} is the result of a run")
+        if overrides or at is not None or second_opinion is not None:
+            given = "--set, --at and --second-opinion"
+            raise click.UsageError(f"{given} change the settings of a file; {case} is the result of a run")
         refuse_unwritable_history(plot, trajectory, energy, animate)
         again = _computed_again(location, number, quiet or as_json)
         sweep, designs = again.sweep, again.designs
         reason = again.stored["reason"] if again.trajectory is None else ""
     else:
-        sweep = load_given(case, overrides, at)
+        sweep = load_given(case, with_or_without(overrides, second_opinion), at)
         refuse_missing(sweep, case, number)
         refuse_unwritable_history(plot, trajectory, energy, animate)
         if not quiet:
@@ -131,7 +137,7 @@ def simulate(
         lines = [] if row["max_rotation_deg"] is None else impact_lines(row, result, units)
         compared = [] if again is None else _compared_lines(again)
         columns = ["", *console.value_lines(whole)] if every else []
-        cautions = _cautions(row | result.inputs, sweep.model, is_asked=again is None or again.is_asked)
+        cautions = _cautions(row | result.inputs, sweep.model, is_asked=_is_asked(sweep))
         show(*wrap(verdict_line(result)), *lines, *cautions, *compared, *columns)
     if plot is not None:
         result.plot(plot, units=units)
@@ -146,6 +152,13 @@ def simulate(
         if file is not None and not quiet:
             say(f"written  {file}")
     return EXIT_SOME_ROWS_FAILED if row["verdict"] == "error" else 0
+
+
+def _is_asked(sweep: Sweep) -> bool:
+    """Whether second opinions were asked, as far as they can be."""
+    from boulder_sweep.judge.robustness import can_be_asked
+
+    return bool(sweep.model.second_opinion) or not can_be_asked(sweep)
 
 
 def _is_result(case: Location) -> bool:
@@ -183,7 +196,7 @@ def _cautions(row: dict[str, Any], model: Model, *, is_asked: bool) -> list[str]
     cautions = [f"caution: {words}" for words in meanings(row["validity"] or "")]
     cautions += ["docs/confidence.md has the bounds of all flags"] if cautions else []
     if row["verdict"] == "pass":
-        grades = grade_lines([row]) if is_asked else ["open: not asked (`sweep run --second-opinion` asks)"]
+        grades = grade_lines([row]) if is_asked else ["open: not asked (--second-opinion asks)"]
         cautions = [*grades, *cautions, f"pass: {NOT_A_RATING}"]
     return [*cautions, *foot_lines(model, [row["reason"]])]
 

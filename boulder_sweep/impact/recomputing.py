@@ -73,11 +73,6 @@ class Recomputed:
         """Outcomes that are not the same to the last bit."""
         return tuple(name for name, value in self.recomputed.items() if not _same(value, self.stored[name]))
 
-    @property
-    def is_asked(self) -> bool:
-        """Whether second opinions were asked of the row, as far as they can be."""
-        return bool(self.sweep.model.second_opinion) or not can_be_asked(self.sweep)
-
     def compared(self, units: str = "si") -> dict[str, Any]:
         """Return how the row comes out now as plain data, in ``si`` or ``us`` units."""
         were, are = (

@@ -104,7 +104,8 @@ def simulate(
     block = sweep.block(design_id, design_id + 1)
     if block.reasons[0]:
         raise ValueError(f"design {design_id} cannot be computed: {block.reasons[0]}")
-    evaluation = evaluation_of(sweep, accuracy_of(sweep)).asked()
+    evaluation = evaluation_of(sweep, accuracy_of(sweep))
+    evaluation = evaluation.asked() if sweep.model.second_opinion else evaluation
     return history_of(sweep, design_id, evaluation, evaluation.by_case(block), sample_s)
 
 

@@ -82,6 +82,8 @@ class Evaluation:
         Margin that a question asks for, from 0 to less than 1; see `judged`.
     second_opinion
         Laws of the soil's resistance under which every pass is simulated again, see `boulder_sweep.judge.robustness`.
+    deciding_laws_only
+        Whether passes that one law overturns are not simulated under the others, which then decide nothing.
     askable
         Whether second opinions know such designs.
     against_slower
@@ -98,6 +100,7 @@ class Evaluation:
     model: Model = field(default_factory=Model)
     least_margin: float = 0.0
     second_opinion: tuple[str, ...] = ()
+    deciding_laws_only: bool = False
     askable: bool = False
     against_slower: bool = True
     outlines_in_lanes: bool = False
@@ -179,7 +182,8 @@ class Evaluation:
             return judged
         limits = self.limits._replace(rotation=(1.0 - self.least_margin) * self.limits.rotation)
         passes = designs.rows(judged.verdict == PASS)
-        return with_second_opinions(judged, passes, self.second_opinion, self.model.resistance, limits, self.longest_s)
+        asked, told = self.second_opinion, not self.deciding_laws_only
+        return with_second_opinions(judged, passes, asked, self.model.resistance, limits, self.longest_s, told=told)
 
     def _worst_shapes(self, designs: Designs) -> Judged:
         """Judge boulders as taped and weighed by the worst of their shapes; by the first in which one fails."""

@@ -123,7 +123,7 @@ class _Designs:
         self.members = rows.over(np.ones(rows.shape, np.int64), self.kinds, np.add)
         self.worst = rows.over(self.rank, self.kinds, np.maximum)
         self.first = rows.over(every.reshape(rows.shape), self.kinds, np.minimum).ravel() == every
-        self.graded = chances is not None or "second_opinion" in rows.settings["model"]
+        self.graded = chances is not None or not rows.asks or "second_opinion" in rows.settings["model"]
         self.tried: dict[int, Design] = {}
 
     def _count(self, held: np.ndarray) -> int:

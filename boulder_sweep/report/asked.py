@@ -136,7 +136,8 @@ def _answer_columns(kind: str, answers: Any) -> list[tuple[str, str, str]]:
         columns += [("mass", BOULDER_MASS, "kg")] if key.name != BOULDER_MASS else []
         chance = "p_pass" in answers.arrow.column_names
         if chance:
-            return [*columns, ("P(pass)", "p_pass", "%"), ("undecided", "p_undecided", "%")]
+            robust = [("P(robust)", "p_robust", "%")] if answers.robust else []
+            return [*columns, ("P(pass)", "p_pass", "%"), *robust, ("undecided", "p_undecided", "%")]
         return [*columns, ("margin", "margin", "%"), ("second opinion", "robustness", "")]
     columns_of = {
         CAPACITY: [
@@ -152,6 +153,7 @@ def _answer_columns(kind: str, answers: Any) -> list[tuple[str, str, str]]:
             ("P(pass)", "p_pass", "%"),
             ("from", "p_pass_low", "%"),
             ("to", "p_pass_high", "%"),
+            *([("P(robust)", "p_robust", "%")] if "p_robust" in answers.arrow.column_names else []),
             ("undecided", "p_undecided", "%"),
             ("decided by", "p_pass_driver", ""),
         ],
@@ -164,7 +166,7 @@ def _cell(row: dict[str, Any], name: str, unit: str, searched: set[str]) -> str 
     value, none = row[name], "passes_at" in row and row["passes_at"] is None
     if none and name.startswith(("least_", "most_")):
         return "in places only" if row["found"] == WORDS[NOT_MONOTONE] else str(row["found"]).replace("_", " ")
-    if value is None or (none and name in (*searched, "margin", "p_pass", "robustness")):
+    if value is None or (none and name in (*searched, "margin", "p_pass", "p_robust", "robustness")):
         return "–"
     if unit == "%":
         return f"{value:.1%}"

@@ -97,6 +97,8 @@ class ResultRows:
         other, and for a grid against its shape.
     robustness : tuple of str
         Grade of the designs of each code, asked for or not; empty words where there is none.
+    asks : bool
+        Whether second opinions are asked now, where the result asked for none.
     """
 
     folder: Location
@@ -108,6 +110,7 @@ class ResultRows:
     sets: dict[str, NamedSets]
     inputs: dict[str, np.ndarray]
     robustness: tuple[str, ...] = ()
+    asks: bool = True
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -250,14 +253,14 @@ class ResultRows:
         return row
 
     def grade(self, row: dict[str, Any]) -> str | None:
-        """Return the robustness of a row; where the table left it open, second opinions are asked now.
+        """Return the robustness of a row; where the table left it open, second opinions are asked now, if `asks`.
 
         None where the row does not pass, or not by today's rules; and where the row stands for the designs drawn, of
         which it is the mean.
         """
         if "p_pass" in row:
             return None
-        if row["verdict"] != "pass" or row.get("robustness") not in ("open", None):
+        if not self.asks or row["verdict"] != "pass" or row.get("robustness") not in ("open", None):
             return row.get("robustness")
         identity = self.finished.identity
         try:

@@ -40,8 +40,13 @@ VEHICLE = {
 }
 OPEN_IN_WORDS = "no study says what a second opinion is worth here; the design is judged by its margin alone"
 """What a design without a grade is."""
-NOT_ASKED = "not asked", "second opinions are not asked of designs that are drawn at random"
-"""The same of a design with a probability."""
+NOT_ASKED = "not asked", "no second opinion was asked of the designs that were drawn at random"
+"""The same of a design with a probability,"""
+DRAWN = (
+    "a probability",
+    "asked of every design that was drawn at random; the share of robust passes stands among the checks",
+)
+"""and of one that has a probability of a robust pass."""
 MOST_CASES = 40
 """Most cases of soil and vehicle that are listed."""
 Cell = str | Measure
@@ -109,7 +114,7 @@ def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
         build=_build(rows, row),
         soil=_inputs(design.rows, SOIL, settings),
         vehicle=_inputs(design.rows, VEHICLE, settings),
-        grade=NOT_ASKED if "p_pass" in row else (grade or "", means),
+        grade=(grade or "", means) if "p_pass" not in row else DRAWN if row.get("p_robust") is not None else NOT_ASKED,
         cases=_cases(design.rows, [*named, *several]) if len(design.rows) > 1 else None,
     )
 
@@ -164,7 +169,10 @@ def _checks(
         lines.append((words, computed, none if allowed is None else Measure(allowed, unit), used))
     if "p_pass" in row:
         least = "–" if need.probability is None else f"≥ {100.0 * need.probability:.4g} %"
-        lines.insert(0, ("probability of passing", f"{row['p_pass']:.1%}", least, "–"))
+        chances = [("probability of passing", f"{row['p_pass']:.1%}", "–" if need.robust else least, "–")]
+        if row.get("p_robust") is not None:
+            chances.append(("and of a robust pass", f"{row['p_robust']:.1%}", least if need.robust else "–", "–"))
+        lines = [*chances, *lines]
     return tuple(lines)
 
 

@@ -77,6 +77,7 @@ def write_report(
     units: str | None = None,
     command: str = "",
     heading: Heading = NO_HEADING,
+    second_opinion: bool = True,
 ) -> Path:
     """Write the report of a result: one HTML file that needs no network, or that page printed to PDF.
 
@@ -95,6 +96,8 @@ def write_report(
     heading
         Whom and what it is for; an entry that is not given comes from the settings file. The date of a PDF is today's
         where none is given.
+    second_opinion
+        Whether designs that are shown have a second opinion where the result asked for none.
 
     Returns
     -------
@@ -117,7 +120,7 @@ def write_report(
         if wrong := wrong_with(text):
             raise ReportError(f"--{key.replace('_', '-')}: {wrong}")
     assembled = _page_maker()
-    rows = read_rows(location_of(out))
+    rows = dataclasses.replace(read_rows(location_of(out)), asks=second_opinion)
     target = checked_page(page)
     if rows.finished.rows_done == 0:
         raise ReportError(f"{out} holds no finished designs yet")

@@ -501,7 +501,7 @@ def _check_arguments(sweep: Sweep, jobs: int | None, progress: Report | None) ->
 
 def resuming(sweep: Sweep, out: Location, jobs: int | None, backend: str, scheduler: str | None) -> str:
     """Return the command that resumes a run with the given arguments."""
-    from boulder_sweep.settings.loader import SECOND_OPINION
+    from boulder_sweep.settings.loader import NO_SECOND_OPINION, SECOND_OPINION
 
     if sweep.path is None:
         return f"boulder_sweep.run(sweep, {str(out)!r}, resume=True)"
@@ -512,8 +512,8 @@ def resuming(sweep: Sweep, out: Location, jobs: int | None, backend: str, schedu
     if sweep.taken_at:
         words += ["--at", next(iter(sweep.taken_at.values())).partition(" ")[0]]
     for entry in sweep.overrides:
-        if entry == SECOND_OPINION:
-            words.append("--second-opinion")
+        if entry in (SECOND_OPINION, NO_SECOND_OPINION):
+            words.append(entry.partition("=")[0])
         else:  # as it was given
             words += entry.split("=", 1) if entry.startswith("--") else ["--set", entry]
     return shlex.join([*words, "--resume"])

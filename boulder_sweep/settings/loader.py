@@ -20,7 +20,7 @@ from boulder_sweep import elementary
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.checks import check_complete, check_pairs, check_usual, notes_on
 from boulder_sweep.settings.entries import NAME, NAME_RULE, TOP_KEYS, Entries
-from boulder_sweep.settings.model import SECOND_OPINIONS, Criterion, Model, SolverSettings
+from boulder_sweep.settings.model import NO_OPINION, USUAL_OPINION, Criterion, Model, SolverSettings
 from boulder_sweep.settings.problems import (
     Position,
     Problem,
@@ -61,11 +61,15 @@ _ALTERNATIVES = {
 }
 """Setting one removes the other from the file, which holds only one of them; two options contradict each other."""
 
-OPTIONS = {"--accuracy": "solver.accuracy", "--second-opinion": "model.second_opinion"}
+OPTIONS = {
+    "--accuracy": "solver.accuracy",
+    "--second-opinion": "model.second_opinion",
+    "--no-second-opinion": "model.second_opinion",
+}
 """Options that set an entry: a mistake is reported for the option, not for ``--set``."""
 
-SECOND_OPINION = f"--second-opinion={SECOND_OPINIONS[-1]}"
-"""Asks for the second opinion that decides."""
+SECOND_OPINION, NO_SECOND_OPINION = f"--second-opinion={USUAL_OPINION[0]}", f"--no-second-opinion={NO_OPINION}"
+"""Asks for the second opinion that decides, whatever the file says; asks for none."""
 
 MAX_OVERRIDE = 20_000
 """Longest option, in characters."""

@@ -32,6 +32,8 @@ RESISTANCES = ("kp_squared", "broms", "width_capped")
 """Laws of the ultimate resistance of the soil; the first is the paper's."""
 SECOND_OPINIONS = RESISTANCES[1:]
 """Laws that a second opinion may take."""
+USUAL_OPINION = SECOND_OPINIONS[-1:]
+"""The law that is asked where nothing else is said: the one that decides."""
 NO_OPINION = "none"
 """Stands in a file for no second opinion."""
 
@@ -310,9 +312,9 @@ class Model:
         "",
         "laws of the soil's resistance under which passes are simulated again, with friction and vertical motion; "
         "width_capped alone decides, and broms is asked where that overturns a pass or resists more",
-        (),
+        USUAL_OPINION,
         kind="a law for a second opinion",
-        shown_default=NO_OPINION,
+        shown_default=USUAL_OPINION[0],
     )
     layers: tuple[Layer, ...] = setting(
         "soil.layers", "", "layers below the uppermost, which the other entries describe", ()

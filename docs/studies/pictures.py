@@ -17,7 +17,6 @@ from boulder_sweep.crash_tests.validation import validate
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.report import write_report
 from boulder_sweep.report.writing import browser
-from boulder_sweep.settings.loader import SECOND_OPINION
 from boulder_sweep.settings.sweep import Heading
 from boulder_sweep.stones.weighing import scanned
 from boulder_sweep.views.crash_curves import FIGURES, draw_crash_test
@@ -74,7 +73,7 @@ def draw_all(root: Path) -> list[Path]:
         pulse = Path(scratch) / "pulse.csv"
         pulse.write_text(example_pulse(), encoding="utf-8")
         fit_pulse(read_pulse(pulse), 6800.0).plot(named("vehicle_fit.png"))
-        sweep = load(root / GRID, [SECOND_OPINION])
+        sweep = load(root / GRID)
         run(sweep, Path(scratch) / "grid.sweep")
         table, terms = read(Path(scratch) / "grid.sweep"), terms_line(sweep.resolved())
         draw_verdict_map(table, named("m30_sizing.png"), title=sweep.name, terms=terms)

@@ -16,7 +16,7 @@ from tests.stones.shapes import box, written
 CONFIGS = Path(__file__).parents[2] / "configs"
 NO_RESULT = "; the result of a run is a folder"
 IS_SETTINGS = "error: my grid.yaml is a settings file; run it first:\n  sweep run 'my grid.yaml'\n"
-RESULT_ONLY = "--set and --at change the settings of a file; small-grid.sweep is the result of a run"
+RESULT_ONLY = "--set, --at and --second-opinion change the settings of a file; small-grid.sweep is the result of a run"
 SI_ONLY = "leave out --units us or --json"
 NEED = "need SITE --set 'site.embedment_ratio=[0.3, 0.7]'"
 """A question that is asked with a note, which is not given where the question is refused."""

@@ -59,18 +59,25 @@ def test_a_run_says_how_firm_its_verdicts_are(sweep, possible_grid):
         "width_capped",
     ):
         assert change in words
-    assert "open: not asked (--second-opinion asks), or outside the ranges of their" in words
 
 
-def test_a_run_with_second_opinions_says_what_is_robust(sweep, possible_grid):
-    """And resumes with them."""
+def test_a_run_says_what_is_robust_unless_second_opinions_are_left_out(sweep, possible_grid):
+    """And resumes only with what it was asked."""
     heights = ("--set", "boulder.height=[3.2, 3.6] m")
-    _, out, _ = sweep("run", possible_grid, *heights, "--second-opinion", "-o", "asked")
-    assert "robust" in out
+    _, out, _ = sweep("run", possible_grid, *heights, "-o", "asked")
+    assert "sensitive (stands under broms) 1" in out
     assert "stands with friction and vertical motion" in " ".join(out.split())
-    assert "--second-opinion asks" not in out
-    code, _, err = sweep("run", possible_grid, *heights, "-o", "asked", "--resume")
-    assert code == 4, err
+    assert "open: not asked" not in out
+    again = [
+        sweep("run", possible_grid, *heights, "-o", "asked", "--resume", *more)[0]
+        for more in ((), ("--second-opinion",), ("--no-second-opinion",), ("--set", "model.second_opinion=none"))
+    ]
+    assert again == [0, 0, 4, 4]
+    _, out, _ = sweep("run", possible_grid, *heights, "--no-second-opinion", "-o", "not-asked")
+    assert "sensitive" not in out
+    assert "open: not asked, or outside the ranges of their study" in out
+    said = ("--set", "model.second_opinion=none", "--second-opinion")
+    assert "sensitive" in sweep("run", possible_grid, *heights, *said, "-o", "asked-anyway")[1]
 
 
 def test_json_is_one_object_on_stdout(sweep, possible_grid):

@@ -155,13 +155,17 @@ def test_a_row_of_a_result_is_told_like_a_design_and_compared_to_the_last_bit(sw
 def test_a_row_that_passes_says_whether_it_was_asked(sweep, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for more, words in (
-        ((), "open: not asked (`sweep run --second-opinion` asks)"),
-        (("--second-opinion",), "robust: "),
+        (("--no-second-opinion",), "open: not asked (--second-opinion asks)"),
+        ((), "robust: "),
     ):
         assert sweep("run", CONFIGS / "rwg.yaml", "-q", "--overwrite", "-o", "rwg.sweep", *more)[0] == 0
         out = sweep("simulate", "rwg.sweep")[1]
         assert f"\n{words}" in out
         assert out.endswith("\ncomputed again: the same to the last bit\n")
+        assert f"\n{words}" in sweep("simulate", CONFIGS / "rwg.yaml", *more)[1]
+        code, _, err = sweep("simulate", "rwg.sweep", "--no-second-opinion")
+        assert code == 2
+        assert "change the settings of a file" in err
 
 
 def test_a_row_that_cannot_be_computed(sweep, grid):
