@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
+from itertools import product
 from typing import Any, NamedTuple
 
 import numba
@@ -20,7 +21,7 @@ from .dynamics import Acceleration, Modes, State, Switches
 from .following import Clock, Impact, Pace
 from .modes import GapFactors
 from .outcomes import Compression, Maxima
-from .pieces import FewPieces, GivenPiece, Piece, SoilSums, constants_of_few, with_soil
+from .pieces import COUNTS, FewPieces, GivenPiece, Piece, SoilSums, constants_of_few, with_soil
 
 LANES = 1 if IS_PLAIN else 8
 """Designs that are integrated side by side: one vector of eight doubles. More of them hide no more latency and take
@@ -82,6 +83,13 @@ def group_type(pieces: int, has_strength: bool, has_outline: bool) -> np.dtype:
         records += [("pieces", numbers_of(piece), (pieces,)), ("body", numbers_of(Body._fields))]
         records += [("given", numbers_of(GivenPiece._fields), (pieces,))]
     return np.dtype((np.record, np.dtype(records, align=True)))
+
+
+_SOILS = (0, True, True), *product(COUNTS, (False, True), (False, True))
+GROUP_TYPES = tuple(numba.from_dtype(group_type(*soil)) for soil in _SOILS)
+"""Numba's types of all groups, made in the same order in every process and kept. Numba names compiled code by a number of
+its record types, which it counts as they are made. Code that two processes have compiled for two kinds of groups could
+have one name, and a process that loads both would run one in place of the other."""
 
 
 def empty_groups(pieces: int = 0, *, has_strength: bool = True, has_outline: bool = True) -> np.ndarray:

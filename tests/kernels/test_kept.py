@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -140,3 +143,58 @@ def test_a_table_says_whether_products_are_fused(monkeypatch: pytest.MonkeyPatch
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(_cache, "processor", lambda: ("model name : any", f"flags : {features}"))
     assert _cache.target() == f"{_cache.platform.machine()}{ending}"
+
+
+NAMES = """
+import re
+import sys
+import numba
+from boulder_kernels.workspace import group_type
+
+@numba.njit
+def first(group):
+    return group.state.theta_b[0]
+
+kinds = {"dry": (1, False, True), "wet": (2, True, True)}
+for name in sys.argv[1:]:
+    record = numba.from_dtype(group_type(*kinds[name]))
+    first.compile((record,))
+    code = first.inspect_llvm((record,))
+    print(name, *sorted({re.sub("v[0-9]+", "", one) for one in re.findall("_ZN8__main__5first\\\\w+", code)}))
+"""
+
+
+def test_compiled_code_for_each_kind_of_group_has_one_name_in_every_process() -> None:
+    """What two processes have compiled is loaded into one, where a name stands for one piece of code."""
+    names = []
+    for order in (("dry", "wet"), ("wet", "dry")):
+        command = [sys.executable, "-c", NAMES, *order]
+        done = subprocess.run(command, check=True, capture_output=True, text=True)
+        names.append(sorted(done.stdout.splitlines()))
+    assert len(names[0]) == 2
+    assert names[0] == names[1]
+
+
+ROTATIONS = """
+import sys
+import boulder_sweep
+for more in sys.argv[2:]:
+    print(boulder_sweep.simulate(boulder_sweep.load(sys.argv[1], more.split())).summary()["max_rotation_deg"])
+"""
+TAPERED = Path(__file__).parents[2] / "configs" / "rwg.yaml"
+DRY, WET = "boulder.taper=0.8", "boulder.taper=0.8 soil.water_table=1m vehicle.speed=12m/s"
+
+
+@pytest.mark.nightly
+def test_code_that_two_processes_have_compiled_runs_in_one(tmp_path: Path) -> None:
+    tmp_path.chmod(0o700)
+
+    def rotations(*more: str) -> list[str]:
+        command = [sys.executable, "-c", ROTATIONS, str(TAPERED), *more]
+        environment = os.environ | {_cache.CACHE_VARIABLE: str(tmp_path)}
+        return subprocess.run(command, check=True, capture_output=True, text=True, env=environment).stdout.split()
+
+    dry, wet = rotations(DRY), rotations(WET)
+    assert dry != wet
+    assert rotations(DRY, WET) == dry + wet
+    assert rotations(WET, DRY) == wet + dry
