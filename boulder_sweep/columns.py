@@ -76,9 +76,9 @@ class OutcomeColumn(ColumnSpec):
         From what the judge knows of n rows (`boulder_sweep.judge.verdict.Facts`) to the values of the column, shape
         (n,): numbers in `unit`, or codes.
     rows : {'all', 'judged', 'computed', 'free', 'rated', 'overturned', 'passing'}
-        Which rows have a value; null elsewhere. *Judged* are all but errors, *computed* those simulated, *free* those
-        of them that were not stopped at the limit of the rotation, *rated* those whose penetration counts: neither
-        overturned nor left undecided by anything but the numerical error. *Passing* rows have the verdict pass.
+        Which rows have a value; null elsewhere. *Judged* are all but errors, *computed* all that were simulated, *free*
+        all simulated ones that were not stopped at the limit of the rotation, *rated* all whose penetration counts:
+        neither overturned nor left undecided by anything but the numerical error. *Passing* rows have the verdict pass.
     words : tuple of str
         What the codes of a dictionary column stand for; a row may add words of its own behind them. Code -1 is null.
     """

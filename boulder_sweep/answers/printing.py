@@ -227,7 +227,7 @@ def uncertainty_lines(result: Uncertainty, units: str = "si") -> list[str]:
 def reserve_lines(result: Reserves, units: str = "si") -> list[str]:
     """Return what designs withstand as lines: varying inputs, verdict, each value and its distance from the design.
 
-    Parameters are those of `uncertainty_lines`.
+    It takes the same parameters as `uncertainty_lines`.
     """
     from boulder_sweep.answers.reserves import RESERVES
 

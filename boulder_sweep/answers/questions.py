@@ -95,7 +95,7 @@ class Answers(Brackets):
     Attributes
     ----------
     block, kind, fails, passes
-        As of `Brackets`.
+        See `Brackets`.
     judged : Judged
         Outcomes and verdicts of the designs.
     stretches : list of str or None, of length n

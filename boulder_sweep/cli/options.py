@@ -167,7 +167,7 @@ def refuse_missing(sweep: Sweep, path: str, number: int) -> None:
 
 
 def refuse_units_of_json(units: str | None, as_json: bool) -> None:
-    """Refuse ``--json`` in US units, for commands whose objects are in those of the table."""
+    """Refuse ``--json`` in US units, for commands that print objects in the units of the table."""
     if as_json and units == "us":
         raise click.UsageError(f"--json is in SI units for this command; leave out --units {units} or --json")
 

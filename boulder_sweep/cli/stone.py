@@ -81,8 +81,8 @@ def stone(
     """Weigh and measure ROCK, a scan of a stone (.ply, .stl, .obj or .glb).
 
     The scan is closed where it is open. Every way to stand gets a flat foot by the least cut, and a profile: width
-    and distances of the near and the far face over the height. The ends a, b and c are those of the long, the middle
-    and the short axis of the stone, a the slimmer end and -a the other; x, y and z are the axes of the scan.
+    and distances of the near and the far face over the height. The ends a, b and c belong to the long, the middle and
+    the short axis of the boulder, a the slimmer end and -a the other; x, y and z are the axes of the scan.
 
     With SITE, a settings file, the stone takes the place of its boulder, and for each of the 24 ways to stand the depth
     is found from which on it passes in all soils and before all vehicles of the file.

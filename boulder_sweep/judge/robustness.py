@@ -50,7 +50,7 @@ IN_WORDS = (
 SENSITIVE_IN_WORDS = (
     "a second opinion overturns it; no fail, but ask for a better soil test, a deeper bed or a crash test"
 )
-"""and ``sensitive``."""
+"""Explanation of the grade ``sensitive``."""
 MEANINGS = {
     "robust": IN_WORDS,
     "sensitive": SENSITIVE_IN_WORDS,

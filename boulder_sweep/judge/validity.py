@@ -18,7 +18,7 @@ import numpy as np
 from boulder_kernels.numerics import records_of
 from boulder_kernels.outcomes import empty_outcomes
 from boulder_kernels.rules import FLAGS as RAISED
-from boulder_kernels.rules import ISLAND_SLIDE, UNSTUDIED, FlagInputs, Tested, write_flags
+from boulder_kernels.rules import ISLAND_SLIDE, UNSTUDIED, FlagInputs, TestedRange, write_flags
 from boulder_sweep.investigation import FAMILY_FACTOR, family_bounds
 from boulder_sweep.judge.judged import CHANGES_SIDE
 from boulder_sweep.settings.fields import BY_NAME
@@ -183,13 +183,13 @@ def largest_tested_rotation(preset: str) -> float:
     return math.radians(TESTED_ROTATION_DEG.get(preset, min(TESTED_ROTATION_DEG.values())))
 
 
-def tested_of(calibrated_crush: float, rotation: float, *, odd_layers: bool) -> Tested:
+def tested_of(calibrated_crush: float, rotation: float, *, odd_layers: bool) -> TestedRange:
     """Return what the model was tested on; arguments: see `boulder_sweep.judge.verdict.Limits`."""
     # No friction angle of the uppermost layer makes up for deeper ones.
     angle = (NOWHERE, NOWHERE) if odd_layers else _ANGLE
     vehicle = (_rounded(*VEHICLE["m_v"]), _rounded(*RATE), _rounded(*DAMPING), _rounded(*VEHICLE["v_0"]))
     ranges = (*_SIZES, _EMBEDMENT, _ROCK, *vehicle, angle, _SOIL, _RATE_FACTOR)
-    return Tested(calibrated_crush, rotation, TESTED_OVERLAP_M, *(end for low_high in ranges for end in low_high))
+    return TestedRange(calibrated_crush, rotation, TESTED_OVERLAP_M, *(end for low_high in ranges for end in low_high))
 
 
 def has_odd_layers(ground: Ground) -> bool:

@@ -74,7 +74,7 @@ class Limits(NamedTuple):
     """Limits of the criterion."""
 
     rotation: float
-    """Largest rotation [rad]."""
+    """Largest rotation that passes [rad]."""
     rating: str
     """Required penetration rating, one of `RATINGS`."""
     criterion: Criterion = Criterion()
@@ -113,7 +113,7 @@ class Facts(NamedTuple):
     """Inputs of the same rows."""
     limits: Limits
     rows: dict[RowKind, np.ndarray]
-    """Masks, see `OutcomeColumn`."""
+    """Masks of the rows of each kind; `OutcomeColumn` explains the kinds."""
     overlap: np.ndarray
     """Height of the top of the boulder over the underside of the bumper [m]."""
     penetration: np.ndarray

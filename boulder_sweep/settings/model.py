@@ -27,7 +27,7 @@ PRINTED = "printed"
 ACCURACIES = ("fast", "balanced", "fine")
 CLOSED_FORM = "closed_form"
 WATER_KG_M3 = 1000.0
-"""Density of water."""
+"""Density of water [kg/m^3]."""
 RESISTANCES = ("kp_squared", "broms", "width_capped")
 """Laws of the ultimate resistance of the soil; the first is the paper's."""
 SECOND_OPINIONS = RESISTANCES[1:]
@@ -119,7 +119,7 @@ class Field:
 
     @property
     def path(self) -> str:
-        """Dotted key."""
+        """Dotted key in the settings file."""
         return f"{self.section}.{self.key}"
 
 

@@ -26,7 +26,7 @@ class Category(NamedTuple):
     mass: tuple[str, str]
     """In SI and US units."""
     speeds_mph: tuple[int, ...]
-    """Nominal speeds."""
+    """Nominal speeds in miles per hour."""
 
 
 CATEGORIES = {

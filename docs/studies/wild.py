@@ -105,7 +105,7 @@ def late_designs(count: int, seed: int) -> Designs:
     return Designs(some_rows(table, late), offset)
 
 
-class Compared(NamedTuple):
+class FamilyScore(NamedTuple):
     """One accuracy on the designs of a family."""
 
     standing: int
@@ -130,7 +130,7 @@ def _solved(
     return simulate_table(table, corrected(), control)
 
 
-def _compared(found: OutcomeTable, known: OutcomeTable) -> Compared:
+def _compared(found: OutcomeTable, known: OutcomeTable) -> FamilyScore:
     """Compare estimated with true errors, which are known to within the errors of `known`."""
     computed = np.isfinite(found.theta_max) & np.isfinite(known.theta_max)
     fell, falls = found.status == Status.LIMIT, known.status == Status.LIMIT
@@ -138,7 +138,7 @@ def _compared(found: OutcomeTable, known: OutcomeTable) -> Compared:
     turned = np.abs(found.theta_max - known.theta_max)
     moved = np.maximum(np.abs(found.x_b_max - known.x_b_max), np.abs(found.x_v_max - known.x_v_max))
     unsure = ~fell & (LIMIT - found.theta_max < found.theta_error) | np.isinf(found.theta_error)
-    return Compared(
+    return FamilyScore(
         int(standing.sum()),
         math.degrees(float(turned[standing].max(initial=0.0))),
         float(np.mean((turned <= found.theta_error + known.theta_error)[standing])),
@@ -147,7 +147,7 @@ def _compared(found: OutcomeTable, known: OutcomeTable) -> Compared:
     )
 
 
-def _measured(designs: DesignTable) -> dict[str, Compared]:
+def _measured(designs: DesignTable) -> dict[str, FamilyScore]:
     """Compare the named accuracies."""
     known = _solved(designs, Steps(REFERENCE_STEP_S, locate_yield=True), estimate=False)
     known.theta_error[:], known.x_error[:] = ROUNDING_RAD, ROUNDING_M
@@ -192,7 +192,7 @@ def _judged_late(designs: Designs, grid: Path, accuracy: str) -> OutcomeTable:
     )
 
 
-def _measured_late(designs: Designs, grid: Path) -> dict[str, Compared]:
+def _measured_late(designs: Designs, grid: Path) -> dict[str, FamilyScore]:
     """Compare what tables of the named accuracies say of late designs. Both end by proof, not always at one time."""
     known = _known_late(designs)
     found = {}
@@ -203,10 +203,10 @@ def _measured_late(designs: Designs, grid: Path) -> dict[str, Compared]:
     return found
 
 
-def _worst(families: list[Compared]) -> Compared:
+def _worst(families: list[FamilyScore]) -> FamilyScore:
     """Return the worst of each number, and how many designs stand and are wrong in all."""
     standing, largest, rotation, displacement, wrong = zip(*families, strict=True)
-    return Compared(sum(standing), max(largest), min(rotation), min(displacement), sum(wrong))
+    return FamilyScore(sum(standing), max(largest), min(rotation), min(displacement), sum(wrong))
 
 
 def _degrees(angle: float) -> str:
@@ -214,7 +214,7 @@ def _degrees(angle: float) -> str:
     return f"{angle:.1g}" if angle < 1.0 else f"{angle:.0f}"
 
 
-def _covered(one: Compared) -> str:
+def _covered(one: FamilyScore) -> str:
     """Shares covered of rotation and displacement, in per cent."""
     return f"{100.0 * one.rotation:.2f}, {100.0 * one.displacement:.2f}"
 

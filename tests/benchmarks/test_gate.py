@@ -65,7 +65,7 @@ def test_timing_ends_with_the_first_round_that_passes_or_the_ninth(
 
 
 def test_what_disturbs_the_reference_excuses_nothing(clock: Callable[..., object]) -> None:
-    """The least time of the reference counts, not that of the same round."""
+    """The least time of the reference counts, not its time in the same round."""
     clock({nothing: [7.0], reference: [1.0, 40.0]})
     (found,) = gate.within({"lanes": nothing}, reference, {"lanes": 4.0}, 1.5)
     assert found.ratio == 7.0 / 4.0
