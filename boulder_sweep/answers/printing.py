@@ -45,7 +45,7 @@ HEADS = {
     "boulder_width_m": ("W", "m"),
     "boulder_height_m": ("H", "m"),
     "boulder_density_kg_m3": ("rock", "kg/m³"),
-    "boulder_mass_kg": ("stone", "kg"),
+    "boulder_mass_kg": ("boulder", "kg"),
     "embedment_depth_m": ("depth", "m"),
     "embedment_ratio": ("ratio", "d/H"),
     "impact_height_m": ("blow", "m"),

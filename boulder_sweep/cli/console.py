@@ -131,7 +131,7 @@ def firmness_lines(firmness: Mapping[str, Any]) -> list[str]:
             f"the other reading of the paper {lost['reading']:.0%}",
             f"1 deg less friction angle {lost['friction_angle']:.0%}",
             f"5 % more speed {lost['speed']:.0%}",
-            f"another law of the soil without friction: {laws}",
+            f"another soil model without friction: {laws}",
         )
     )
     lines += _indent(f"of its {firmness['passes']:,} passes fail by {shares}", "       ")

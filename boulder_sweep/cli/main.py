@@ -125,7 +125,7 @@ def cli() -> None:
     """Find out which boulder, buried how deep in which soil, stops a truck.
 
     A file describes boulders, soils and a vehicle as ranges of values. `sweep run` simulates every
-    combination and writes one table with a verdict for each.
+    design and writes one table with a verdict for each.
     """
 
 

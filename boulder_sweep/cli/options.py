@@ -84,8 +84,8 @@ margin_option = click.option("--margin", default="0", metavar="SHARE", help="Lea
 second_opinion_option = click.option(
     "--second-opinion/--no-second-opinion",
     default=None,
-    help="Simulate every pass again with friction, vertical motion and weaker laws: robust or sensitive? [as in the "
-    "file, where nothing is said: yes]",
+    help="Simulate every pass again with friction, vertical motion and a weaker soil model: robust or sensitive? [as "
+    "in the file, where nothing is said: yes]",
 )
 
 

@@ -184,7 +184,7 @@ def _compared_lines(again: Recomputation) -> list[str]:
         for name in again.unequal
     ]
     lines += [f"changed since: {line}" for line in again.changed]
-    lines += [f"as stored, the row was {again.judged_by}"] if again.judged_by else []
+    lines += [f"as stored, the design was {again.judged_by}"] if again.judged_by else []
     return lines if again.unequal else [*lines, "computed again: the same to the last bit"]
 
 

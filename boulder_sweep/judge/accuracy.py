@@ -36,8 +36,8 @@ class Steps(NamedTuple):
 STEPS = {"fast": Steps(0.012), "balanced": Steps(0.012), "fine": Steps(0.006, locate_yield=True)}
 """Steps of each named accuracy: but for ``fast``, three times the steps of the solution that is reported."""
 STEPS_PRINTED = {"fast": Steps(0.006), "balanced": Steps(0.006), "fine": Steps(0.003, locate_yield=True)}
-"""Steps of each named accuracy for the restoring moment as printed: it jumps where the angular velocity passes zero, and
-a design close to that jump needs shorter steps to end on the right side of it."""
+"""Steps of each named accuracy for the restoring moment as printed: it jumps where the angular velocity passes zero,
+and a design close to that jump needs shorter steps to end on the right side of it."""
 LADDER = (
     *(Steps(0.018), Steps(0.012)),
     *(Steps(1e-3 * step, locate_yield=True) for step in (12, 9, 6, 4.5, 3, 2.25, 1.5, 1.125)),

@@ -1,6 +1,6 @@
 """Robust or sensitive: what a pass is worth when the model has another form.
 
-A second opinion is the same impact with friction and vertical motion, under a law of the soil that resists less
+A second opinion is the same impact with friction and vertical motion, under a soil model that resists less
 (`boulder_kernels.second_opinion`). A pass that stands under the weakest law, mostly `DECISIVE`, is *robust*, one that
 does not under a law that was asked *sensitive*. A pass that stands, but lies outside the ranges from which the study of
 the documentation draws, is *open*: nobody has looked at what second opinions are worth there. Where no second opinion
@@ -43,10 +43,10 @@ ROBUST, SENSITIVE, OPEN = range(len(GRADES))
 DECISIVE = "width_capped"
 """The law that decides: it resists least, but for slender boulders in dense soil, which are asked of others, too."""
 IN_WORDS = (
-    "stands with friction and vertical motion under the weakest of three laws; not tested: soil on one side only, "
-    "rounded stones"
+    "stands with friction and vertical motion under the weakest of three soil models; not tested: soil on one side "
+    "only, rounded boulders"
 )
-"""What ``robust`` means, in words,"""
+"""Explanation of the grade ``robust``."""
 SENSITIVE_IN_WORDS = (
     "a second opinion overturns it; no fail, but ask for a better soil test, a deeper bed or a crash test"
 )

@@ -168,8 +168,8 @@ FLAGS = (
         CHANGES_SIDE,
         "a verdict that changes with the uncertain inputs",
         "another verdict with the uncertain inputs at their 5 %, at their mean or at their 95 % quantiles",
-        "The row has the worst of the verdicts. Shallow boulders may pass in weak soil, by sliding, and fail in better "
-        "soil. How likely a pass is, `sweep uncertainty` says.",
+        "The design has the worst of the verdicts. Shallow boulders may pass in weak soil, by sliding, and fail in "
+        "better soil. How likely a pass is, `sweep uncertainty` says.",
     ),
 )
 """In the order of the kernels, and of the column."""

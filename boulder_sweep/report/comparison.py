@@ -256,7 +256,7 @@ def _values_in_order(tables: Sequence[pd.DataFrame], differ: Sequence[str]) -> b
 def _apart(tables: Sequence[pd.DataFrame], differ: Sequence[str]) -> str:
     """Say why two results have no design in common, and what helps."""
     if not differ:
-        return ": every single value occurs in both, but no combination does"
+        return ": every single value occurs in both, but no design does"
     reasons = []
     for name in differ:
         unit = f" {unit_of(name)}".rstrip()

@@ -68,7 +68,7 @@ TAPED = (
 )
 """Why the page simulates no boulder as taped and weighed; the last of its refusals."""
 FIXED_SIDES = ["boulder_length_m", "boulder_width_m", "boulder_height_m"]
-"""Sides that the reader cannot change where the boulder is a stone with a profile of its own."""
+"""Sides that the reader cannot change where the boulder has a profile of its own."""
 OF_THE_PAGE = {"L": "reach_m", "bed_offset": "bed_offset_m"}
 """Where the page has its own names for what the verdict takes: a boulder reaches from where it is struck."""
 MOST_CELLS = 1_500_000

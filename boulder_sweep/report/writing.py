@@ -264,7 +264,7 @@ def _general_notes(settings: Mapping[str, Any], control: Control, units: str) ->
     ]
     if taken := [_taken(name, how, settings["inputs"], units) for name, how in settings.get("taken_at", {}).items()]:
         judged = (
-            "; every row of the table is judged at the means and at the other ends, too, and has the worst verdict, "
+            "; every design of the table is judged at the means and at the other ends, too, and has the worst verdict, "
             "while simulations in this page take the values shown"
         )
         notes.append(f"Uncertain inputs are taken at {', '.join(taken)}{judged if 'judged_at' in settings else ''}.")

@@ -294,7 +294,7 @@ class Model:
     calibrated_crush_m: float = setting(
         "vehicle.calibrated_crush",
         "m",
-        "crush up to which spring and damper describe the vehicle's front; a row with more is flagged",
+        "crush up to which spring and damper describe the vehicle's front; a design with more is flagged",
         1.0,
         admitted=Bound(0.0, 100.0, "the chassis stiffens at about 1 m of crush"),
         also=("crush", "max_crush"),
@@ -302,18 +302,18 @@ class Model:
     resistance: str = setting(
         "model.resistance",
         "",
-        "law of the ultimate resistance of the soil",
+        "soil model: the ultimate resistance of the soil",
         RESISTANCES[0],
         choices=RESISTANCES,
-        kind="a law of the soil's resistance",
+        kind="a soil model",
     )
     second_opinion: tuple[str, ...] = setting(
         "model.second_opinion",
         "",
-        "laws of the soil's resistance under which passes are simulated again, with friction and vertical motion; "
+        "soil models under which passes are simulated again, with friction and vertical motion; "
         "width_capped alone decides, and broms is asked where that overturns a pass or resists more",
         USUAL_OPINION,
-        kind="a law for a second opinion",
+        kind="a soil model for a second opinion",
         shown_default=USUAL_OPINION[0],
     )
     layers: tuple[Layer, ...] = setting(
@@ -371,7 +371,7 @@ class Model:
     scan: Scan | None = setting(
         "boulder.scan",
         "",
-        "scan of the stone, from which its profile and, with its mass, its density follow",
+        "scan of the boulder, from which its profile and, with its mass, its density follow",
         None,
         also=("mesh", "stone"),
     )

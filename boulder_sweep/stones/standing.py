@@ -126,7 +126,7 @@ class Stone:
         doubled = self._whole_doubled()
         if doubled > MOST_DOUBLED:
             raise ScanError(
-                f"{file}: the surface crosses itself: {doubled:.0%} of the stone lies inside it twice or inside out; "
+                f"{file}: the surface crosses itself: {doubled:.0%} of the boulder lies inside it twice or inside out; "
                 "repair the scan first, for example in MeshLab"
             )
 
@@ -193,7 +193,7 @@ class Stone:
         """
         for key, end in (("up", up), ("facing", facing)):
             if end not in DIRECTIONS:
-                raise ScanError(f"{key}: '{end}' is no end of a stone; there are {', '.join(DIRECTIONS)}")
+                raise ScanError(f"{key}: '{end}' is no end of a boulder; there are {', '.join(DIRECTIONS)}")
         if up[-1] == facing[-1] or (up[-1] in OF_STONE) != (facing[-1] in OF_STONE):
             kinds = "one of a, b, c or one of x, y, z each"
             raise ScanError(f"up: {up} and facing: {facing} do not go together: give two different axes, {kinds}")
