@@ -113,7 +113,7 @@ def grades(grid: Path = GRID, count: int = PASSES) -> dict[str, GradeCounts]:
 
 
 def grades_table(found: dict[str, GradeCounts], *, cpu: bool = False) -> Table:
-    """Return what became of the sets as a table, with the CPU time of a pass if asked."""
+    """Return the grades of the sets as a table, with the CPU time of a pass if asked."""
     table = Table(("passes of", "passes", "stand", "unsafe", "over-cautious", *(["CPU [µs]"] if cpu else [])))
     for name, one in found.items():
         time_us = [f"{1e6 * one.cpu_s / one.passes:.0f}"] if cpu else []

@@ -335,7 +335,7 @@ COLUMNS: tuple[ColumnSpec, ...] = (DESIGN_ID, *INPUTS, *OUTCOMES)
 INPUT_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in INPUTS)
 OPTIONAL_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in OPTIONAL_INPUTS)
 BOULDER_MASS = "boulder_mass_kg"
-"""That of a boulder that has been weighed."""
+"""Column of the mass of a weighed boulder."""
 OUTCOME_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in OUTCOMES)
 BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in (*COLUMNS, *OPTIONAL_INPUTS, *TO_BUILD)}
 

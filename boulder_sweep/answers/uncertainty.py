@@ -185,7 +185,7 @@ class _Arguments:
     spread: Spread
     judges: Judges
     robust: Judges | None
-    """Those that count only robust passes; None where second opinions are not asked."""
+    """Judges that count only robust passes; None where second opinions are not asked."""
     half_width: float
     confidence: float
     most: int

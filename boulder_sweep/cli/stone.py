@@ -58,9 +58,7 @@ Examples:
 @click.option("--unit", default="m", metavar="UNIT", help="Unit of the scan: m, mm, cm, in or ft [m].")
 @click.option("--up", metavar="END", help="End that is up, for a block of settings: a, -a, b, -b, c, -c, x, ...")
 @click.option("--facing", metavar="END", help="End that faces the vehicle, with --up.")
-@click.option(
-    "--plot", type=OUTPUT, metavar="F.png", help="Draw it with each end up; with SITE the best ways."
-)
+@click.option("--plot", type=OUTPUT, metavar="F.png", help="Draw it with each end up; with SITE the best ways.")
 @margin_option
 @at_option
 @set_option

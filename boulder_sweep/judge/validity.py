@@ -76,12 +76,12 @@ VEHICLE = {
 }
 """Vehicles from which the study of second opinions draws, about the one that was tested, SI."""
 RATE = (math.sqrt(VEHICLE["k_v"][0] / VEHICLE["m_v"][1]), math.sqrt(VEHICLE["k_v"][1] / VEHICLE["m_v"][0]))
-"""Their angular frequency sqrt(k/m) [1/s],"""
+"""Angular frequency sqrt(k/m) of these vehicles [1/s]."""
 DAMPING = (
     VEHICLE["c_v"][0] / math.sqrt(VEHICLE["k_v"][1] * VEHICLE["m_v"][1]),
     VEHICLE["c_v"][1] / math.sqrt(VEHICLE["k_v"][0] * VEHICLE["m_v"][0]),
 )
-"""and their damper over sqrt(k m) [-]."""
+"""Damper of these vehicles over sqrt(k m) [-]."""
 NOWHERE = 1e9
 """A friction angle that no soil has [deg]."""
 _SIZES = [usual_range(f"boulder_{side}_m") for side in ("length", "width", "height")]
@@ -172,7 +172,7 @@ FLAGS = (
         "better soil. How likely a pass is, `sweep uncertainty` says.",
     ),
 )
-"""In the order of the kernels, and of the column."""
+"""The flags in the order of the kernels and of the column."""
 _UNSTUDIED = sum(1 << RAISED.index(name) for name in UNSTUDIED)
 """Bits of the flags of designs that the study of second opinions does not speak for."""
 BY_FLAG = {flag.name: flag for flag in FLAGS}

@@ -69,7 +69,7 @@ class Sheet(NamedTuple):
     """What the first page shows."""
 
     words: dict[str, Words]
-    """By system of units."""
+    """Sentences by system of units."""
     qualifies: bool
     title: str
     sketch: Sketch

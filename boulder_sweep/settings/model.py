@@ -43,7 +43,7 @@ FOOT_WORDS = {
     "flat": "foot: flat (boulder.foot); a rounded one is not modelled",
     "rounded": "foot: rounded (boulder.foot), which is not modelled",
 }
-"""What every answer says of it."""
+"""Note on the foot in every answer."""
 
 ENOUGH_ELEMENTS = 200
 """Soil elements that come near their limit; a note says what fewer cost."""

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 PANEL_IN = 3.1
 ROOM_M = 0.25
-"""Around the largest stone of a picture."""
+"""Room around the largest boulder of a picture [m]."""
 
 
 def draw_stone(scan: ScannedStone, path: str | Path) -> None:

@@ -45,7 +45,7 @@ SAME_END_S = 0.02
 def wild_families(count: int, seed: int) -> dict[str, DesignTable]:
     """Return twelve families of designs, made of usual ones.
 
-    Those of wide and flat boulders have the truck strike them as high as its own height and theirs allow.
+    The truck strikes wide and flat boulders as high as its own height and theirs allow.
 
     Parameters
     ----------

@@ -83,11 +83,11 @@ for none is 1.0), which the damping of the soil and the length of an impact more
 STABLE_DECAY = 3.0
 """Largest step times rate of decay (the method's limit on the negative real axis is 3.3)."""
 MOST_SHORTENING = 25.0
-"""No design takes more than this many times the steps asked for,"""
+"""A design may take this many times the steps asked for, or `STEPS_ALWAYS` if that is more."""
 STEPS_ALWAYS = 2_500
-"""unless it needs no more than these to the horizon;"""
+"""Steps to the horizon that every design may take."""
 MOST_STEPS = 500_000
-"""and none takes more than these."""
+"""Most steps that any design takes."""
 RETRY = 0.25
 """Factor on the step of a design whose motion became non-finite all the same, for its retry."""
 ACCEPTED = -1

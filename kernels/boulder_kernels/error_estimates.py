@@ -45,7 +45,7 @@ changed before."""
 LASTING = 0.5
 """Simulated time from which the factor of a long motion counts [s]."""
 LONG_MOTION = 5.0
-"""That factor on the error."""
+"""Factor of a long motion on the error."""
 LONG = 1.0
 """Simulated time from which the motion of a shallow or wide boulder is doubtful [s]."""
 SHALLOW, VERY_SHALLOW = 0.42, 0.3

@@ -39,9 +39,9 @@ sides, and their friction per depth; what all pieces have of five sums."""
 ROOM = 11 * ROW
 """Numbers in the workspace."""
 SIDE_POINTS = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262)
-"""Gauss's four points of a length 1,"""
+"""Gauss's four points of a length 1: the sides are four points by four."""
 SIDE_WEIGHTS = (0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692)
-"""and their weights: the sides are four points by four."""
+"""Weights of Gauss's four points."""
 
 
 class Base(NamedTuple):
@@ -303,7 +303,7 @@ class Element(NamedTuple):
     far: float
     """Force of springs and drag where it is pushed forward [N]."""
     near: float
-    """And where it is pushed back [N]."""
+    """Force of springs and drag where it is pushed back [N]."""
     turning: float
     """Moment of these and of the lift about the common centre of mass [N m]."""
     lift: float

@@ -65,23 +65,23 @@ class GapFactors(NamedTuple):
     """What the gaps of a mode are made of; all of them are constant while the mode lasts."""
 
     contact: float
-    """Of the compression u: 1 where the truck touches, -1 where it has come off."""
+    """Factor of the compression u: 1 where the truck touches, -1 where it has come off."""
     rotation_0: float
     rotation_abs_M: float
-    """Of the modulus of the net moment M."""
+    """Factor of the modulus of the net moment M."""
     rotation_theta: float
     rotation_omega: float
     couple_M: float
     """Factor of the net moment M."""
     couple_abs_M: float
     couple_limit: float
-    """Of the limit of the restoring moment; 0 where the event cannot happen."""
+    """Factor of the limit of the restoring moment; 0 where the event cannot happen."""
     corner_0: float
     corner_theta: float
     arm: float
-    """Of the signed arm of the weight; 0 where the event cannot happen."""
+    """Factor of the signed arm of the weight; 0 where the event cannot happen."""
     top: float
-    """Of the displacement at the soil line: 1 or -1 beyond the ultimate resistance, 0 below, or UNSOUGHT."""
+    """Factor of the displacement at the soil line: 1 or -1 beyond the ultimate resistance, 0 below, or UNSOUGHT."""
     base: float
     """Factor of the displacement at the foot: 1 or -1 beyond the ultimate resistance, 0 below, or UNSOUGHT."""
     limit: float

@@ -181,7 +181,7 @@ class LumpedSoil(NamedTuple):
     """What the wedge of Eqs 1, 2 weighs."""
     bounds: Bounds
     sums: SoilSums
-    """Of pieces; zero for elements."""
+    """Integrals over whole pieces; zero for elements."""
 
 
 @exact_inlined

@@ -76,9 +76,9 @@ class Sizes(NamedTuple):
     v_0: float
     """Speed of impact [m/s]."""
     flat_foot: float
-    """1 or 0: whether the foot of the boulder is flat,"""
+    """1 or 0: whether the foot of the boulder is flat."""
     known_shape: float
-    """and whether what was simulated has its shape."""
+    """1 or 0: whether the simulated boulder has its shape."""
 
 
 class Course(NamedTuple):

@@ -88,7 +88,7 @@ class HeaveControl(NamedTuple):
     fineness: int = 1
     """1 for 16 parts of the soil, strips of the foot and points of the sides, up to 4 for 256."""
     margin: float = 0.0
-    """By how much the motion is proved to stay below the limit, unless it comes that near to it [rad]."""
+    """Distance below the limit within which the motion is proved to stay, unless it comes that near to it [rad]."""
     stop: bool = True
     """Whether the simulation ends at the limit, and where it is proved that it is not reached."""
 
@@ -264,7 +264,7 @@ def move_to_least_energy(
 
 @inlined
 def growth(tolerance: float, error: float) -> float:
-    """By what the next step may be longer: the error of one grows with the fourth power of its length."""
+    """Return the factor for the next step: the error of a step grows with the fourth power of its length."""
     return 0.9 * math.sqrt(math.sqrt(tolerance / error))
 
 

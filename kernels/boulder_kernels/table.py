@@ -96,7 +96,7 @@ def run_rows(
 def run_last_resort(
     designs: np.ndarray, readings: Readings, control: Control, record: Record, out: np.ndarray
 ) -> Outcome:
-    """Do the same for designs that need more steps than are allowed, see `simulate_last_resort`."""
+    """Simulate designs one by one by `simulate_last_resort`, which takes those that need too many steps."""
     outcome = failed(Status.INVALID.value)
     for row in range(designs.shape[1]):
         design = design_in(designs, row)

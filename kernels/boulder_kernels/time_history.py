@@ -42,9 +42,9 @@ class StoredEnergies(NamedTuple):
 
     truck_kinetic: float
     boulder_kinetic: float
-    """Of boulder and lumped soil, m_eff v_b^2/2."""
+    """Translation of boulder and lumped soil, m_eff v_b^2/2."""
     boulder_rotational: float
-    """Of boulder and lumped soil, J_eff omega_b^2/2."""
+    """Rotation of boulder and lumped soil, J_eff omega_b^2/2."""
     soil_elastic: float
     crush_elastic: float
     """In the spring of the vehicle."""

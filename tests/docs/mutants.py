@@ -61,10 +61,10 @@ BROKEN_RUN = 70
 
 
 class Outcome(NamedTuple):
-    """What became of a run."""
+    """Outcome of one run of the tests."""
 
     code: int
-    """That of pytest, `BROKEN_RUN`, or minus the number of the signal that ended the process."""
+    """Exit code of pytest, `BROKEN_RUN`, or minus the number of the signal that ended the process."""
     output: str
 
 

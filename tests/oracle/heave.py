@@ -355,7 +355,7 @@ def energy(body: Body, q: Array, rates: Array, sets: Array) -> float:
 
 @dataclass(frozen=True)
 class HeaveImpact:
-    """What became of an impact: largest rotation [rad], displacement, rise and way of the truck [m], when the rotation
+    """Outcome of an impact: largest rotation [rad], displacement, rise and way of the truck [m], when the rotation
     reached its limit [s] (infinity for never), the last state, what the base is pressed in for good [m], and how often
     the truck came off or touched again."""
 
