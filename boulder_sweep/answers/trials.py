@@ -101,7 +101,7 @@ def block_at(rows: InputRows, index: np.ndarray, **inputs: np.ndarray) -> Design
 
 @dataclasses.dataclass(frozen=True)
 class Judges:
-    """Two evaluations of designs: a coarse one to search, and the one of the sweep to certify.
+    """Two evaluations of designs: a coarse one to search, and the sweep's own to certify.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ WATER = 1000.0
 
 
 class Ground(NamedTuple):
-    """The soil around a boulder below and besides the uppermost layer, whose constants the design holds."""
+    """The soil around a boulder, apart from the constants of the uppermost layer, which the design holds."""
 
     law: int
     """Law of the ultimate resistance."""

@@ -228,9 +228,9 @@ class TestedRange(NamedTuple):
     """What the model was tested on, and what is usual."""
 
     crush: float
-    """Largest crush of the tests [m]."""
+    """Largest crush without a flag [m]."""
     rotation: float
-    """Largest rotation of the tests [rad]."""
+    """Largest rotation without a flag [rad]."""
     overlap: float
     """Least overlap of boulder and bumper [m]."""
     least_L: float

@@ -84,11 +84,11 @@ class HeaveControl(NamedTuple):
     longest: float
     """Longest simulated time [s]; a motion that is not proved to stay below the limit by then is not decided."""
     tolerance: float = 2e-4
-    """Error of one step [m]: velocities times its length, the rotation at `error_arm`."""
+    """Error of one step [m]: error of the velocities times its length, the rotation at `error_arm`."""
     fineness: int = 1
     """1 for 16 parts of the soil, strips of the foot and points of the sides, up to 4 for 256."""
     margin: float = 0.0
-    """Distance below the limit within which the motion is proved to stay, unless it comes that near to it [rad]."""
+    """Distance that the motion provably keeps from the limit, unless it comes that near to it [rad]."""
     stop: bool = True
     """Whether the simulation ends at the limit, and where it is proved that it is not reached."""
 

@@ -467,12 +467,12 @@ def by_count(load: Callable[[Any, int, int], Any]) -> Callable[[Any, int], tuple
 
     @inlined
     def two(group: Any, m: int, lane: int) -> Any:
-        """Add up two pieces from m on."""
+        """Load two from m on, as a tuple."""
         return one(group, m, lane) + one(group, m + 1, lane)
 
     @inlined
     def four(group: Any, m: int, lane: int) -> Any:
-        """Add up four pieces from m on."""
+        """Load four from m on, as a tuple."""
         return two(group, m, lane) + two(group, m + 2, lane)
 
     def choose(group: Any, lane: Any) -> Callable[..., Any]:
