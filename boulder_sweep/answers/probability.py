@@ -1,8 +1,7 @@
 """Questions about the probability of passing, when inputs of soil or vehicle are uncertain.
 
 The least value at which designs drawn with it pass often enough, and the lightest boulder that does. The
-latter is searched as in `lightest`: shapes are compared by a few points, and the boulders around the answer by all of
-them.
+second search works as in `lightest`: a few points compare shapes, and all points the boulders around the answer.
 """
 
 from __future__ import annotations

@@ -54,9 +54,8 @@ def start_light() -> None:
     NumPy's linear algebra starts a thread for each core, and the systems solved here have a few unknowns; a number of
     threads that the user has set stands. Imports make hundreds of thousands of objects that stay until the end. By
     default Python searches them for unused ones hundreds of times, and thrice more at the end, where the system takes
-    all back. Each block has arrays as large as the next. By default each thread and Arrow have a heap of
-    their own, and the system gets freed arrays back and clears them anew: more memory by a fifth, and twice the page
-    faults.
+    all back. Each block has arrays as large as the next. By default each thread and Arrow have a heap of their own, and
+    the system gets freed arrays back and clears them anew: more memory by a fifth, and twice the page faults.
     """
     os.environ.setdefault(THREADS_OF_OPENBLAS, "1")
     os.environ.setdefault(ALLOCATOR_OF_ARROW, "system")

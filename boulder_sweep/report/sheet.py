@@ -81,7 +81,7 @@ class Sheet(NamedTuple):
     vehicle: tuple[tuple[str, Cell, str], ...]
     """Name, value and source of each input."""
     grade: tuple[str, str]
-    """Worst grade of the recommended design over all cases, and its meaning."""
+    """Grade of the recommended design over all cases, and its meaning."""
     cases: AnswerTable | None
     """The recommended design in every soil and before every vehicle."""
 

@@ -302,7 +302,7 @@ class Model:
     resistance: str = setting(
         "model.resistance",
         "",
-        "soil model: the ultimate resistance of the soil",
+        "soil model, which gives the ultimate resistance of the soil",
         RESISTANCES[0],
         choices=RESISTANCES,
         kind="a soil model",
