@@ -185,7 +185,7 @@ def placing_lines(result: Placing, rock: str, unit: str, site: str) -> list[str]
     return [
         f"at {site}, depth from which on it passes{cases}:",
         *_table(columns, passing),
-        "up, facing: the end of the boulder that is up, and the one that faces the vehicle",
+        "up, facing: the end that is up, and the one that faces the vehicle",
         "above: height over the ground; mass: of what is left after the cut",
         *(words for kind, words in SIGNS.items() if kind in kinds),
         *rest,
@@ -281,7 +281,7 @@ def foot_text(standing: Standing) -> str:
 def _legend(scan: ScannedStone) -> list[str]:
     """Return what the columns mean, as far as they say something."""
     lines = [
-        "up, facing: the end of the boulder that is up, and the one that faces the vehicle",
+        "up, facing: the end that is up, and the one that faces the vehicle",
         "cut: cut off below, for a flat foot under the centre of mass",
         "rests: section of the uncut boulder just above the ground over its largest one",
         "fit: error of the profile, root mean square over the volume",
