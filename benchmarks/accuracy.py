@@ -44,7 +44,7 @@ class Peaks(NamedTuple):
     """What is compared: arrays of shape (n,)."""
 
     theta: np.ndarray
-    """Largest rotation [rad]."""
+    """Largest rotation of each design [rad]."""
     x_b: np.ndarray
     """Largest displacement of the boulder [m]."""
     x_v: np.ndarray

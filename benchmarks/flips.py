@@ -40,7 +40,7 @@ EDGE_DEG, EDGE_M = NOTABLE_DEG, 1e-5
 """Where a rotation or a length, with or without its error, is so close to a limit, rounding may decide the verdict:
 processors differ in the last bits [deg], [m]."""
 REACHED = 1e-9
-"""As close as this to a limit, a rotation or length is the limit itself: degrees come from radians [deg], [m]."""
+"""A rotation or length this close to a limit is the limit itself: degrees come from radians [deg], [m]."""
 MOST_ROUNDED = 1e-4
 """Fraction of the designs, or one of them, whose verdict rounding may have changed."""
 MOST_UNSETTLED = 1e-3

@@ -143,7 +143,7 @@ class Problem:
 
     @property
     def size(self) -> int:
-        """How many designs."""
+        """Number of designs in the problem."""
         return len(self.t_end)
 
     def first(self, count: int) -> Problem:
@@ -363,7 +363,7 @@ def compiler() -> list[str]:
 
 @cache
 def _library() -> ctypes.CDLL:
-    """Compile once."""
+    """Compile the library once, and load it."""
     folder = Path(tempfile.mkdtemp(prefix="sweep-plain-c-"))
     try:
         names = ", ".join(Constants._fields)

@@ -29,7 +29,7 @@ from docs.studies.coverage import (
 )
 
 DESIGNS = 20_000
-"""Of each family."""
+"""Designs of each family."""
 SEED = 7
 """Of the random numbers: not one of those by which `boulder_kernels.error_estimates` was chosen."""
 HOOD_M = 1.45
@@ -115,7 +115,8 @@ class FamilyScore(NamedTuple):
     rotation: float
     """Share of these whose estimated error of the rotation is no smaller than the true one."""
     displacement: float
-    """The same of the displacements, over all designs that both solutions or neither stopped at the limit."""
+    """Share whose estimated error of the displacements is no smaller than the true one, of all designs that both
+    solutions or neither stopped at the limit."""
     wrong: int
     """Designs on the wrong side of the limit that are not undecided."""
 

@@ -40,7 +40,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Callable[[], No
 
 def test_work_that_takes_half_as_long_again_fails_by_name(clock: Callable[..., object]) -> None:
     def lanes() -> None:
-        """As fast as when the record was made."""
+        """Lanes as fast as when the record was made."""
 
     clock({lanes: [4.5], nothing: [9.1]})
     found = gate.within({"lanes": lanes, "twice": nothing}, reference, {"lanes": 4.5, "twice": 6.0}, 1.5)

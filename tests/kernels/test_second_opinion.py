@@ -410,7 +410,7 @@ def test_the_proof_counts_all_energy_and_waits_for_the_truck() -> None:
 
 
 def shallow(design: bk.Design) -> bk.Design:
-    """The same boulder, embedded by a sixth of its height: turned, it sinks by more than its embedment."""
+    """Return a boulder embedded by a sixth of its height: turned, it sinks by more than its embedment."""
     return design._replace(d=design.H / 6, e=(min(design.H * 5 / 6, 1.4) + design.e_bumper) / 2)
 
 

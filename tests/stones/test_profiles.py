@@ -251,7 +251,7 @@ def turned(points, seed):
 
 
 def shuffled(surface, seed):
-    """The same surface with its points, its faces and the corners of each in another order."""
+    """Return a surface with its points, its faces and the corners of each in another order."""
     points, faces = surface
     random = np.random.default_rng(seed)
     order = random.permutation(len(points))
