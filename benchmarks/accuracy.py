@@ -44,7 +44,7 @@ class Peaks(NamedTuple):
     """What is compared: arrays of shape (n,)."""
 
     theta: np.ndarray
-    """Largest rotation [rad]."""
+    """Largest rotation of each design [rad]."""
     x_b: np.ndarray
     """Largest displacement of the boulder [m]."""
     x_v: np.ndarray
@@ -76,7 +76,7 @@ class Point:
 
 
 def point_of(preset: str, way: str, step_s: float, cpu_us: float, found: Peaks, known: Peaks) -> Point:
-    """Compare peaks with those of the reference."""
+    """Compare peaks with the reference's peaks."""
     both = ~found.overturned & ~known.overturned
     theta = np.degrees(np.abs(found.theta - known.theta))[both]
     x = 1e3 * np.maximum(np.abs(found.x_b - known.x_b), np.abs(found.x_v - known.x_v))[both]

@@ -40,7 +40,7 @@ EDGE_DEG, EDGE_M = NOTABLE_DEG, 1e-5
 """Where a rotation or a length, with or without its error, is so close to a limit, rounding may decide the verdict:
 processors differ in the last bits [deg], [m]."""
 REACHED = 1e-9
-"""As close as this to a limit, a rotation or length is the limit itself: degrees come from radians [deg], [m]."""
+"""A rotation or length this close to a limit is the limit itself: degrees come from radians [deg], [m]."""
 MOST_ROUNDED = 1e-4
 """Fraction of the designs, or one of them, whose verdict rounding may have changed."""
 MOST_UNSETTLED = 1e-3
@@ -63,7 +63,7 @@ class Case:
     settings
         Lines of the settings file beside the table of designs.
     ranges
-        Ranges in place of those of `RANGES`.
+        Ranges that replace `RANGES`.
     outlined
         Whether the settings give the boulder's outline, and with it the sides, in place of the table.
     """
@@ -251,8 +251,8 @@ class Changes:
     designs : int
         How many were compared.
     verdicts, reasons, grades, unsafe, rotations, unsettled, rounded : int
-        Designs with another verdict; with the same one for another reason; with another grade of a pass; those of them
-        all that pass now and did not, or have a better grade; with a largest rotation that moved by at least
+        Designs with another verdict; with the same one for another reason; with another grade of a pass; among
+        them all that pass now and did not, or have a better grade; with a largest rotation that moved by at least
         `NOTABLE_DEG` and more than its error, or not more. Where a verdict or reason may have changed by rounding
         alone, it is counted as rounded only.
     largest_deg : float
@@ -275,7 +275,7 @@ class Changes:
 
 
 def compared(case: str, record: pd.DataFrame, now: pd.DataFrame) -> Changes:
-    """Compare the rows of a case with those of its record.
+    """Compare the rows of a case with its record.
 
     Parameters
     ----------

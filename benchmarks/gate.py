@@ -54,7 +54,7 @@ solver: {accuracy: balanced, horizon: 1 s}
 """
 """Settings of the small run: a grid of 1000 designs."""
 COUNTED = ("closed_form", "step", "follow")
-"""Kernels whose calls are counted one by one, beside those of all."""
+"""Kernels whose calls are counted one by one, besides the calls of all kernels."""
 PREPARING = "interruptible work"
 """Name of the threads that prepare a run; how many designs they try depends on the clock."""
 ANY_PROCESSOR = "any"

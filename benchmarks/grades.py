@@ -48,14 +48,14 @@ LOOSE_DEG = 30.0
 SEED = 55
 
 
-class Found(NamedTuple):
-    """What became of the passes of a set."""
+class GradeCounts(NamedTuple):
+    """How many passes of a set stand."""
 
     passes: int
     stand: int
     """Passes that stand as they are graded."""
     unsafe: int
-    """Those of them that overturn in a fine solution."""
+    """Passes that overturn in a fine solution."""
     cautious: int
     """Passes that do not stand, though no fine solution overturns them."""
     cpu_s: float
@@ -94,7 +94,7 @@ def overturned(passes: Designs, evaluation: Evaluation) -> np.ndarray:
     return found
 
 
-def held(evaluation: Evaluation, passes: Designs) -> Found:
+def held(evaluation: Evaluation, passes: Designs) -> GradeCounts:
     """Grade passes, and hold the grades to fine solutions."""
     judged, model = evaluation.judged(passes), evaluation.model
     begun = time.process_time()
@@ -104,16 +104,16 @@ def held(evaluation: Evaluation, passes: Designs) -> Found:
     cpu_s = time.process_time() - begun
     stand, lost = standing(graded), overturned(passes, evaluation)
     unsafe, cautious = (int(np.count_nonzero(which)) for which in (stand & lost, ~stand & ~lost))
-    return Found(passes.size, int(np.count_nonzero(stand)), unsafe, cautious, cpu_s)
+    return GradeCounts(passes.size, int(np.count_nonzero(stand)), unsafe, cautious, cpu_s)
 
 
-def grades(grid: Path = GRID, count: int = PASSES) -> dict[str, Found]:
+def grades(grid: Path = GRID, count: int = PASSES) -> dict[str, GradeCounts]:
     """Hold the grades of all sets to fine solutions."""
     return {name: held(evaluation, passes) for name, evaluation, passes in sets(grid, count)}
 
 
-def grades_table(found: dict[str, Found], *, cpu: bool = False) -> Table:
-    """Return what became of the sets as a table, with the CPU time of a pass if asked."""
+def grades_table(found: dict[str, GradeCounts], *, cpu: bool = False) -> Table:
+    """Return the grades of the sets as a table, with the CPU time of a pass if asked."""
     table = Table(("passes of", "passes", "stand", "unsafe", "over-cautious", *(["CPU [µs]"] if cpu else [])))
     for name, one in found.items():
         time_us = [f"{1e6 * one.cpu_s / one.passes:.0f}"] if cpu else []

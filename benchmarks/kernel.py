@@ -19,7 +19,7 @@ from boulder_kernels.outline import HEIGHT
 from boulder_kernels.pieces import COUNTS, TO, given_pieces, uniform_layers
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_kernels.soil import Kinematics, Reaction, closed_form, element_sums
-from boulder_kernels.table import Given, some_rows
+from boulder_kernels.table import LaneDesigns, some_rows
 from boulder_sweep.judge.accuracy import LONGEST_HORIZON
 from boulder_sweep.settings.model import SECOND_OPINIONS
 from boulder_sweep.soils import with_law
@@ -87,14 +87,14 @@ def measure() -> Table:
     lines = Kinematics(0.05, 0.03, 2.0, 0.5, 0.4, 1.5)
     layered = {count: same_soil(designs, count) for count in COUNTS}
 
-    def in_lanes(given: Given) -> Callable[[], object]:
+    def in_lanes(given: LaneDesigns) -> Callable[[], object]:
         out = empty_outcomes(given.designs.shape[1])
         return partial(lanes.simulate_lanes, *given, readings, control, bk.no_record(), out)
 
     work: dict[str, Callable[[], object]] = {
-        "box": in_lanes(Given(stacked)),
-        **{f"{count} layers": in_lanes(Given(table, count, True)) for count, table in layered.items()},
-        "taper": in_lanes(Given(same_taper(designs), 1, has_outline=True)),
+        "box": in_lanes(LaneDesigns(stacked)),
+        **{f"{count} layers": in_lanes(LaneDesigns(table, count, True)) for count, table in layered.items()},
+        "taper": in_lanes(LaneDesigns(same_taper(designs), 1, has_outline=True)),
         **{law: partial(second_opinions, with_law(passes, law), asked) for law in SECOND_OPINIONS},
         "sums": partial(repeated(element_sums), lines, with_elements, SUMS),
         "closed": partial(repeated(closed_form), lines, closed, CLOSED_FORMS),

@@ -95,7 +95,7 @@ def compared(table: pd.DataFrame, rotations: np.ndarray) -> dict[str, int]:
     table
         Result of a run.
     rotations
-        As of `truth`.
+        Largest rotations [rad] by each of `STEPS_S`, shape (n, 2).
     """
     overturns = rotations >= LIMIT
     known = overturns[:, 0] == overturns[:, 1]

@@ -143,7 +143,7 @@ class Problem:
 
     @property
     def size(self) -> int:
-        """How many designs."""
+        """Number of designs in the problem."""
         return len(self.t_end)
 
     def first(self, count: int) -> Problem:
@@ -363,7 +363,7 @@ def compiler() -> list[str]:
 
 @cache
 def _library() -> ctypes.CDLL:
-    """Compile once."""
+    """Compile the library once, and load it."""
     folder = Path(tempfile.mkdtemp(prefix="sweep-plain-c-"))
     try:
         names = ", ".join(Constants._fields)
@@ -420,7 +420,7 @@ def solvers() -> tuple[list[Solver], list[str]]:
 
 
 @dataclass
-class Measured:
+class Measurement:
     """One solver at several tolerances.
 
     Parameters
@@ -469,10 +469,10 @@ class Measured:
         ]
 
 
-def measure_kernels(problem: Problem, *, in_lanes: bool = True) -> Measured:
+def measure_kernels(problem: Problem, *, in_lanes: bool = True) -> Measurement:
     """Measure this project in lanes, or one design after the other; on the whole problem."""
     name = "boulder-sweep, lanes" if in_lanes else "boulder-sweep, single impact, events located"
-    measured = Measured(name, problem.size)
+    measured = Measurement(name, problem.size)
 
     def simulate(control: bk.Control) -> bk.OutcomeTable:
         return bk.simulate_table(problem.designs, READINGS, control._replace(side_by_side=in_lanes))
@@ -485,7 +485,7 @@ def measure_kernels(problem: Problem, *, in_lanes: bool = True) -> Measured:
     return measured
 
 
-def measure_solver(solver: Solver, problem: Problem, finer: int = 1) -> Measured:
+def measure_solver(solver: Solver, problem: Problem, finer: int = 1) -> Measurement:
     """Tighten the tolerance until the solver is accurate enough, and a little further.
 
     Parameters
@@ -498,7 +498,7 @@ def measure_solver(solver: Solver, problem: Problem, finer: int = 1) -> Measured
         How many further tolerances to try, to confirm that the accuracy holds.
     """
     own = problem.first(min(solver.designs, problem.size))
-    measured = Measured(solver.name, own.size, in_steps=solver.in_steps)
+    measured = Measurement(solver.name, own.size, in_steps=solver.in_steps)
     solve = solver.prepare(own)
     enough, states = 0, solve(solver.tolerances[0]).ndim > 1
     for tolerance in solver.tolerances:
@@ -524,7 +524,7 @@ def _point(solve: Callable[[float], np.ndarray], tolerance: float, problem: Prob
     return tolerance, seconds / problem.size, error
 
 
-def _try_fewer_outputs(measured: Measured, solver: Solver, problem: Problem) -> None:
+def _try_fewer_outputs(measured: Measurement, solver: Solver, problem: Problem) -> None:
     """Give fewer output times as long as the chosen tolerance stays accurate enough."""
     if measured.chosen is None:
         return

@@ -31,7 +31,7 @@ SHOWN = {
     "peak_force_kN": ("peak force [%]", 1e2),
     "time_to_limit_s": ("time to the limit [ms]", 1e3),
 }
-"""Headings of differences, and the factors to the units in them; those of forces are relative."""
+"""Headings of differences, and the factors to their units; forces are compared by their ratio."""
 
 
 def by_design(results: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:

@@ -36,7 +36,7 @@ WAY_OUT = {
 GRADES = ("robust", "sensitive", "open")
 """What is known of a pass under other forms of the model."""
 STANDINGS = ("paper", "paper;broms", "paper;width_capped", "paper;broms;width_capped")
-"""Models that a pass stands under: the paper's motion, and second opinions by other laws of the soil."""
+"""Models that a pass stands under: the paper's motion, and second opinions by other soil models."""
 SHAPES = ("narrower_downwards", "barrel", "narrower_upwards")
 """Shapes of which the worst stands for a boulder as taped and weighed (`boulder_sweep.stones.taped`), in the order in
 which they are simulated: the one that most often fails first."""
@@ -76,9 +76,9 @@ class OutcomeColumn(ColumnSpec):
         From what the judge knows of n rows (`boulder_sweep.judge.verdict.Facts`) to the values of the column, shape
         (n,): numbers in `unit`, or codes.
     rows : {'all', 'judged', 'computed', 'free', 'rated', 'overturned', 'passing'}
-        Which rows have a value; null elsewhere. *Judged* are all but errors, *computed* those simulated, *free* those
-        of them that were not stopped at the limit of the rotation, *rated* those whose penetration counts: neither
-        overturned nor left undecided by anything but the numerical error. *Passing* rows have the verdict pass.
+        Which rows have a value; null elsewhere. *Judged* are all but errors, *computed* all that were simulated, *free*
+        all simulated ones that were not stopped at the limit of the rotation, *rated* all whose penetration counts:
+        neither overturned nor left undecided by anything but the numerical error. *Passing* rows have the verdict pass.
     words : tuple of str
         What the codes of a dictionary column stand for; a row may add words of its own behind them. Code -1 is null.
     """
@@ -97,7 +97,7 @@ INPUTS: tuple[ColumnSpec, ...] = (
     ColumnSpec("boulder_width_m", "float64", "m", "width W of the boulder across the direction of travel"),
     ColumnSpec("boulder_height_m", "float64", "m", "whole height H of the boulder, buried part included"),
     ColumnSpec("boulder_density_kg_m3", "float64", "kg/m^3", "density of the boulder"),
-    ColumnSpec("embedment_depth_m", "float64", "m", "depth d of the boulder's base below the soil line"),
+    ColumnSpec("embedment_depth_m", "float64", "m", "depth d of the boulder's foot below the soil line"),
     ColumnSpec("impact_height_m", "float64", "m", "height e of the impact above the soil line (Eq 9, or as given)"),
     ColumnSpec("soil_density_kg_m3", "float64", "kg/m^3", "density of the compacted soil"),
     ColumnSpec("friction_angle_deg", "float64", "deg", "effective friction angle of the soil"),
@@ -139,7 +139,7 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "",
         "why: empty for a pass; no_contact, overturns, penetration or slower_truck (it stops this truck, but a slower "
         "one overturns it) for a fail; horizon, error, crush, override, foot, shape or validity where undecided; or "
-        "why the row could not be computed",
+        "why the design could not be computed",
         lambda facts: facts.reason,
         rows="all",
         words=REASONS,
@@ -269,7 +269,7 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "dictionary",
         "",
         "of a boulder as taped and weighed, which fills less than 95 % of the box of its sizes: the shape that decides "
-        "the row, the worst of those with its mass and sizes; null for any other",
+        "the verdict, the worst of those with its mass and sizes; null for any other",
         lambda facts: np.full(facts.designs.size, facts.designs.shape, dtype=np.int32),
         rows="judged",
         words=SHAPES,
@@ -288,8 +288,8 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "robustness",
         "dictionary",
         "",
-        "of a pass: robust where it stands with friction and vertical motion under the weakest law of the soil, too, "
-        "sensitive where it does not under a law that was asked, open where none was; null for no pass",
+        "of a pass: robust where it stands with friction and vertical motion under the weakest soil model, too, "
+        "sensitive where it does not under a soil model that was asked, open where none was; null for no pass",
         lambda facts: facts.robustness,
         rows="passing",
         words=GRADES,
@@ -308,7 +308,7 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "step_s",
         "float64",
         "s",
-        "time step that decided the row, shortened further where stability asks for it",
+        "time step that decided the verdict, shortened further where stability asks for it",
         lambda facts: facts.outcomes.step,
     ),
 )
@@ -335,7 +335,7 @@ COLUMNS: tuple[ColumnSpec, ...] = (DESIGN_ID, *INPUTS, *OUTCOMES)
 INPUT_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in INPUTS)
 OPTIONAL_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in OPTIONAL_INPUTS)
 BOULDER_MASS = "boulder_mass_kg"
-"""That of a boulder that has been weighed."""
+"""Column of the mass of a weighed boulder."""
 OUTCOME_COLUMNS: tuple[str, ...] = tuple(spec.name for spec in OUTCOMES)
 BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in (*COLUMNS, *OPTIONAL_INPUTS, *TO_BUILD)}
 

@@ -21,8 +21,8 @@ LEAST_SOLIDITY, MOST_SOLIDITY = 0.95, 1.15
 """Volume of a boulder by its mass, over the volume of the box of its sides, between which it counts as this box: sides
 are taped to 5 cm, and mass and density are not known better. More is a mistake."""
 LEAST_TAPED = 0.4
-"""The same, above which the worst of a family of shapes stands for a boulder that fills less than its box
-(`boulder_sweep.stones.taped`). With less it is no block, and no shape stands for it."""
+"""Least share of its box that a boulder fills: between this and `LEAST_SOLIDITY` the worst of a family of shapes stands
+for it (`boulder_sweep.stones.taped`). With less it is no block, and no shape stands for it."""
 MAX_DICTIONARY = 1 << 16
 """Largest dictionary of a column; beyond that a column holds one value per row."""
 
@@ -160,7 +160,7 @@ class Source:
         """Indices into the dictionary for every value (None: its own index), and the dictionary."""
 
     def to_numpy(self) -> np.ndarray:
-        """Return the values."""
+        """Return the values, shape (n,)."""
         return self.values
 
     def find_dictionary(self) -> None:
@@ -174,14 +174,14 @@ class Source:
 
 
 @dataclass(frozen=True, eq=False)
-class Derived:
+class Formula:
     """A quantity computed from others row by row, where the combinations are too many to keep."""
 
     function: Callable[..., np.ndarray]
-    inputs: tuple[Source | Derived, ...]
+    inputs: tuple[Source | Formula, ...]
 
 
-PlannedInput = Source | Derived
+PlannedInput = Source | Formula
 Known = TypeVar("Known")
 """What is known of a quantity: its values, or how they follow from the axes."""
 
@@ -319,11 +319,11 @@ class DesignPlan:
         """Return ``function(*inputs)`` over all combinations if these are few, else per row."""
         sources = [quantity for quantity in inputs if isinstance(quantity, Source)]
         if len(sources) < len(inputs):
-            return Derived(function, inputs)
+            return Formula(function, inputs)
         axes = tuple(sorted({axis for source in sources for axis in source.axes}))
         shape = tuple(self.lengths[axis] for axis in axes)
         if math.prod(shape) > max(MAX_DICTIONARY, *(len(source.values) for source in sources)):
-            return Derived(function, inputs)
+            return Formula(function, inputs)
         grids = []
         for source in sources:
             lengths = tuple(self.lengths[axis] if axis in source.axes else 1 for axis in axes)

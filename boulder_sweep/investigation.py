@@ -77,12 +77,12 @@ class SandState(NamedTuple):
 
     name: str
     relative_density: float
-    """Upper end [-]."""
+    """Upper end of the relative density [-]."""
     friction_angle_deg: float
-    """At this end."""
+    """Friction angle at the upper end of the relative density."""
     lightest_pcf: float
     heaviest_pcf: float
-    """Moist unit weight."""
+    """Bounds of the moist unit weight."""
 
 
 STATES = (
@@ -235,7 +235,7 @@ def api_curve(angle: np.ndarray) -> np.ndarray:
 
 
 def terzaghi_curve(angle: np.ndarray) -> np.ndarray:
-    """The same by Terzaghi's values."""
+    """Constant of horizontal subgrade reaction [MN/m^3] by Terzaghi's values, over the friction angle [deg]."""
     return _log_line(angle, _TERZAGHI_ANGLES, _TERZAGHI)
 
 

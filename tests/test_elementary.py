@@ -1,4 +1,4 @@
-"""Elementary functions of arrays: those of the C library, one number after another."""
+"""Elementary functions of arrays give what the C library gives, one number after another."""
 
 from __future__ import annotations
 

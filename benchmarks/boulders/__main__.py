@@ -2,7 +2,7 @@
 
 The kernels only choose designs of a family and leave out those not at rest within the time simulated; every reference
 value is the oracle's (`tests.oracle`, DOP853 that lands on every event and kink). Each design is integrated by two
-tolerances; the values are those of the finer one, and the metadata of the file say how far apart both are.
+tolerances; the file holds the finer values, and its metadata say how far apart both are.
 """
 
 from __future__ import annotations

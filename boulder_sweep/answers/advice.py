@@ -29,13 +29,13 @@ NOT_ASKED = "no second opinion was asked for"
 """Why designs of a run may have no grade."""
 ALONG = dict(zip(SIDES, ("long", "wide", "high"), strict=True))
 BETTER = {"mass": "lighter", "depth": "shallower", "excavation": "less to dig"}
-"""What a design is that is the best by a preference, beside the one that is recommended."""
+"""What the best design by a preference is, compared with the recommended one."""
 BEST = {"mass": "the lightest", "depth": "the shallowest", "excavation": "the one with the least to dig"}
-"""And what the one that is recommended is."""
+"""What the recommended design is, by preference."""
 MOST_NAMED = 6
 """Most boulders that are named one by one because they will not do."""
 ROUNDED = 0.01
-"""By how much a side may be less than the usual one for having been rounded."""
+"""Share by which rounding may make a side smaller than the usual one."""
 
 
 class Again(NamedTuple):

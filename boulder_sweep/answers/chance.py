@@ -26,7 +26,7 @@ from scipy.stats import qmc
 from boulder_sweep.runner.pool import Pool, call
 
 SCRAMBLINGS = 16
-"""Independent estimates."""
+"""Independent scramblings of the points; their spread tells how uncertain the estimate is."""
 FIRST = 32
 """Initial points of each; doubled until the interval is narrow enough."""
 FEWEST = 2 * SCRAMBLINGS
@@ -75,7 +75,7 @@ def _normal(engine: qmc.Sobol, count: int) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class Sampled:
+class Estimates:
     """Probabilities of n rows from sampled points.
 
     Attributes
@@ -102,12 +102,12 @@ class Sampled:
 class Chances(NamedTuple):
     """Chances of n rows of passing, and of a pass that stands under the second opinion that decides."""
 
-    passing: Sampled
-    robust: Sampled | None
+    passing: Estimates
+    robust: Estimates | None
     """None where second opinions are not asked."""
 
     @property
-    def asked(self) -> Sampled:
+    def asked(self) -> Estimates:
         """The chance that a question about a probability is about."""
         return self.passing if self.robust is None else self.robust
 
@@ -126,7 +126,7 @@ def chance(
     confidence: float = 0.95,
     most: int = 1 << 16,
     first: int = FIRST,
-) -> Sampled:
+) -> Estimates:
     """Estimate the probability of an event in n rows.
 
     Parameters
@@ -148,7 +148,7 @@ def chance(
 
     Returns
     -------
-    Sampled
+    Estimates
         If `most` points are not enough, the interval is wider than requested.
     """
     happened, possible = np.zeros((rows, SCRAMBLINGS)), np.zeros((rows, SCRAMBLINGS))
@@ -176,7 +176,7 @@ def chance(
         target = min(2 * target, max(most // SCRAMBLINGS, first))
     low, high = interval(happened, count, sure)[0], interval(possible, count, sure)[1]
     drawn = SCRAMBLINGS * count
-    return Sampled(happened.sum(axis=1) / drawn, low, high, drawn, causes.sum(axis=1) / drawn, causes.argmax(axis=1))
+    return Estimates(happened.sum(axis=1) / drawn, low, high, drawn, causes.sum(axis=1) / drawn, causes.argmax(axis=1))
 
 
 def interval(happened: np.ndarray, count: np.ndarray | int, confidence: float) -> tuple[np.ndarray, np.ndarray]:

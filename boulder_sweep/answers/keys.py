@@ -101,7 +101,7 @@ def key_of(word: str, *, most: bool = False) -> Key:
     Parameters
     ----------
     word
-        As of `boulder_sweep.settings.fields.named`; ``mass`` is that of the boulder.
+        Path, key or column of the input; ``mass`` is the boulder's.
     most
         Whether its largest value is wanted.
 
@@ -264,8 +264,12 @@ def refuse_narrow(sweep: Sweep, key: Key, pieces: Iterable[Mapping[str, np.ndarr
 
     Parameters
     ----------
-    sweep, key, between
-        As of `range_of`.
+    sweep
+        The sweep.
+    key
+        The input.
+    between
+        Ends given by the user, which take precedence.
     pieces
         The other inputs of all rows, in pieces.
 

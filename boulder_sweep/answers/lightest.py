@@ -102,7 +102,7 @@ class LightestQuestion:
         if sweep.table is not None:
             raise QuestionError("the least mass needs bounds for the boulder's sides; a list of designs has none")
         if key.most:
-            raise QuestionError("the largest mass is simply that of the largest boulder; use --least mass")
+            raise QuestionError("the largest boulder has the largest mass; use --least mass")
         self.sweep, self.key, self.judges = sweep, key, judges
         self.bounds = sweep_ranges(sweep)
         self.bounds |= {name: (value, value) for name, value in sweep.constants.items()}
@@ -289,7 +289,7 @@ class Boulders:
         )
 
     def lighter(self, sizes: Sides, passing: np.ndarray) -> Sides:
-        """Return lighter boulders that pass than those of some rows, tried at random around the lightest so far."""
+        """Return boulders that pass and are lighter than the ones given, tried at random around the lightest so far."""
         sizes = {name: values.copy() for name, values in sizes.items()}
         mass = self.mass(np.arange(len(passing)), self.positions(sizes), sizes)
         unlucky = np.where(passing, 0, UNLUCKY)
@@ -312,7 +312,7 @@ class Boulders:
     def neighbours(
         self, rows: np.ndarray, sizes: Sides, mass: np.ndarray, draw: int
     ) -> tuple[np.ndarray, Sides, np.ndarray]:
-        """Return rows, sizes and masses of random boulders that are lighter than those of some rows."""
+        """Return rows, sizes and masses of random boulders that are lighter than the ones given."""
         count = self.asked.neighbours
         # The same for every row, so that an answer does not depend on the rows that are searched with it.
         rng = np.random.default_rng(draw)

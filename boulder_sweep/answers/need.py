@@ -56,7 +56,7 @@ class Need(Result):
     Attributes
     ----------
     sweep, arrow
-        As of `Result`: inputs, answer, bracket, outcome at the answer.
+        The sweep asked about, and one row for each answer: inputs, answer, bracket, outcome at the answer.
     key : Key
         The input asked for.
     least_margin : float
@@ -166,8 +166,8 @@ def need(
     Parameters
     ----------
     sweep
-        The sweep, the path of its file, or a mapping as of `boulder_sweep.load`. If the input asked for is an axis of
-        its grid, the axis gives the search range.
+        The sweep, the path of its file, or a mapping that `boulder_sweep.load` takes. If the input asked for is an axis
+        of its grid, the axis gives the search range.
     least, most
         The input whose smallest or largest passing value is wanted; only one of the two.
         ``embedment_depth`` by default.
@@ -229,7 +229,7 @@ def need(
         )
     if BOULDER_MASS.name in sweep.plan.given and key.name in (BOULDER_MASS.name, *SIDES, "boulder_density_kg_m3"):
         raise QuestionError(
-            f"{key.field.path} cannot be searched beside boulder.mass, which is that of one boulder; "
+            f"{key.field.path} cannot be searched while boulder.mass gives the mass of one boulder; "
             "remove it from the file and give boulder.density"
         )
     chance = None if probability is None else share(probability, "--probability")

@@ -84,7 +84,7 @@ OF_ANSWERS = "`sweep need`, `capacity` or `uncertainty`"
 
 
 class AnswerFile:
-    """The rows of a file of answers or of a time history, read as those of a run are (`FinishedRows`).
+    """The rows of a file of answers or of a time history, with the attributes of `FinishedRows`.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ class AnswerFile:
     Attributes
     ----------
     rows, rows_done, identity, judged_by, columns
-        As of `FinishedRows`.
+        See `FinishedRows`.
     question : dict
         What was asked; empty where the command asks nothing more.
     kind : str
@@ -256,9 +256,9 @@ def _identified(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[pa.
     table : Table
         All of it.
     identity : dict
-        As of `boulder_sweep.store.provenance.identity`.
+        What all rows have in common, see `boulder_sweep.store.provenance.identity`.
     judged : str
-        As of `boulder_sweep.store.provenance.judged_by`.
+        Whose rules judged the rows; empty where this version's did.
 
     Raises
     ------
@@ -321,7 +321,7 @@ def result_of(
     StoreError
         There is no result in the folder, or it is damaged.
     BoulderSweepError
-        As of `AnswerFile`.
+        The file cannot be read, is damaged, or no command wrote it.
     """
     if not isinstance(path, Path) or not path.is_file() or part_file(path.name):
         return FinishedRows(path)

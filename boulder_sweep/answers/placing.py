@@ -149,7 +149,7 @@ def placed(
     standings
         Ways to stand; all by default.
     margin
-        Margin that is asked for, as of `boulder_sweep.need`.
+        Least margin of a pass that counts.
     progress
         Called with the ways done and their number.
 

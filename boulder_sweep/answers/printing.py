@@ -45,7 +45,7 @@ HEADS = {
     "boulder_width_m": ("W", "m"),
     "boulder_height_m": ("H", "m"),
     "boulder_density_kg_m3": ("rock", "kg/m³"),
-    "boulder_mass_kg": ("stone", "kg"),
+    "boulder_mass_kg": ("boulder", "kg"),
     "embedment_depth_m": ("depth", "m"),
     "embedment_ratio": ("ratio", "d/H"),
     "impact_height_m": ("blow", "m"),
@@ -227,7 +227,7 @@ def uncertainty_lines(result: Uncertainty, units: str = "si") -> list[str]:
 def reserve_lines(result: Reserves, units: str = "si") -> list[str]:
     """Return what designs withstand as lines: varying inputs, verdict, each value and its distance from the design.
 
-    Parameters are those of `uncertainty_lines`.
+    It takes the same parameters as `uncertainty_lines`.
     """
     from boulder_sweep.answers.reserves import RESERVES
 

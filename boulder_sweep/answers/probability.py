@@ -1,8 +1,7 @@
 """Questions about the probability of passing, when inputs of soil or vehicle are uncertain.
 
-The least value at which designs drawn with it pass often enough, and the lightest boulder that does. The search for the
-latter is that of `lightest`: shapes are compared by a few points, and the boulders between which the answer lies, and
-those tried around it, by all of them.
+The least value at which designs drawn with it pass often enough, and the lightest boulder that does. The
+second search works as in `lightest`: a few points compare shapes, and all points the boulders around the answer.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_sweep.answers.chance import SCRAMBLINGS, Chances, Points, Sampled, chance
+from boulder_sweep.answers.chance import SCRAMBLINGS, Chances, Estimates, Points, chance
 from boulder_sweep.answers.draws import WORST, Draws
 from boulder_sweep.answers.keys import Ends, Key, range_of
 from boulder_sweep.answers.lightest import DEPTH, RATIO, Boulders, LightestQuestion, Sides
@@ -113,7 +112,7 @@ class Sampling:
         """Return the probabilities of all rows with inputs set, from the points and more where needed."""
         count, points = len(next(iter(inputs.values()))), Points(len(self.spread.names), self.seed)
 
-        def sampled(draws: Draws) -> Sampled:
+        def sampled(draws: Draws) -> Estimates:
             def event(index: np.ndarray, z: np.ndarray) -> np.ndarray:
                 return draws.drawn(index, z, **rows_at(inputs, index))[1]
 
@@ -130,14 +129,17 @@ class ProbabilityQuestion(Question):
     Parameters
     ----------
     sweep, key, between, judges
-        As of `Question`.
-    probability, seed
-        As of `Sampling`.
+        See `Question`.
+    probability
+        The required probability of passing.
+    seed
+        Seed of the points.
 
     Raises
     ------
     QuestionError
-        As of `Question`, no input has a distribution, or that of the input asked for cannot move with its mean.
+        `Question` refuses, no input has a distribution, or the distribution of the input asked for cannot move with
+        its mean.
     """
 
     rows_at_once = 4
@@ -208,14 +210,16 @@ class LikelyLightestQuestion(LightestQuestion):
     Parameters
     ----------
     sweep, key, judges
-        As of `LightestQuestion`.
-    probability, seed
-        As of `Sampling`.
+        See `LightestQuestion`.
+    probability
+        The required probability of passing.
+    seed
+        Seed of the points.
 
     Raises
     ------
     QuestionError
-        As of `LightestQuestion`, no input has a distribution, or one that is searched for has.
+        `LightestQuestion` refuses, no input has a distribution, or one that is searched for has.
     """
 
     rows_at_once = 1

@@ -53,9 +53,9 @@ FAST_OVERTURN_S = 0.3
 one of its neighbours reaches the limit after 0.5 s or later (see tests/answers/test_scan.py)."""
 SHALLOW, SLIDES_M = 0.45, 0.1
 """Embedment over height below which a boulder that passes by sliding so far [m] may overturn for values between two
-that pass, in stretches of 1 % of the value and less,"""
+that pass, in stretches of 1 % of the value and less."""
 FINE_CELLS = 400
-"""and pieces into which its range is then cut."""
+"""Pieces into which the range of such a boulder is cut."""
 DEPTH = EMBEDMENT[1]
 COARSE_DEPTHS, FINE_DEPTHS, DEPTH_ROUNDS = 7, 5, 5
 """Number of depths, where it is to be found: on the first lattice, on each finer one, and of finer ones, each half as
@@ -95,7 +95,7 @@ class Answers(Brackets):
     Attributes
     ----------
     block, kind, fails, passes
-        As of `Brackets`.
+        See `Brackets`.
     judged : Judged
         Outcomes and verdicts of the designs.
     stretches : list of str or None, of length n

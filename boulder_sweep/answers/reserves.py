@@ -94,7 +94,7 @@ def capacity(sweep: Settings, *, jobs: int | None = None, progress: ProgressCall
     Parameters
     ----------
     sweep
-        The sweep, the path of its file, or a mapping as of `boulder_sweep.load`.
+        The sweep, the path of its file, or a mapping that `boulder_sweep.load` takes.
     jobs
         Threads; all cores by default.
     progress

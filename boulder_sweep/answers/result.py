@@ -92,7 +92,7 @@ def chance_columns(chances: Chances, where: str = "") -> list[TableColumn]:
         *columns,
         ("p_robust", "1", f"chance that the design passes{where}, and {stands}", robust.estimate),
         ("p_robust_low", "1", "lower end of the interval of p_robust", robust.low),
-        ("p_robust_high", "1", "upper end of the interval of p_robust, as of p_pass_high", robust.high),
+        ("p_robust_high", "1", "upper end of the interval of p_robust", robust.high),
     ]
 
 

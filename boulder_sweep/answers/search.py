@@ -170,7 +170,7 @@ def searched_again(
 
 
 def _replace_rows(result: Search, rows: np.ndarray, part: Search) -> Search:
-    """Return a search with some of its rows replaced by those of another."""
+    """Return a search in which another replaces some rows."""
     arrays = {}
     for name in PER_ROW:
         arrays[name] = getattr(result, name).copy()

@@ -1,8 +1,8 @@
 """Uncertain inputs: from independent standard normal numbers to values.
 
 Where the mean of a distribution is searched, its ends move with it. The distribution keeps its shape: where it has a
-coefficient of variation, its ends keep their ratio to the mean, otherwise their distance from it. The ends that a file
-does not name are those of the admitted range, and stay.
+coefficient of variation, its ends keep their ratio to the mean, otherwise their distance from it. Ends that a file
+does not name are the ends of the admitted range, and stay.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Spread:
     Raises
     ------
     QuestionError
-        No input has a distribution, or it is not known how that of the input searched moves with its mean.
+        No input has a distribution, or the one of the input searched moves with its mean in a way that is not known.
 
     Notes
     -----
@@ -147,7 +147,7 @@ class Moving:
         Parameters
         ----------
         spread
-            The distribution of the file, or that of one of its sets.
+            The distribution in the file, or in one of its sets.
         mean
             Means, in the unit of the column, shape (n,).
 
@@ -193,7 +193,7 @@ def moving_of(sweep: Sweep, name: str) -> Moving | None:
     Raises
     ------
     QuestionError
-        As of `Moving`; or the embedment is searched as a depth and uncertain as a ratio, or the reverse.
+        `Moving` refuses; or the embedment is searched as a depth and uncertain as a ratio, or the reverse.
     """
     other = next((one for one in EMBEDMENT if name in EMBEDMENT and one != name and one in sweep.distributions), None)
     if other is not None:
@@ -211,12 +211,14 @@ def narrowed(
 
     Parameters
     ----------
-    sweep, name
-        As of `Moving`; an input without a distribution keeps its ranges.
+    sweep
+        The sweep.
+    name
+        Column (or ``embedment_ratio``) of the input; without a distribution it keeps its ranges.
     low, high
         The ranges, in the unit of the column, shape (n,).
     least
-        As of `Moving.means`.
+        See `Moving.means`.
     given
         Whether the user chose the range; it is then refused in place of being narrowed.
 

@@ -101,7 +101,7 @@ def block_at(rows: InputRows, index: np.ndarray, **inputs: np.ndarray) -> Design
 
 @dataclasses.dataclass(frozen=True)
 class Judges:
-    """Two evaluations of designs: a coarse one to search, and that of the sweep to certify.
+    """Two evaluations of designs: a coarse one to search, and the sweep's own to certify.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def millimetres(lengths: np.ndarray) -> np.ndarray:
 
 
 class Remembered:
-    """Judges designs as an evaluation does, each only once: an answer asks again and again for those of its bracket.
+    """Judges designs as an evaluation does, each only once: an answer asks again and again for the ends of its bracket.
 
     It keeps what it has judged, so every block of rows has one of its own.
 
@@ -215,9 +215,9 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0, *, robust: bool = False) 
     sweep
         The sweep.
     least_margin
-        As of `Judges`.
+        Margin that a design must have to count as passing.
     robust
-        As of `Judges`.
+        Whether only a pass counts that stands under the second opinion that decides.
     """
     accuracy = accuracy_of(sweep)
     final = dataclasses.replace(evaluation_of(sweep, accuracy), least_margin=least_margin)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_sweep.answers.chance import FIRST, SCRAMBLINGS, Chances, Event, Points, Sampled, chance
+from boulder_sweep.answers.chance import FIRST, SCRAMBLINGS, Chances, Estimates, Event, Points, chance
 from boulder_sweep.answers.draws import Draws
 from boulder_sweep.answers.keys import margin_asked, share
 from boulder_sweep.answers.result import (
@@ -56,9 +56,9 @@ class Uncertainty(Result):
     Attributes
     ----------
     sweep, arrow
-        As of `Result`: inputs with the means of the uncertain ones, the outcome at these means, the chance of passing
-        and of a robust pass (`p_robust`, unless second opinions are left out or do not know such designs), with their
-        intervals, and the most influential input.
+        The sweep asked about, and one row for each design: inputs with the means of the uncertain ones, the outcome at
+        these means, the chance of passing and of a robust pass (`p_robust`, unless second opinions are left out or do
+        not know such designs), with their intervals, and the most influential input.
     samples : pyarrow.Table
         Designs drawn: number of the design, uncertain inputs, distance to failing; none where there are more than
         `MOST_SAMPLED` designs.
@@ -118,7 +118,7 @@ def uncertainty(
     Parameters
     ----------
     sweep
-        The sweep, the path of its file, or a mapping as of `boulder_sweep.load`; some inputs have distributions.
+        The sweep, the path of its file, or a mapping that `boulder_sweep.load` takes; some inputs have distributions.
     half_width
         Largest half-width of the interval; sampling continues until it is reached.
     confidence
@@ -155,7 +155,7 @@ def uncertainty(
     spread, graded = Spread(sweep), can_be_asked(sweep) and bool(sweep.model.second_opinion)
     sweep.need_depth()
     judges = judges_of(sweep, least_margin, robust=graded)
-    asked = _Asked(sweep, spread, judges.of_any_pass(), judges if graded else None, width, sure, most)
+    asked = _Arguments(sweep, spread, judges.of_any_pass(), judges if graded else None, width, sure, most)
     if ready is not None:
         ready()
     judges.final.warm_up()
@@ -178,19 +178,19 @@ def uncertainty(
 
 
 @dataclass(frozen=True, eq=False)
-class _Asked:
+class _Arguments:
     """The arguments of `uncertainty`."""
 
     sweep: Sweep
     spread: Spread
     judges: Judges
     robust: Judges | None
-    """Those that count only robust passes; None where second opinions are not asked."""
+    """Judges that count only robust passes; None where second opinions are not asked."""
     half_width: float
     confidence: float
     most: int
 
-    def sampled(self, event: Event, rows: int, points: Points) -> Sampled:
+    def sampled(self, event: Event, rows: int, points: Points) -> Estimates:
         """Return the probabilities of an event."""
         return chance(event, rows, points, half_width=self.half_width, confidence=self.confidence, most=self.most)
 
@@ -200,7 +200,7 @@ class _Asked:
         return Draws(rows, self.spread, self.judges, parallel)
 
 
-def _rows(asked: _Asked, points: Points, parallel: Pool, start: int, stop: int) -> pa.Table:
+def _rows(asked: _Arguments, points: Points, parallel: Pool, start: int, stop: int) -> pa.Table:
     """Return the table of the rows ``[start, stop)``: inputs, outcome at the means, probability, main input."""
     from boulder_sweep.store.part import word_array
 
@@ -258,7 +258,7 @@ def drivers(z: np.ndarray, output: np.ndarray) -> np.ndarray:
     return np.where(output.var(axis=1) > 0.0, shares.argmax(axis=1), -1)
 
 
-def _sample_table(asked: _Asked, points: Points, parallel: Pool, rows: int) -> pa.Table:
+def _sample_table(asked: _Arguments, points: Points, parallel: Pool, rows: int) -> pa.Table:
     """Return samples of the first rows as a table: number of the design, uncertain inputs, distance from failing."""
     import pyarrow as pa
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from boulder_sweep.columns import BY_NAME, VERDICTS, WAY_OUT
 from boulder_sweep.settings.fields import TO_BE_FOUND
 from boulder_sweep.settings.model import FOOT_WORDS, RESISTANCES
-from boulder_sweep.settings.shown_units import Shown, shown_column, shown_settings, shown_unit
+from boulder_sweep.settings.shown_units import ShownColumn, shown_column, shown_settings, shown_unit
 from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.text import counted, duration_text, size_text
 
@@ -33,7 +33,9 @@ def grid_lines(sweep: Sweep) -> list[str]:
     lines = [f"{sweep.name}: {count}"]
     for axis in sweep.axes:
         shown = (
-            shown_column(axis.name, sweep.units) if axis.name in BY_NAME else Shown(axis.name, axis.name, "", 1.0, "")
+            shown_column(axis.name, sweep.units)
+            if axis.name in BY_NAME
+            else ShownColumn(axis.name, axis.name, "", 1.0, "")
         )
         if axis.labels:
             noun = "set" if len(axis) == 1 else "sets"
@@ -129,7 +131,7 @@ def firmness_lines(firmness: Mapping[str, Any]) -> list[str]:
             f"the other reading of the paper {lost['reading']:.0%}",
             f"1 deg less friction angle {lost['friction_angle']:.0%}",
             f"5 % more speed {lost['speed']:.0%}",
-            f"another law of the soil without friction: {laws}",
+            f"another soil model without friction: {laws}",
         )
     )
     lines += _indent(f"of its {firmness['passes']:,} passes fail by {shares}", "       ")

@@ -54,9 +54,8 @@ def start_light() -> None:
     NumPy's linear algebra starts a thread for each core, and the systems solved here have a few unknowns; a number of
     threads that the user has set stands. Imports make hundreds of thousands of objects that stay until the end. By
     default Python searches them for unused ones hundreds of times, and thrice more at the end, where the system takes
-    all back. The arrays of one block are as large as those of the next. By default each thread and Arrow have a heap of
-    their own, and the system gets freed arrays back and clears them anew: more memory by a fifth, and twice the page
-    faults.
+    all back. Each block has arrays as large as the next. By default each thread and Arrow have a heap of their own, and
+    the system gets freed arrays back and clears them anew: more memory by a fifth, and twice the page faults.
     """
     os.environ.setdefault(THREADS_OF_OPENBLAS, "1")
     os.environ.setdefault(ALLOCATOR_OF_ARROW, "system")
@@ -73,7 +72,7 @@ GROUPS = {
     "Share": (plot, report, export),
     "Model": (tradeoff, validate, fit_vehicle, doctor),
 }
-"""As in ``sweep --help``: what answers a question, what makes and reads tables, what goes to others, what is behind."""
+"""Commands in the order of ``sweep --help``: questions, tables, what others receive, the model itself."""
 COMMANDS = tuple(command for group in GROUPS.values() for command in group)
 COMPLETION = "_SWEEP_COMPLETE"
 """Set by the completion of a shell."""
@@ -125,7 +124,7 @@ def cli() -> None:
     """Find out which boulder, buried how deep in which soil, stops a truck.
 
     A file describes boulders, soils and a vehicle as ranges of values. `sweep run` simulates every
-    combination and writes one table with a verdict for each.
+    design and writes one table with a verdict for each.
     """
 
 
@@ -161,7 +160,7 @@ def execute(arguments: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     arguments : sequence of str, optional
-        Words behind ``sweep``; those of this process by default.
+        Words behind ``sweep``; by default what this process was called with.
 
     Returns
     -------
@@ -230,7 +229,7 @@ def _usage_text(error: click.ClickException) -> str:
 
 
 def _invoke(words: list[str]) -> int:
-    """Run a command."""
+    """Run a command, and return its exit code."""
     # Not cli.main(): it would replace an interruption by an exception without the signal and the message.
     with cli.make_context("sweep", words) as context:
         return int(cli.invoke(context))

@@ -84,8 +84,8 @@ margin_option = click.option("--margin", default="0", metavar="SHARE", help="Lea
 second_opinion_option = click.option(
     "--second-opinion/--no-second-opinion",
     default=None,
-    help="Simulate every pass again with friction, vertical motion and weaker laws: robust or sensitive? [as in the "
-    "file, where nothing is said: yes]",
+    help="Simulate every pass again with friction, vertical motion and a weaker soil model: robust or sensitive? [as "
+    "in the file, where nothing is said: yes]",
 )
 
 
@@ -167,7 +167,7 @@ def refuse_missing(sweep: Sweep, path: str, number: int) -> None:
 
 
 def refuse_units_of_json(units: str | None, as_json: bool) -> None:
-    """Refuse ``--json`` in US units, for commands whose objects are in those of the table."""
+    """Refuse ``--json`` in US units, for commands that print objects in the units of the table."""
     if as_json and units == "us":
         raise click.UsageError(f"--json is in SI units for this command; leave out --units {units} or --json")
 

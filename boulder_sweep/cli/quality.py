@@ -142,7 +142,7 @@ Examples:
 The first line of a --measured file names its columns, with units:
   time [ms], rotation [deg], boulder_displacement [mm],
   vehicle_displacement [m], vehicle_acceleration [g]
-The boulder's displacement is that of its own centre of mass.
+The boulder's displacement is measured at its own centre of mass.
 Displacements are positive in the direction in which the truck
 travels, the rotation while the boulder's top moves away from it.
 Empty cells are gaps in a track.

@@ -30,7 +30,7 @@ from boulder_sweep.errors import EXIT_SOME_ROWS_FAILED
 from boulder_sweep.locations import Location, location_of
 
 if TYPE_CHECKING:
-    from boulder_sweep.impact.recomputing import Recomputed
+    from boulder_sweep.impact.recomputing import Recomputation
     from boulder_sweep.impact.trajectory import Trajectory
     from boulder_sweep.settings import Sweep
     from boulder_sweep.settings.model import Model
@@ -166,7 +166,7 @@ def _is_result(case: Location) -> bool:
     return not isinstance(case, Path) or case.is_dir() or case.suffix.lower() in (".sweep", ".parquet")
 
 
-def _computed_again(folder: Location, number: int, quiet: bool) -> Recomputed:
+def _computed_again(folder: Location, number: int, quiet: bool) -> Recomputation:
     """Compute a row of a result again; one that it does not have, or does not say all of, is wrong use."""
     from boulder_sweep.impact.recomputing import recompute
 
@@ -177,14 +177,14 @@ def _computed_again(folder: Location, number: int, quiet: bool) -> Recomputed:
         raise click.UsageError(str(problem)) from None
 
 
-def _compared_lines(again: Recomputed) -> list[str]:
+def _compared_lines(again: Recomputation) -> list[str]:
     """Return how a row of a result comes out now."""
     lines = [
         f"differs now: {name} was {again.stored[name]!r}, comes out as {again.recomputed[name]!r}"
         for name in again.unequal
     ]
     lines += [f"changed since: {line}" for line in again.changed]
-    lines += [f"as stored, the row was {again.judged_by}"] if again.judged_by else []
+    lines += [f"as stored, the design was {again.judged_by}"] if again.judged_by else []
     return lines if again.unequal else [*lines, "computed again: the same to the last bit"]
 
 

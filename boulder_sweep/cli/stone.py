@@ -1,4 +1,4 @@
-"""``sweep stone``: what the scan of a stone says of it."""
+"""``sweep stone``: volume, mass, foot and profile of a scanned boulder."""
 
 from __future__ import annotations
 
@@ -46,19 +46,19 @@ Examples:
 """
 
 
-@click.command("stone", short_help="Volume, mass, foot and profile of a scanned stone.", epilog=EXAMPLES)
+@click.command("stone", short_help="Volume, mass, foot and profile of a scanned boulder.", epilog=EXAMPLES)
 @click.argument("rock", type=click.Path())
 @click.argument("site", type=click.Path(), required=False)
 @click.option(
     "--mass",
     type=Quantity("kg"),
     metavar="'18.2 t'",
-    help=f"Mass of the whole stone [default: rock of {ROCK_KG_M3:g} kg/m³].",
+    help=f"Mass of the whole boulder [default: rock of {ROCK_KG_M3:g} kg/m³].",
 )
 @click.option("--unit", default="m", metavar="UNIT", help="Unit of the scan: m, mm, cm, in or ft [m].")
 @click.option("--up", metavar="END", help="End that is up, for a block of settings: a, -a, b, -b, c, -c, x, ...")
 @click.option("--facing", metavar="END", help="End that faces the vehicle, with --up.")
-@click.option("--plot", type=OUTPUT, metavar="F.png", help="Draw the stone with each end up; with SITE the best ways.")
+@click.option("--plot", type=OUTPUT, metavar="F.png", help="Draw it with each end up; with SITE the best ways.")
 @margin_option
 @at_option
 @set_option
@@ -78,21 +78,21 @@ def stone(
     quiet: bool,
     as_json: bool,
 ) -> int:
-    """Weigh and measure ROCK, a scan of a stone (.ply, .stl, .obj or .glb).
+    """Weigh and measure ROCK, a scan of a boulder (.ply, .stl, .obj or .glb).
 
     The scan is closed where it is open. Every way to stand gets a flat foot by the least cut, and a profile: width
-    and distances of the near and the far face over the height. The ends a, b and c are those of the long, the middle
-    and the short axis of the stone, a the slimmer end and -a the other; x, y and z are the axes of the scan.
+    and distances of the near and the far face over the height. The ends a, b and c belong to the long, the middle and
+    the short axis of the boulder, a the slimmer end and -a the other; x, y and z are the axes of the scan.
 
-    With SITE, a settings file, the stone takes the place of its boulder, and for each of the 24 ways to stand the depth
-    is found from which on it passes in all soils and before all vehicles of the file.
+    With SITE, a settings file, the scan takes the place of its boulder. For each of the 24 ways to stand, the command
+    finds the depth from which on it passes in all soils and before all vehicles of the file.
     """
     if (up is None) != (facing is None):
         raise click.UsageError("--up and --facing belong together; give both")
     if site is None and (overrides or at is not None or margin != "0"):
         raise click.UsageError("--set, --at and --margin belong to a SITE")
     if site is not None and mass is None:
-        raise click.UsageError("at a site the stone must be weighed: give --mass")
+        raise click.UsageError("at a site the boulder must be weighed: give --mass")
     mass_kg = None if mass is None else quantity_of("--mass", mass, "kg")
     metres = quantity_of("--unit", f"1 {unit}", "m")
     if plot is not None:
@@ -144,7 +144,7 @@ def _find_placing(
         return sweep
 
     if not any(standing.has_foot for standing in standings or scan.standings):
-        raise click.UsageError("no way to stand has a flat foot; bed the stone in concrete")
+        raise click.UsageError("no way to stand has a flat foot; bed the boulder in concrete")
     with working(quiet, "placing", "ways") as progress:
         return placed(scan, with_boulder, standings, margin=margin, progress=progress)
 
@@ -185,7 +185,7 @@ def placing_lines(result: Placing, rock: str, unit: str, site: str) -> list[str]
     return [
         f"at {site}, depth from which on it passes{cases}:",
         *_table(columns, passing),
-        "up, facing: the end of the stone that is up, and the one that faces the vehicle",
+        "up, facing: the end that is up, and the one that faces the vehicle",
         "above: height over the ground; mass: of what is left after the cut",
         *(words for kind, words in SIGNS.items() if kind in kinds),
         *rest,
@@ -208,7 +208,7 @@ def _beside(rock: str, site: str) -> str:
 
 
 def stone_lines(scan: ScannedStone) -> list[str]:
-    """Return what the stone is."""
+    """Return volume, mass, sides and inertia of a scan as lines."""
     shape = scan.stone
     density = f"{scan.density_kg_m3:,.0f} kg/m³"
     mass = {
@@ -281,9 +281,9 @@ def foot_text(standing: Standing) -> str:
 def _legend(scan: ScannedStone) -> list[str]:
     """Return what the columns mean, as far as they say something."""
     lines = [
-        "up, facing: the end of the stone that is up, and the one that faces the vehicle",
+        "up, facing: the end that is up, and the one that faces the vehicle",
         "cut: cut off below, for a flat foot under the centre of mass",
-        "rests: section of the uncut stone just above the ground over its largest one",
+        "rests: section of the uncut boulder just above the ground over its largest one",
         "fit: error of the profile, root mean square over the volume",
     ]
     if any(not standing.has_foot for standing in scan.standings):

@@ -66,8 +66,8 @@ _BY_TEST = {
 }
 HORIZON_S = 0.5
 STEP_S = 0.0005
-"""Simulated time, as long as the paper's figures, and a step far finer than any figure shows [s]: short enough that of
-soil elements the number shows, not the steps, down to some 1e-8 deg."""
+"""Simulated time, as long as the paper's figures, and a step far finer than any figure shows [s]: the number of soil
+elements then decides the result, not the step, down to some 1e-8 deg."""
 
 
 def crash_test(name: str) -> Sweep:

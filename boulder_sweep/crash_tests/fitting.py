@@ -53,7 +53,7 @@ class SignalMisfit(NamedTuple):
     rms: float
     """Root mean square of the residuals, in the unit of the signal."""
     share: float
-    """The same as a share of its range."""
+    """Root mean square of the residuals as a share of the range of the signal."""
 
 
 @dataclass(frozen=True, eq=False)

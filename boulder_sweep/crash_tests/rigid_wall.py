@@ -82,7 +82,7 @@ class RigidWall:
 
     @property
     def max_displacement_m(self) -> float:
-        """Largest displacement [m]."""
+        """Largest displacement of the truck [m]."""
         if self.over_damped:  # v and v' both end at 0
             return self.mass_kg * self.speed_m_s / self.damper_N_s_m
         return float(self.displacement(np.array([self.max_displacement_time_s]))[0])

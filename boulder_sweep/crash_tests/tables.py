@@ -27,7 +27,7 @@ class Table:
     rows: list[tuple[str, ...]] = field(default_factory=list)
 
     def add(self, *cells: str) -> None:
-        """Add a line."""
+        """Add a line of cells, one for each column of the head."""
         if len(cells) != len(self.head):
             raise ValueError(f"{len(cells)} cells for {len(self.head)} columns")
         self.rows.append(cells)

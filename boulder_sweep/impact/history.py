@@ -48,7 +48,7 @@ class Motion:
     control: Control
     record: Record
     outcome: Outcome
-    """Of the whole motion that was recorded, beyond the limit."""
+    """Outcome of the whole recorded motion, beyond the limit."""
 
     given_outline: np.ndarray = field(default_factory=lambda: BOX)
     """Outline of the boulder, shape (P, 4), see `boulder_kernels.outline`; P = 0 of a box."""

@@ -33,11 +33,11 @@ from boulder_sweep.store.reading import FinishedRows
 if TYPE_CHECKING:
     from boulder_sweep.impact.trajectory import Trajectory
 
-__all__ = ["Recomputed", "recompute"]
+__all__ = ["Recomputation", "recompute"]
 
 
 @dataclass(frozen=True, eq=False)
-class Recomputed:
+class Recomputation:
     """A row of a result, and what it is now.
 
     Attributes
@@ -87,7 +87,7 @@ class Recomputed:
         }
 
 
-def recompute(out: str | Location, design_id: int) -> Recomputed:
+def recompute(out: str | Location, design_id: int) -> Recomputation:
     """Compute one row of a result again, from the result alone.
 
     Parameters
@@ -99,7 +99,7 @@ def recompute(out: str | Location, design_id: int) -> Recomputed:
 
     Returns
     -------
-    Recomputed
+    Recomputation
         The row as stored and as recomputed, and its time history.
 
     Raises
@@ -129,7 +129,7 @@ def recompute(out: str | Location, design_id: int) -> Recomputed:
     evaluation = Evaluation(readings, control, limits, model=sweep.model, second_opinion=laws, outlines_in_lanes=many)
     cases = evaluation.by_case(block)
     again = part_table(block, worst_of(cases), {}).to_pylist()[0]
-    return Recomputed(
+    return Recomputation(
         design_id=design_id,
         designs=finished.rows,
         sweep=sweep,

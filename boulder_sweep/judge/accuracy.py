@@ -36,8 +36,8 @@ class Steps(NamedTuple):
 STEPS = {"fast": Steps(0.012), "balanced": Steps(0.012), "fine": Steps(0.006, locate_yield=True)}
 """Steps of each named accuracy: but for ``fast``, three times the steps of the solution that is reported."""
 STEPS_PRINTED = {"fast": Steps(0.006), "balanced": Steps(0.006), "fine": Steps(0.003, locate_yield=True)}
-"""The same where the restoring moment is read as printed: it jumps where the angular velocity passes zero, and a
-design close to that jump needs shorter steps to end on the right side of it."""
+"""Steps of each named accuracy for the restoring moment as printed: it jumps where the angular velocity passes zero,
+and a design close to that jump needs shorter steps to end on the right side of it."""
 LADDER = (
     *(Steps(0.018), Steps(0.012)),
     *(Steps(1e-3 * step, locate_yield=True) for step in (12, 9, 6, 4.5, 3, 2.25, 1.5, 1.125)),
@@ -55,7 +55,7 @@ this factor. With this one alone late rows take twice as long, and no verdict of
 LAST_RESORT_STEPS = 2_000
 """Steps to the horizon of the last attempt, where nothing asks for shorter ones."""
 MOST_STEPS = 20_000
-"""It ends with at least so many steps to the horizon, with the soil in closed form; fewer with many soil elements."""
+"""Steps to the horizon at which shortening ends, with the soil in closed form; fewer with many soil elements."""
 LONGEST_HORIZON = 10.0
 """A design without proof of its verdict at the horizon is simulated for up to this many horizons."""
 DESIGNS = 4096

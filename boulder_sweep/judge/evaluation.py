@@ -295,7 +295,7 @@ PLAIN_DESIGN = DesignTable(
     c_v=np.array([1.4e5]),
     e_bumper=np.array([0.5]),
 )
-"""One usual design."""
+"""One usual design, in the units of the kernels."""
 
 
 def evaluation_of(sweep: Sweep, accuracy: Accuracy, simulate: Simulate = by_kernels) -> Evaluation:

@@ -65,7 +65,7 @@ class Designs(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Number of designs."""
+        """Number of designs in the block."""
         return len(self.bed_offset)
 
     def rows(self, chosen: np.ndarray | slice) -> Designs:

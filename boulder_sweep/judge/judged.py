@@ -44,12 +44,12 @@ class Judged:
 
     @property
     def verdict(self) -> np.ndarray:
-        """Codes of `VERDICTS`."""
+        """Codes of `VERDICTS`, shape (n,)."""
         return self.columns["verdict"]
 
     @property
     def reason(self) -> np.ndarray:
-        """Codes of `reasons`."""
+        """Codes of `reasons`, shape (n,)."""
         return self.columns["reason"]
 
     @property

@@ -1,6 +1,6 @@
 """Robust or sensitive: what a pass is worth when the model has another form.
 
-A second opinion is the same impact with friction and vertical motion, under a law of the soil that resists less
+A second opinion is the same impact with friction and vertical motion, under a soil model that resists less
 (`boulder_kernels.second_opinion`). A pass that stands under the weakest law, mostly `DECISIVE`, is *robust*, one that
 does not under a law that was asked *sensitive*. A pass that stands, but lies outside the ranges from which the study of
 the documentation draws, is *open*: nobody has looked at what second opinions are worth there. Where no second opinion
@@ -43,14 +43,14 @@ ROBUST, SENSITIVE, OPEN = range(len(GRADES))
 DECISIVE = "width_capped"
 """The law that decides: it resists least, but for slender boulders in dense soil, which are asked of others, too."""
 IN_WORDS = (
-    "stands with friction and vertical motion under the weakest of three laws; not tested: soil on one side only, "
-    "rounded stones"
+    "stands with friction and vertical motion under the weakest of three soil models; not tested: soil on one side "
+    "only, rounded boulders"
 )
-"""What ``robust`` means, in words,"""
+"""Explanation of the grade ``robust``."""
 SENSITIVE_IN_WORDS = (
     "a second opinion overturns it; no fail, but ask for a better soil test, a deeper bed or a crash test"
 )
-"""and ``sensitive``."""
+"""Explanation of the grade ``sensitive``."""
 MEANINGS = {
     "robust": IN_WORDS,
     "sensitive": SENSITIVE_IN_WORDS,
@@ -61,14 +61,14 @@ UNSTUDIED_IN_WORDS = (
     "stands under the second opinions that were asked, but outside the ranges of their study, as its flags say "
     f"({', '.join(UNSTUDIED)})"
 )
-"""And ``open``, where they were asked."""
+"""Explanation of the grade ``open`` where second opinions were asked."""
 GIVES_WAY = (
     "no second opinion: by the density and friction angle of the soil the ground under the foot cannot carry the "
     "boulder's own weight; ask for a better soil test, a deeper bed or a foundation"
 )
-"""And of a sensitive pass whose boulder would sink before the impact."""
+"""Explanation of a sensitive pass whose boulder would sink before the impact."""
 FREE_ROTATION_DEG = 8.0
-"""Largest rotation up to which a pass is robust without being asked,"""
+"""Rotation up to which a pass within `FREE` and `FREE_EMBEDMENT` is robust without a second opinion."""
 FREE = {
     "L": (1.0, 2.0),
     "W": (0.8, 2.5),
@@ -80,9 +80,9 @@ FREE = {
     "K_epsilon": (1.0, 1.2),
     **VEHICLE,
 }
-"""in these ranges of the inputs, where the study found none that is lost (SI, `boulder_kernels.DesignTable`),"""
+"""Ranges of the inputs in which the study lost no such pass (SI, `boulder_kernels.DesignTable`)."""
 FREE_EMBEDMENT = (0.5, 0.75)
-"""of embedment depth over height, and with a subgrade reaction that belongs to the friction angle."""
+"""Range of embedment depth over height; the subgrade reaction must belong to the friction angle, too."""
 FREE_LIMIT_DEG = 20.0
 """The limit of rotation that the study asks about; a higher one is no easier to stay below for a second opinion."""
 ROUNDING = 1e-9
@@ -91,13 +91,13 @@ QUICK_M = 5e-4
 """Error of a step of a second opinion [m]: of 6,800 random designs that turn about as far as the limit, none turned by
 0.6 deg too little. Shallow ones may err more, by shorter steps, too; `benchmarks.grades` holds their grades."""
 NEAR_DEG = 1.0
-"""Within this of the limit of rotation,"""
+"""Distance from the limit of rotation within which a second opinion is simulated again finely."""
 NEAR_M = 0.01
-"""or of the limit of penetration, a second opinion is simulated again finely."""
+"""Distance from the limit of penetration within which a second opinion is simulated again finely."""
 FINENESS, TOLERANCE_M = 2, 1e-6
-"""Fineness and error of a step of the fine solution (`boulder_kernels.second_opinion.HeaveControl`),"""
+"""Fineness and error of a step of the fine solution (`boulder_kernels.second_opinion.HeaveControl`)."""
 ERROR_DEG, ERROR_M = 0.05, 1e-3
-"""and its own largest error, and more, which is taken off the limits."""
+"""Bound on the largest error of the fine solution [deg, m]; it is taken off the limits."""
 AT_ONCE = 400
 """Designs simulated per call: an interruption waits for the current call."""
 
@@ -166,9 +166,9 @@ def stands(designs: Designs, law: str, present: str, limits: Any, longest_s: flo
     designs
         The designs, all of which the vehicle hits.
     law
-        Law of the soil's resistance of the second opinion, one of `SECOND_OPINIONS`.
+        Soil model of the second opinion, one of `SECOND_OPINIONS`.
     present
-        That of the designs.
+        Soil model of the designs.
     limits
         Limits of the criterion (`boulder_sweep.judge.verdict.Limits`).
     longest_s

@@ -18,7 +18,7 @@ import numpy as np
 from boulder_kernels.numerics import records_of
 from boulder_kernels.outcomes import empty_outcomes
 from boulder_kernels.rules import FLAGS as RAISED
-from boulder_kernels.rules import ISLAND_SLIDE, UNSTUDIED, FlagInputs, Tested, write_flags
+from boulder_kernels.rules import ISLAND_SLIDE, UNSTUDIED, FlagInputs, TestedRange, write_flags
 from boulder_sweep.investigation import FAMILY_FACTOR, family_bounds
 from boulder_sweep.judge.judged import CHANGES_SIDE
 from boulder_sweep.settings.fields import BY_NAME
@@ -76,12 +76,12 @@ VEHICLE = {
 }
 """Vehicles from which the study of second opinions draws, about the one that was tested, SI."""
 RATE = (math.sqrt(VEHICLE["k_v"][0] / VEHICLE["m_v"][1]), math.sqrt(VEHICLE["k_v"][1] / VEHICLE["m_v"][0]))
-"""Their angular frequency sqrt(k/m) [1/s],"""
+"""Angular frequency sqrt(k/m) of these vehicles [1/s]."""
 DAMPING = (
     VEHICLE["c_v"][0] / math.sqrt(VEHICLE["k_v"][1] * VEHICLE["m_v"][1]),
     VEHICLE["c_v"][1] / math.sqrt(VEHICLE["k_v"][0] * VEHICLE["m_v"][0]),
 )
-"""and their damper over sqrt(k m) [-]."""
+"""Damper of these vehicles over sqrt(k m) [-]."""
 NOWHERE = 1e9
 """A friction angle that no soil has [deg]."""
 _SIZES = [usual_range(f"boulder_{side}_m") for side in ("length", "width", "height")]
@@ -168,11 +168,11 @@ FLAGS = (
         CHANGES_SIDE,
         "a verdict that changes with the uncertain inputs",
         "another verdict with the uncertain inputs at their 5 %, at their mean or at their 95 % quantiles",
-        "The row has the worst of the verdicts. Shallow boulders may pass in weak soil, by sliding, and fail in better "
-        "soil. How likely a pass is, `sweep uncertainty` says.",
+        "The design has the worst of the verdicts. Shallow boulders may pass in weak soil, by sliding, and fail in "
+        "better soil. How likely a pass is, `sweep uncertainty` says.",
     ),
 )
-"""In the order of the kernels, and of the column."""
+"""The flags in the order of the kernels and of the column."""
 _UNSTUDIED = sum(1 << RAISED.index(name) for name in UNSTUDIED)
 """Bits of the flags of designs that the study of second opinions does not speak for."""
 BY_FLAG = {flag.name: flag for flag in FLAGS}
@@ -183,13 +183,13 @@ def largest_tested_rotation(preset: str) -> float:
     return math.radians(TESTED_ROTATION_DEG.get(preset, min(TESTED_ROTATION_DEG.values())))
 
 
-def tested_of(calibrated_crush: float, rotation: float, *, odd_layers: bool) -> Tested:
+def tested_of(calibrated_crush: float, rotation: float, *, odd_layers: bool) -> TestedRange:
     """Return what the model was tested on; arguments: see `boulder_sweep.judge.verdict.Limits`."""
     # No friction angle of the uppermost layer makes up for deeper ones.
     angle = (NOWHERE, NOWHERE) if odd_layers else _ANGLE
     vehicle = (_rounded(*VEHICLE["m_v"]), _rounded(*RATE), _rounded(*DAMPING), _rounded(*VEHICLE["v_0"]))
     ranges = (*_SIZES, _EMBEDMENT, _ROCK, *vehicle, angle, _SOIL, _RATE_FACTOR)
-    return Tested(calibrated_crush, rotation, TESTED_OVERLAP_M, *(end for low_high in ranges for end in low_high))
+    return TestedRange(calibrated_crush, rotation, TESTED_OVERLAP_M, *(end for low_high in ranges for end in low_high))
 
 
 def has_odd_layers(ground: Ground) -> bool:

@@ -74,7 +74,7 @@ class Limits(NamedTuple):
     """Limits of the criterion."""
 
     rotation: float
-    """Largest rotation [rad]."""
+    """Largest rotation that passes [rad]."""
     rating: str
     """Required penetration rating, one of `RATINGS`."""
     criterion: Criterion = Criterion()
@@ -99,7 +99,7 @@ class Limits(NamedTuple):
 
     @property
     def of_rules(self) -> VerdictLimits:
-        """Those that decide a verdict, as the kernels take them."""
+        """Limits that decide a verdict, as the kernels take them."""
         further = (getattr(self.criterion, name) for name in OF_CRITERION)
         return VerdictLimits(self.rotation, self.penetration, float(self.guarded), *further)
 
@@ -113,7 +113,7 @@ class Facts(NamedTuple):
     """Inputs of the same rows."""
     limits: Limits
     rows: dict[RowKind, np.ndarray]
-    """Masks, see `OutcomeColumn`."""
+    """Masks of the rows of each kind; `OutcomeColumn` explains the kinds."""
     overlap: np.ndarray
     """Height of the top of the boulder over the underside of the bumper [m]."""
     penetration: np.ndarray
@@ -168,7 +168,7 @@ def judge(
 
 
 UNCONFIRMED = np.zeros((1, len(Control._fields)))
-"""Of a single solution: a control as `consider_rows` takes it that confirms nothing."""
+"""Control of a single solution for `consider_rows`, which confirms nothing."""
 
 
 def rows_of(designs: Designs, limits: Limits) -> Rows:

@@ -19,7 +19,7 @@ from boulder_sweep.answers.recommendation import PREFERENCES, RANKS, Design, Nea
 from boulder_sweep.columns import BOULDER_MASS, GRADES
 from boulder_sweep.judge.quantities import EXCAVATED, NEEDED, quantities_by
 from boulder_sweep.judge.robustness import IN_WORDS, MEANINGS, SENSITIVE_IN_WORDS
-from boulder_sweep.report.asked import Named, Sentence, listed, need_sentences, share, verb
+from boulder_sweep.report.asked import NamedDesign, Sentence, listed, need_sentences, share, verb
 from boulder_sweep.report.rows import CONDITIONS, DEPTH, NOT_YET, ResultRows, condition_of, inputs_of
 from boulder_sweep.text import counted
 from boulder_sweep.views.wording import REASON_WORDS
@@ -50,11 +50,11 @@ class Answer:
     need: Need
     row: dict[str, Any]
     sentences: tuple[Sentence, ...]
-    named: Named
+    named: NamedDesign
 
 
 def answer_of(rows: ResultRows) -> Answer:
-    """Describe a result."""
+    """Describe a result in sentences, with the design worth naming."""
     passing = rows.having("pass")
     n = int(passing.sum())
     need = rows.need or _as_need(rows, passing)
@@ -62,7 +62,7 @@ def answer_of(rows: ResultRows) -> Answer:
     near = None if found is None or found.nearest is None else found.nearest.design or found.nearest.rows
     shown = near if found is None or found.design is None else found.design
     if rows.need is None:
-        sentences, named = _counts(rows, n), Named("Design 0", 0)
+        sentences, named = _counts(rows, n), NamedDesign("Design 0", 0)
     else:
         sentences, named = need_sentences(rows, need)
         if len(rows.codes) > 1 and n and need.probability is None:
@@ -71,7 +71,7 @@ def answer_of(rows: ResultRows) -> Answer:
         return Answer(need, rows.row(named.number), tuple(sentences), named)
     row = worst_of(shown.rows if isinstance(shown, Design) else shown)
     title = NEAREST if shown is near else RECOMMENDED
-    return Answer(need, row, tuple(sentences), Named(title, _number_of(rows, need, row)))
+    return Answer(need, row, tuple(sentences), NamedDesign(title, _number_of(rows, need, row)))
 
 
 def worst_of(rows: list[dict[str, Any]]) -> dict[str, Any]:
@@ -172,7 +172,7 @@ class _Designs:
         return None
 
     def recommended(self) -> Recommendation:
-        """Return the recommendation."""
+        """Return the recommendation of the whole result."""
         asked, rows = self.asked, self.rows
         enough = self.has >= (asked.least_margin if asked.probability is None else asked.probability)
         held = rows.over(enough & (self.passing | (asked.probability is not None)), self.kinds, np.minimum)

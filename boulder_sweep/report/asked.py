@@ -42,12 +42,12 @@ Sentence = tuple[str | Measure, ...]
 
 
 @dataclass(frozen=True)
-class Named:
+class NamedDesign:
     """A design worth naming."""
 
     title: str
     number: int
-    """Its row."""
+    """Row of the design in the result."""
 
 
 def verb(count: int, many: str, one: str) -> str:
@@ -80,7 +80,7 @@ def key_words(need: Need) -> str:
     return f"{'largest' if need.key.most else 'least'} {name}"
 
 
-def need_sentences(rows: ResultRows, need: Need) -> tuple[list[Sentence], Named]:
+def need_sentences(rows: ResultRows, need: Need) -> tuple[list[Sentence], NamedDesign]:
     """Return how many rows have an answer, why others have none, and first, where nothing is recommended, the worst."""
     answers = need.arrow[need.key.answer].to_numpy()
     n, total = int((~np.isnan(answers)).sum()), len(answers)
@@ -93,13 +93,13 @@ def need_sentences(rows: ResultRows, need: Need) -> tuple[list[Sentence], Named]
             who = f"{counted(count, 'combination')}" if total > 1 else "The boulder"
             sentences.append((f"{who} {verb(count, 'do', 'does')} {NOTHING[word]}.",))
     if not n or need.recommendation is not None:
-        return sentences, Named("The last value tried", 0)
+        return sentences, NamedDesign("The last value tried", 0)
     number = int(np.nanargmin(answers if need.key.most else -answers))
     where, row = f" in the worst of {n:,} combinations" if n > 1 else "", rows.row(number)
     held = f"P(pass) = {row['p_pass']:.1%}" if "p_pass" in row else f"margin {row['margin']:.1%}"
     lead = f"The {key_words(need)} that passes{where}: "
     worst = (lead, Measure(float(answers[number]), need.key.field.unit), f" (design {number:,}, {held}).")
-    return [worst, *sentences], Named("The answer that is worst", number)
+    return [worst, *sentences], NamedDesign("The answer that is worst", number)
 
 
 def answers_table(rows: ResultRows) -> AnswerTable | None:

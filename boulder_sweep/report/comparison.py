@@ -194,7 +194,7 @@ def _whole_identity(result: FinishedRows | AnswerFile) -> dict[str, Any]:
     return result.identity | ({"question": result.question} if isinstance(result, AnswerFile) else {})
 
 
-class Asked(NamedTuple):
+class Query(NamedTuple):
     """What a result answers: the command, the columns of its answers with their units, the inputs searched for."""
 
     command: str
@@ -202,17 +202,17 @@ class Asked(NamedTuple):
     searched: tuple[str, ...]
 
 
-def _asked(result: FinishedRows | AnswerFile) -> Asked:
+def _asked(result: FinishedRows | AnswerFile) -> Query:
     """Return what a result answers."""
     if not isinstance(result, AnswerFile):
-        return Asked(RUN, {}, ())
+        return Query(RUN, {}, ())
     if result.kind == NEED:
         need = result.answers()
         assert isinstance(need, Need)
-        return Asked(NEED, {need.key.answer: need.key.field.unit}, (need.key.name, *need.derived))
+        return Query(NEED, {need.key.answer: need.key.field.unit}, (need.key.name, *need.derived))
     names = MARKS[result.kind][: 1 if result.kind == UNCERTAINTY else None]
     units = {name: (result.table.schema.field(name).metadata or {}).get(b"unit", b"") for name in names}
-    return Asked(result.kind, {name: unit.decode() for name, unit in units.items()}, ())
+    return Query(result.kind, {name: unit.decode() for name, unit in units.items()}, ())
 
 
 def _table(location: Location, result: FinishedRows | AnswerFile, answers: Iterable[str]) -> pd.DataFrame:
@@ -256,7 +256,7 @@ def _values_in_order(tables: Sequence[pd.DataFrame], differ: Sequence[str]) -> b
 def _apart(tables: Sequence[pd.DataFrame], differ: Sequence[str]) -> str:
     """Say why two results have no design in common, and what helps."""
     if not differ:
-        return ": every single value occurs in both, but no combination does"
+        return ": every single value occurs in both, but no design does"
     reasons = []
     for name in differ:
         unit = f" {unit_of(name)}".rstrip()

@@ -1,4 +1,4 @@
-"""Data for the script of the page: plain data whose words and numbers all come from the registers of the package."""
+"""Data that the script of the page reads: plain values, whose words and numbers come from the package's registers."""
 
 from __future__ import annotations
 
@@ -68,16 +68,16 @@ TAPED = (
 )
 """Why the page simulates no boulder as taped and weighed; the last of its refusals."""
 FIXED_SIDES = ["boulder_length_m", "boulder_width_m", "boulder_height_m"]
-"""Sides that the reader cannot change where the boulder is a stone with a profile of its own."""
+"""Sides that the reader cannot change where the boulder has a profile of its own."""
 OF_THE_PAGE = {"L": "reach_m", "bed_offset": "bed_offset_m"}
 """Where the page has its own names for what the verdict takes: a boulder reaches from where it is struck."""
 MOST_CELLS = 1_500_000
 """Most designs of a grid whose verdicts go into the page; of larger grids, some values of the longest axes are left
 out."""
 MOST_POINTS = 20_000
-"""The same for a list of designs, each of which carries its inputs."""
+"""Most designs of a list that go into the page; each carries its own inputs."""
 OF_FLAGS = {"rock": "boulder_density_kg_m3", "phi_deg": "friction_angle_deg"}
-"""The same for what the flags take."""
+"""Columns of what the flags take under names of their own."""
 ANGLES = np.arange(20.0, 61.0)
 """Friction angles [deg] at which the page knows which soil constants belong together."""
 
@@ -145,7 +145,7 @@ def page_data(
 
 
 @dataclass(frozen=True, eq=False)
-class Thinned:
+class Selection:
     """The part of a grid or list that goes into the page.
 
     Attributes
@@ -160,13 +160,13 @@ class Thinned:
     words: str
 
 
-def thinned(rows: ResultRows, most_cells: int = MOST_CELLS, most_points: int = MOST_POINTS) -> Thinned:
+def thinned(rows: ResultRows, most_cells: int = MOST_CELLS, most_points: int = MOST_POINTS) -> Selection:
     """Choose the rows that go into the page: all, or values spread evenly along the longest axes."""
     if not rows.axes:
         computed = np.flatnonzero(~rows.having(NOT_YET))  # the inputs of the others are in no file yet
         n, kept = len(computed), min(len(computed), most_points)
         words = f"{kept:,} of the {n:,} designs of the list, spread evenly" if kept < n else ""
-        return Thinned((computed[np.round(np.linspace(0, n - 1, kept)).astype(np.int64)],), words)
+        return Selection((computed[np.round(np.linspace(0, n - 1, kept)).astype(np.int64)],), words)
     lengths = list(rows.shape)
     while np.prod(lengths, dtype=float) > most_cells:
         longest = int(np.argmax(lengths))
@@ -180,10 +180,10 @@ def thinned(rows: ResultRows, most_cells: int = MOST_CELLS, most_points: int = M
         for name, whole, kept in zip(rows.axes, rows.shape, lengths, strict=True)
         if kept < whole
     ]
-    return Thinned(indices, f"{', '.join(left)}, spread evenly" if left else "")
+    return Selection(indices, f"{', '.join(left)}, spread evenly" if left else "")
 
 
-def table_data(rows: ResultRows, kept: Thinned) -> dict[str, Any]:
+def table_data(rows: ResultRows, kept: Selection) -> dict[str, Any]:
     """Return the data of the map: codes of the designs kept, values along the axes or of the list."""
     codes = rows.codes.reshape(rows.shape)[np.ix_(*kept.indices)].ravel()
     if rows.axes:
@@ -220,7 +220,7 @@ def map_of(rows: ResultRows) -> dict[str, Any]:
     return {"first": [*others, *asked][:2], "asked": "".join(asked)}
 
 
-def held_at(rows: ResultRows, kept: Thinned, number: int) -> dict[str, int]:
+def held_at(rows: ResultRows, kept: Selection, number: int) -> dict[str, int]:
     """Return the index of a design along each axis of the map; the nearest one kept where its own is left out."""
     if not rows.axes:
         return {}

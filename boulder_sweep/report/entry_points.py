@@ -1,7 +1,7 @@
-"""What the page calls: the kernels behind two functions over pointers to doubles.
+"""The two functions that the page calls in its compiled kernels; their arguments are pointers to doubles.
 
-`rows` does the work of ``sweep run``, one design after another instead of in lanes, and `history` the work of
-``sweep simulate``.
+`rows` judges designs as ``sweep run`` does, one after another instead of in lanes. `history` records one impact as
+``sweep simulate`` does.
 """
 
 from __future__ import annotations
@@ -165,7 +165,7 @@ def simulate_in_soil(
     return simulate_recorded(SoilProfile(layers, outline, soil), design, readings, control, record, out, centre)
 
 
-class Given(NamedTuple):
+class DesignsInSoil(NamedTuple):
     """Designs, their layers and outlines, and room for the soil of one design."""
 
     designs: np.ndarray
@@ -175,7 +175,7 @@ class Given(NamedTuple):
 
 
 @kernel
-def solve(out: np.ndarray, row: int, given: Given, readings: Readings, control: Control) -> int:
+def solve(out: np.ndarray, row: int, given: DesignsInSoil, readings: Readings, control: Control) -> int:
     """Simulate one design, write its outcome with the error of its steps, and return which second one it needs."""
     design, soil_at = design_in(given.designs, row), given.soil_at
     nothing, nowhere = carray(soil_at, (HISTORY_COUNT, 0)), carray(soil_at, (0,))
@@ -191,7 +191,7 @@ def solve(out: np.ndarray, row: int, given: Given, readings: Readings, control: 
 
 @kernel
 def solve_with_error(
-    out: np.ndarray, other: np.ndarray, row: int, given: Given, readings: Readings, control: Control
+    out: np.ndarray, other: np.ndarray, row: int, given: DesignsInSoil, readings: Readings, control: Control
 ) -> None:
     """Simulate one design as `boulder_kernels.table.simulate_table` does; `other` has room for a second solution."""
     second = solve(out, row, given, readings, control_for(NONE_NEEDED, control))
@@ -205,7 +205,9 @@ def solve_with_error(
 
 
 @kernel
-def decide(rows: Rows, room: np.ndarray, row: int, given: Given, settings: np.ndarray, limits: VerdictLimits) -> None:
+def decide(
+    rows: Rows, room: np.ndarray, row: int, given: DesignsInSoil, settings: np.ndarray, limits: VerdictLimits
+) -> None:
     """Simulate one design until it is decided; `room` has room for two solutions, shape (2, len(OUTCOME), n)."""
     number, controls = 0, settings[:, READINGS_COUNT:]
     while number < len(settings):
@@ -281,7 +283,7 @@ def rows(
     )
     layers, outlines = carray(layers_at, (n, m, 6)), carray(outlines_at, (n, points, 4))
     put_soils(designs, ground_at, below_at, deeper, carray(profile_at, (points, 4)), layers, outlines)
-    given, room = Given(designs, layers, outlines, soil_at), carray(room_at, (3, OUTCOME_COUNT, n))
+    given, room = DesignsInSoil(designs, layers, outlines, soil_at), carray(room_at, (3, OUTCOME_COUNT, n))
     courses, flags = carray(courses_at, (2, n)), carray(flags_at, (n,))
     own = Rows(carray(outcomes_at, (OUTCOME_COUNT, n)), courses[0], sizes)
     slower = Rows(room[2], courses[1], sizes)

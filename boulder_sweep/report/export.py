@@ -16,7 +16,14 @@ from boulder_sweep.columns import BOULDER_MASS, BY_NAME
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.quantities import NEEDED, QUANTITIES, quantities_by
 from boulder_sweep.locations import Location, location_of, replacing
-from boulder_sweep.settings.shown_units import Shown, check_system, in_unit, shown_as, shown_column, shown_settings
+from boulder_sweep.settings.shown_units import (
+    ShownColumn,
+    check_system,
+    in_unit,
+    shown_as,
+    shown_column,
+    shown_settings,
+)
 from boulder_sweep.settings.sweep import units_in
 from boulder_sweep.store.folder import check_target
 from boulder_sweep.store.reading import FinishedRows
@@ -87,7 +94,7 @@ def export(out: str | Location, file: str | Path, *, units: str | None = None) -
         raise ReportError(f"{file} cannot be written: {why(problem)}") from problem
 
 
-def about(finished: Exportable, columns: Iterable[Shown], units: str = "si") -> Iterator[tuple[str, str, str]]:
+def about(finished: Exportable, columns: Iterable[ShownColumn], units: str = "si") -> Iterator[tuple[str, str, str]]:
     """Yield what a reader must know about a table, three texts for each line; settings in ``si`` or ``us`` units."""
     identity: Mapping[str, Any] = finished.identity
     answers = finished.answers() if isinstance(finished, AnswerFile) and finished.kind == NEED else None
@@ -127,7 +134,7 @@ def setting_lines(settings: Mapping[str, Any], indent: str = "") -> list[str]:
     return lines
 
 
-def _tables(finished: Exportable, units: str) -> Iterator[tuple[list[Shown], pa.Table]]:
+def _tables(finished: Exportable, units: str) -> Iterator[tuple[list[ShownColumn], pa.Table]]:
     """Yield the rows piece by piece in the requested units."""
     import pyarrow as pa
 
@@ -152,7 +159,7 @@ def _tables(finished: Exportable, units: str) -> Iterator[tuple[list[Shown], pa.
 
 
 def _without_tried(table: pa.Table, answers: Need) -> pa.Table:
-    """Return answers without the values tried last in rows that have no answer, and what came of these."""
+    """Return answers without the values tried last in rows that have no answer, and the outcome at these."""
     import pyarrow.compute as pc
 
     names, key = table.column_names, answers.key.name
@@ -180,7 +187,7 @@ def _with_quantities(table: pa.Table, settings: Mapping[str, Any]) -> pa.Table:
     return table
 
 
-def _shown(field: pa.Field, units: str) -> Shown:
+def _shown(field: pa.Field, units: str) -> ShownColumn:
     """Return how a column is shown, by the register of columns or, of an answer, by its own metadata.
 
     Intervals are texts and stay in their unit. A mass is as weighed, or follows from the density.
@@ -255,7 +262,7 @@ def _sheet(target: BinaryIO, finished: Exportable, units: str) -> int:
     except ImportError as lacking:
         raise ReportError(f"spreadsheets need openpyxl: {install('report')}") from lacking
 
-    rows, columns, book = 0, list[Shown](), Workbook(write_only=True)
+    rows, columns, book = 0, list[ShownColumn](), Workbook(write_only=True)
     designs = book.create_sheet("designs")
     designs.freeze_panes = "B2"
     for columns, table in _tables(finished, units):

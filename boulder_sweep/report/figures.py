@@ -189,7 +189,7 @@ class Sketch(NamedTuple):
     """What the template draws; lengths in metres, y upwards from the ground, x from the struck face."""
 
     corners: tuple[tuple[float, float], ...]
-    """Of the boulder, from the near one of its foot around."""
+    """Corners of the boulder, beginning with the near one of its foot."""
     at_water: float
     """Where the far face is at the water table; at the foot or the top where it lies beyond them."""
     bumper: float
@@ -197,9 +197,9 @@ class Sketch(NamedTuple):
     roof: float
     left: float
     ground: float
-    """Where the ground of the elevation ends, and the plan begins,"""
+    """Where the ground of the elevation ends and the plan begins."""
     right: float
-    """and where that ends."""
+    """Where the ground of the plan ends."""
     top: float
     bottom: float
     dimensions: tuple[Dimension, ...]

@@ -40,7 +40,7 @@ class LogChart(NamedTuple):
     quantity: str
     readings: tuple[Reading, ...]
     layers: tuple[tuple[float, float], ...]
-    """Their boundaries."""
+    """Upper and lower boundary of each layer."""
     foot: float | None
     labels: tuple[Label, ...]
     depths: tuple[float, ...]

@@ -12,7 +12,7 @@ from boulder_kernels._jit import inlined
 from boulder_kernels.ground import Ground
 from boulder_kernels.numerics import record_type
 from boulder_kernels.pieces import Piece, SoilElements, SoilSums
-from boulder_kernels.rules import Course, FlagInputs, Sizes, Tested, VerdictLimits
+from boulder_kernels.rules import Course, FlagInputs, Sizes, TestedRange, VerdictLimits
 
 DESIGN = Design._fields
 """Inputs of a design, in this order; SI, phi in rad, beta in MN/m^3."""
@@ -29,7 +29,7 @@ OUTCOME_COUNT = len(OUTCOME)
 SIZES, FLAG_INPUTS, COURSE = map(record_type, (Sizes, FlagInputs, Course))
 """Records of a design: inputs of the rules, and of the flags, SI but for the friction angle of the flags in degrees;
 and what the rules make of it."""
-LIMITS = np.dtype((np.record, [("criterion", record_type(VerdictLimits)), ("tested", record_type(Tested))]))
+LIMITS = np.dtype((np.record, [("criterion", record_type(VerdictLimits)), ("tested", record_type(TestedRange))]))
 """Limits of the criterion, and what the model was tested on; rad, m, kg/m^3."""
 HISTORY = (
     *("x_b", "v_b", "theta_b", "omega_b", "x_v", "v_v"),

@@ -39,14 +39,14 @@ VEHICLE = {
     "bed_offset_m": "bumper to cargo bed",
 }
 OPEN_IN_WORDS = "no study says what a second opinion is worth here; the design is judged by its margin alone"
-"""What a design without a grade is."""
+"""Note on a design without a grade."""
 NOT_ASKED = "not asked", "no second opinion was asked of the designs that were drawn at random"
-"""The same of a design with a probability,"""
+"""Grade and note of a design with a probability, whose draws have no second opinion."""
 DRAWN = (
     "a probability",
     "asked of every design that was drawn at random; the share of robust passes stands among the checks",
 )
-"""and of one that has a probability of a robust pass."""
+"""Grade and note of a design with a probability of a robust pass."""
 MOST_CASES = 40
 """Most cases of soil and vehicle that are listed."""
 Cell = str | Measure
@@ -69,7 +69,7 @@ class Sheet(NamedTuple):
     """What the first page shows."""
 
     words: dict[str, Words]
-    """By system of units."""
+    """Sentences by system of units."""
     qualifies: bool
     title: str
     sketch: Sketch
@@ -77,13 +77,13 @@ class Sheet(NamedTuple):
     """Name, computed, allowed, and how much of it is used."""
     build: tuple[tuple[str, Cell], ...]
     soil: tuple[tuple[str, Cell, str], ...]
-    """Name, value, source,"""
+    """Name, value and source of each input."""
     vehicle: tuple[tuple[str, Cell, str], ...]
-    """and the same."""
+    """Name, value and source of each input."""
     grade: tuple[str, str]
-    """Of the recommended design in all cases, and what it means."""
+    """Grade of the recommended design over all cases, and its meaning."""
     cases: AnswerTable | None
-    """It in every soil and before every vehicle."""
+    """The recommended design in every soil and before every vehicle."""
 
 
 def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:

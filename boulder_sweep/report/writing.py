@@ -21,7 +21,7 @@ from boulder_sweep.judge.accuracy import accuracy_of, control_of, readings_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import Location, location_of, replacing
 from boulder_sweep.report.answers import answer_of
-from boulder_sweep.report.asked import Named, answers_table
+from boulder_sweep.report.asked import NamedDesign, answers_table
 from boulder_sweep.report.build import kernel
 from boulder_sweep.report.rows import MOST_ELEMENTS, inputs_of, read_rows
 from boulder_sweep.report.sheet import sheet_of
@@ -126,7 +126,7 @@ def write_report(
         raise ReportError(f"{out} holds no finished designs yet")
     answer = answer_of(rows)
     try:
-        chosen = [_shown(Named(f"Design {number}", number), rows.row(number)) for number in designs]
+        chosen = [_shown(NamedDesign(f"Design {number}", number), rows.row(number)) for number in designs]
     except IndexError as missing:
         raise ReportError(str(missing)) from missing
     given = {k: value for k, value in answer.row.items() if k != BOULDER_MASS or k in rows.settings["inputs"]}
@@ -237,7 +237,7 @@ def _page_maker() -> Callable[..., str]:
     return assembled
 
 
-def _shown(one: Named, row: Mapping[str, Any]) -> dict[str, Any]:
+def _shown(one: NamedDesign, row: Mapping[str, Any]) -> dict[str, Any]:
     """Return a row as the page shows it."""
     return {"title": one.title, "number": one.number, "inputs": inputs_of(row)}
 
@@ -264,7 +264,7 @@ def _general_notes(settings: Mapping[str, Any], control: Control, units: str) ->
     ]
     if taken := [_taken(name, how, settings["inputs"], units) for name, how in settings.get("taken_at", {}).items()]:
         judged = (
-            "; every row of the table is judged at the means and at the other ends, too, and has the worst verdict, "
+            "; every design of the table is judged at the means and at the other ends, too, and has the worst verdict, "
             "while simulations in this page take the values shown"
         )
         notes.append(f"Uncertain inputs are taken at {', '.join(taken)}{judged if 'judged_at' in settings else ''}.")

@@ -57,7 +57,7 @@ def planned(sweep: Sweep, evaluation: Evaluation) -> Ranges:
     return ranges_of(sweep.n_designs, WORK_S / seconds_per_row(sweep, evaluation))
 
 
-class Written(NamedTuple):
+class PartReport(NamedTuple):
     """What a worker says of a part that it has written."""
 
     name: str
@@ -98,7 +98,7 @@ class Work:
     made_by: Fingerprint | None = None
     _failures: int = field(default=0, init=False)
 
-    def write(self, first: int, stop: int, tick: Callable[[int], None] = lambda rows: None) -> Written:
+    def write(self, first: int, stop: int, tick: Callable[[int], None] = lambda rows: None) -> PartReport:
         """Compute a range and write its part.
 
         Parameters
@@ -127,7 +127,7 @@ class Work:
             tick(end - start)
         content, verdicts = encoded_part(self.make_block(first, stop), joined(pieces), self.metadata)
         part = put_part(location_of(self.out), first, stop, content)
-        return Written(part.name, stop - first, len(content), verdicts)
+        return PartReport(part.name, stop - first, len(content), verdicts)
 
     def _blocks(self, first: int, stop: int) -> Iterator[tuple[int, int]]:
         count = -(-(stop - first) // self.rows_per_block)

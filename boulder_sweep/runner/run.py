@@ -45,13 +45,13 @@ from boulder_sweep.runner.progress import (
     time_and_disk,
     too_large,
 )
-from boulder_sweep.runner.ranges import BLOCK_S, StoppedError, Work, Written, planned, seconds_per_row
+from boulder_sweep.runner.ranges import BLOCK_S, PartReport, StoppedError, Work, planned, seconds_per_row
 from boulder_sweep.settings.sweep import SECTION
 from boulder_sweep.signals import Signals, noted_signals, undone
 from boulder_sweep.store import failures
 from boulder_sweep.store.folder import Ranges, check_writable, clear, locked, make, part_file, part_files, remove_parts
 from boulder_sweep.store.provenance import differences, file_metadata, identity
-from boulder_sweep.store.reading import Contents, Described, FinishedRows, Table, contents, refuse_two
+from boulder_sweep.store.reading import Contents, FinishedRows, PartSummary, Table, contents, refuse_two
 from boulder_sweep.text import why
 
 if TYPE_CHECKING:
@@ -184,7 +184,7 @@ def run(
         except (ClusterLostError, ComputationError, failures.WriteError) as problem:
             safe = safe_words(whole.rows_safe, sweep.n_designs)
             raise type(problem)(f"{problem}. {safe}. Resume with: {again}") from problem
-    parts: list[Described | Written] = [*plan.there.intact.values(), *whole.written]
+    parts: list[PartSummary | PartReport] = [*plan.there.intact.values(), *whole.written]
     reasons = sum((Counter(part.verdicts) for part in parts), Counter[str]())
     model = plan.identity["settings"]["model"]
     return Summary(
@@ -215,7 +215,7 @@ class _Run:
         Rows that are safe,
     is_counted : bool
         and whether rows of an earlier run are among them.
-    written : list of Written
+    written : list of PartReport
         Parts written by this run.
     jobs : int
         Workers.
@@ -224,7 +224,7 @@ class _Run:
     def __init__(
         self, out: Location, signals: Signals, rows: int, jobs: int, backend: str, scheduler: str | None
     ) -> None:
-        self.done, self.written, self.jobs, self.is_counted = 0, list[Written](), jobs, True
+        self.done, self.written, self.jobs, self.is_counted = 0, list[PartReport](), jobs, True
         self._out, self._signals, self._rows = out, signals, rows
         self._backend, self._scheduler = backend, scheduler
         self._stopped = threading.Event()
@@ -291,8 +291,8 @@ class _Run:
         """Yield the ranges that are not there, until something goes wrong."""
         return itertools.takewhile(lambda _: not self._stopped.is_set(), plan.missing())
 
-    def _note(self, part: Written | Exception) -> None:
-        if isinstance(part, Written):
+    def _note(self, part: PartReport | Exception) -> None:
+        if isinstance(part, PartReport):
             self.written.append(part)
             self.done += part.rows
         else:  # what is in hand ends, and nothing more is begun
@@ -306,7 +306,7 @@ class _Run:
         self._ticked += rows
 
 
-def _written(work: Work, first: int, stop: int, *tick: Callable[[int], None]) -> Written | Exception:
+def _written(work: Work, first: int, stop: int, *tick: Callable[[int], None]) -> PartReport | Exception:
     """Compute a range and write its part, or return what went wrong: a call on a worker."""
     try:
         return work.write(first, stop, *tick)
@@ -413,7 +413,7 @@ def _firmness(plan: _Plan, out: Location) -> dict[str, Any]:
     return firmness
 
 
-def _check_whole(out: Location, plan: _Plan, written: list[Written]) -> None:
+def _check_whole(out: Location, plan: _Plan, written: list[PartReport]) -> None:
     """Check that the parts of all workers are in the folder as this machine sees it.
 
     Raises

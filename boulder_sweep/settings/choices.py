@@ -187,7 +187,7 @@ def unfold_scan(boulder: Mapping, folder: Path) -> tuple[Scan, list[str]]:
         if key in boulder.entries:
             mistakes.add(boulder.entries[key].position, f"{key} follows from the scan; remove one of them")
     if len({"mass", "density"} & set(boulder.entries)) != 1:
-        message = "beside a scan give the mass of the whole stone, or its density: one of them"
+        message = "beside a scan give the mass of the whole boulder, or its density: one of them"
         mistakes.add(entry.position, message)
     mistakes.raise_if_any()
     mass = boulder.entries.pop("mass", None)

@@ -356,7 +356,7 @@ _READERS: dict[str, Callable[[Location, ProblemList], DesignList]] = {
     ".xlsx": _read_rows,
     ".parquet": _read_columns,
 }
-"""By the end of the file's name."""
+"""Readers by the end of the file's name."""
 
 
 MAX_TEXT = 200

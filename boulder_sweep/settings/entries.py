@@ -30,7 +30,7 @@ NAMED_SETS = ("soil", "vehicle")
 NAME = re.compile(r"\w[\w .+-]{0,79}")
 """Names of sweeps and of named sets."""
 NAME_RULE = "must be at most 80 letters, digits, spaces and - _ . +, as in m30-sizing"
-"""The same in words."""
+"""Message about a name that `NAME` refuses."""
 TOP_KEYS = ("name", *fields.SECTIONS, "table", SECTION, UNITS, fields.ALLOW_UNUSUAL)
 SITE_KEYS = {"soil": (*METHODS, HOLE, ENERGY, TOPSOIL.key), "vehicle": (APPROACH,)}
 """Keys of a block that stand for others, as the site gives them."""

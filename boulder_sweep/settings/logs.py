@@ -418,4 +418,4 @@ _READERS: dict[str, Callable[[Location, _Hole], None]] = {
     ".gef": _read_gef,
     ".xml": _read_bro,
 }
-"""By the end of the file's name."""
+"""Readers by the end of the file's name."""

@@ -27,7 +27,7 @@ PRINTED = "printed"
 ACCURACIES = ("fast", "balanced", "fine")
 CLOSED_FORM = "closed_form"
 WATER_KG_M3 = 1000.0
-"""Density of water."""
+"""Density of water [kg/m^3]."""
 RESISTANCES = ("kp_squared", "broms", "width_capped")
 """Laws of the ultimate resistance of the soil; the first is the paper's."""
 SECOND_OPINIONS = RESISTANCES[1:]
@@ -43,7 +43,7 @@ FOOT_WORDS = {
     "flat": "foot: flat (boulder.foot); a rounded one is not modelled",
     "rounded": "foot: rounded (boulder.foot), which is not modelled",
 }
-"""What every answer says of it."""
+"""Note on the foot in every answer."""
 
 ENOUGH_ELEMENTS = 200
 """Soil elements that come near their limit; a note says what fewer cost."""
@@ -119,7 +119,7 @@ class Field:
 
     @property
     def path(self) -> str:
-        """Dotted key."""
+        """Dotted key in the settings file."""
         return f"{self.section}.{self.key}"
 
 
@@ -294,7 +294,7 @@ class Model:
     calibrated_crush_m: float = setting(
         "vehicle.calibrated_crush",
         "m",
-        "crush up to which spring and damper describe the vehicle's front; a row with more is flagged",
+        "crush up to which spring and damper describe the vehicle's front; a design with more is flagged",
         1.0,
         admitted=Bound(0.0, 100.0, "the chassis stiffens at about 1 m of crush"),
         also=("crush", "max_crush"),
@@ -302,18 +302,18 @@ class Model:
     resistance: str = setting(
         "model.resistance",
         "",
-        "law of the ultimate resistance of the soil",
+        "soil model, which gives the ultimate resistance of the soil",
         RESISTANCES[0],
         choices=RESISTANCES,
-        kind="a law of the soil's resistance",
+        kind="a soil model",
     )
     second_opinion: tuple[str, ...] = setting(
         "model.second_opinion",
         "",
-        "laws of the soil's resistance under which passes are simulated again, with friction and vertical motion; "
+        "soil models under which passes are simulated again, with friction and vertical motion; "
         "width_capped alone decides, and broms is asked where that overturns a pass or resists more",
         USUAL_OPINION,
-        kind="a law for a second opinion",
+        kind="a soil model for a second opinion",
         shown_default=USUAL_OPINION[0],
     )
     layers: tuple[Layer, ...] = setting(
@@ -371,7 +371,7 @@ class Model:
     scan: Scan | None = setting(
         "boulder.scan",
         "",
-        "scan of the stone, from which its profile and, with its mass, its density follow",
+        "scan of the boulder, from which its profile and, with its mass, its density follow",
         None,
         also=("mesh", "stone"),
     )

@@ -110,7 +110,7 @@ class Mistakes(list[Mistake]):
     """
 
     def add(self, position: Position, message: str) -> None:
-        """Add one mistake."""
+        """Add one mistake to the list."""
         self.append(Mistake(position, message))
 
     def __enter__(self) -> None:

@@ -51,11 +51,11 @@ _FORCES = {
 }
 
 
-class Shown(NamedTuple):
+class ShownColumn(NamedTuple):
     """A column of a result as it is shown."""
 
     stored: str
-    """Its name in the result."""
+    """Name of the column in the result."""
     name: str
     unit: str
     size: float
@@ -133,19 +133,19 @@ def quantity_text(unit: str, units: str, *ends: float, digits: str = ".4g") -> s
     return numbers if shown == "1" else f"{numbers} {shown}"
 
 
-def shown_column(stored: str, units: str) -> Shown:
+def shown_column(stored: str, units: str) -> ShownColumn:
     """Return how a column of the result is shown: its name ends in the unit."""
     spec = column_spec(stored)
     return shown_as(stored, spec.unit, spec.meaning, units)
 
 
-def shown_as(stored: str, unit: str, meaning: str, units: str) -> Shown:
+def shown_as(stored: str, unit: str, meaning: str, units: str) -> ShownColumn:
     """Return how a column of a unit and a meaning is shown."""
     if units == "si" or not unit:
-        return Shown(stored, stored, unit, 1.0, meaning)
+        return ShownColumn(stored, stored, unit, 1.0, meaning)
     other, size = shown_unit(unit, units)
     name = stored if size == 1.0 else stored.removesuffix(name_suffix(unit)) + name_suffix(other)
-    return Shown(stored, name, other, size, meaning)
+    return ShownColumn(stored, name, other, size, meaning)
 
 
 def shown_values(values: Mapping[str, Any], units: str) -> dict[str, Any]:

@@ -76,7 +76,7 @@ METHODS = (*READING_FIELDS, RELATIVE_DENSITY.key, LOG)
 SOURCE_OF_DENSITY = "EM 1110-2-2504, Table 3-1"
 _SCATTER_DEG = {"spt": sand.SPT_SD_DEG, "cpt": sand.CPT_SD_DEG, RELATIVE_DENSITY.key: sand.DENSITY_SD_DEG}
 CORRELATION = 0.99
-"""Of friction angle and subgrade reaction where the second follows from the first; 1 is not admitted."""
+"""Correlation of friction angle and subgrade reaction where the second follows from the first; 1 is not admitted."""
 IN_TOPSOIL, BELOW_FOOT = "topsoil", "below the foot"
 """Why a reading is left out."""
 

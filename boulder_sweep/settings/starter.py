@@ -26,7 +26,7 @@ class Category(NamedTuple):
     mass: tuple[str, str]
     """In SI and US units."""
     speeds_mph: tuple[int, ...]
-    """Nominal speeds."""
+    """Nominal speeds in miles per hour."""
 
 
 CATEGORIES = {
@@ -81,7 +81,7 @@ _EXAMPLES: dict[str, tuple[str, str]] = {
     "partial_factor.friction_angle": ("1.25",) * 2,
     "solver.step": ("4 ms",) * 2,
 }
-"""By dotted key, in SI and US units; other entries show their default."""
+"""Values shown by dotted key, in SI and US units; other entries show their default."""
 _HEAD = """\
 # {name}: which boulder, buried how deep, stops the truck?
 #

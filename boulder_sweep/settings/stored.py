@@ -67,7 +67,7 @@ _CONTROL: dict[str, tuple[type, float, float]] = {
 """Entries of `boulder_kernels.Control` with their types and bounds. The kernels are not asked: to import them, and the
 compiler with them, takes longer than to read a table."""
 _READINGS = {"inertia_box", "arm_geometric", "contact_left_face", "restoring_gravity", "separation_released"}
-"""Entries of `boulder_kernels.Readings`."""
+"""Names of the entries of `boulder_kernels.Readings`."""
 
 
 @dataclass
@@ -115,7 +115,7 @@ _Case = dict[str, float | tuple[float, ...] | _Long | dict[str, str]]
 
 @dataclass
 class _Settings:
-    """What `Sweep.resolved` returns."""
+    """Settings as `Sweep.resolved` returns them."""
 
     name: str
     n_designs: int

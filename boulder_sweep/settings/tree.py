@@ -248,7 +248,7 @@ class _TreeReader:
         return Scalar(self.position(event), ""), 1
 
     def read_sequence(self, position: Position, path: tuple[str, ...]) -> tuple[Node, int]:
-        """Return a list."""
+        """Return a list of nodes, and their number."""
         sequence, size = Sequence(position), 1
         while not isinstance(event := next(self.events), SequenceEndEvent):
             item, values = self.read_node(event, path)

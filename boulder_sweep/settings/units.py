@@ -73,7 +73,7 @@ percent = 0.01 = %
 """
 
 
-class Expected(NamedTuple):
+class QuantityKind(NamedTuple):
     """What a quantity in the file must be."""
 
     words: str
@@ -83,20 +83,22 @@ class Expected(NamedTuple):
 
 
 # By the unit of the table (the unit of a bare number).
-EXPECTED: dict[str, Expected] = {
-    "m": Expected("a length", "m, cm, ft or in", "1.65 m"),
-    "kg": Expected("a mass", "kg, t, lb or short_ton", "6800 kg or 15000 lb"),
-    "s": Expected("a time", "s or ms", "1 s"),
-    "m/s": Expected("a speed", "m/s, km/h, mph or ft/s", "13.4 m/s or 30 mph"),
-    "m/s^2": Expected("an acceleration", "m/s^2, ft/s^2 or g", "1.5 m/s^2"),
-    "deg": Expected("an angle", "deg or rad", "36 deg"),
-    "kg/m^3": Expected("a density", "kg/m^3, t/m^3, pcf or kN/m^3", "2650 kg/m^3 or 116 pcf"),
-    "MN/m^3": Expected("a subgrade reaction (pressure per length)", "MN/m^3, kN/m^3 or pci", "95 MN/m^3 or 350 pci"),
-    "kPa": Expected("a pressure", "kPa, Pa or MPa", "5 kPa"),
-    "MPa": Expected("a pressure", "MPa, kPa or tsf", "14 MPa"),
-    "N/m": Expected("a stiffness", "kN/m, N/m or lb/in", "3103.3 kN/m"),
-    "N*s/m": Expected("a damping constant", "kN*s/m, N*s/m or lb*s/in", "138.91 kN*s/m"),
-    "1": Expected("a plain number", "no unit, or %", ""),
+EXPECTED: dict[str, QuantityKind] = {
+    "m": QuantityKind("a length", "m, cm, ft or in", "1.65 m"),
+    "kg": QuantityKind("a mass", "kg, t, lb or short_ton", "6800 kg or 15000 lb"),
+    "s": QuantityKind("a time", "s or ms", "1 s"),
+    "m/s": QuantityKind("a speed", "m/s, km/h, mph or ft/s", "13.4 m/s or 30 mph"),
+    "m/s^2": QuantityKind("an acceleration", "m/s^2, ft/s^2 or g", "1.5 m/s^2"),
+    "deg": QuantityKind("an angle", "deg or rad", "36 deg"),
+    "kg/m^3": QuantityKind("a density", "kg/m^3, t/m^3, pcf or kN/m^3", "2650 kg/m^3 or 116 pcf"),
+    "MN/m^3": QuantityKind(
+        "a subgrade reaction (pressure per length)", "MN/m^3, kN/m^3 or pci", "95 MN/m^3 or 350 pci"
+    ),
+    "kPa": QuantityKind("a pressure", "kPa, Pa or MPa", "5 kPa"),
+    "MPa": QuantityKind("a pressure", "MPa, kPa or tsf", "14 MPa"),
+    "N/m": QuantityKind("a stiffness", "kN/m, N/m or lb/in", "3103.3 kN/m"),
+    "N*s/m": QuantityKind("a damping constant", "kN*s/m, N*s/m or lb*s/in", "138.91 kN*s/m"),
+    "1": QuantityKind("a plain number", "no unit, or %", ""),
 }
 
 _KINDS = (

@@ -195,7 +195,7 @@ class Profile:
 
     @property
     def volume(self) -> float:
-        """Volume [m^3]."""
+        """Volume within the profile [m^3]."""
         return self._integral(lambda w, near, far, z: w * (near + far))
 
     @property

@@ -161,6 +161,6 @@ def _check_size(path: Path, used: np.ndarray, metres: float) -> None:
     fitting = [name for name, unit in OTHER_UNITS.items() if 0.5 <= side * unit <= 6.0 and unit != metres]
     advice = f"; if the scan is in {fitting[0]}, add its unit: {fitting[0]}" if fitting else ""
     raise ScanError(
-        f"{path}: its largest side is {side * metres:.4g} m; stones of {LEAST_SIZE_M:g} to {LARGEST_SIZE_M:g} m are "
+        f"{path}: its largest side is {side * metres:.4g} m; boulders of {LEAST_SIZE_M:g} to {LARGEST_SIZE_M:g} m are "
         f"taken{advice}"
     )

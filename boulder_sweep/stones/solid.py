@@ -93,10 +93,10 @@ def solid_of(scan: ScannedSurface) -> Solid:
     repairs: list[str] = []
     vertices, faces = _merge_points(scan.vertices, scan.faces)
     if len(faces) < 4:
-        raise ScanError(f"{scan.file}: has {counted(len(faces), 'face')} with an area; a stone has at least 4")
+        raise ScanError(f"{scan.file}: has {counted(len(faces), 'face')} with an area; a boulder has at least 4")
     faces, crumbs = _largest_body(vertices, faces, scan.file)
     if crumbs:
-        repairs.append(f"{_bodies(crumbs)} beside the stone left out")
+        repairs.append(f"{_bodies(crumbs)} beside the boulder left out")
     faces, turned = _orient_faces(faces)
     if turned:
         repairs.append(f"{counted(turned, 'face')} turned to the side of the others")
@@ -108,8 +108,8 @@ def solid_of(scan: ScannedSurface) -> Solid:
     if closed > MOST_CLOSED or closed + base > MOST_ADDED:
         raise ScanError(
             f"{scan.file}: is open: {closed + base:.0%} of its surface would be added to close it; at most "
-            f"{MOST_CLOSED:.0%} is, or {MOST_ADDED:.0%} with a base inside a plane rim; scan the stone from all sides, "
-            "or trim the scan to a plane just above the ground"
+            f"{MOST_CLOSED:.0%} is, or {MOST_ADDED:.0%} with an underside inside a plane rim; scan the boulder from "
+            "all sides, or trim the scan to a plane just above the ground"
         )
     faces = np.concatenate([faces, lids])
     volume = float(_cones(vertices, faces, vertices[np.unique(faces)].mean(axis=0)).sum())
@@ -126,7 +126,7 @@ def solid_of(scan: ScannedSurface) -> Solid:
     moments = _moments(vertices, faces)
     cones = np.abs(np.bincount(hole, _cones(vertices, lids, moments[1]))) / volume
     for which, words in (
-        (is_base, "base closed by a flat lid"),
+        (is_base, "underside closed by a flat lid"),
         (~is_base, f"{counted(int((~is_base).sum()), 'hole')} closed"),
     ):
         if which.any():
@@ -227,7 +227,7 @@ def _largest_body(vertices: np.ndarray, faces: np.ndarray, file: str) -> tuple[n
     if others > MOST_CRUMBS:
         raise ScanError(
             f"{file}: holds {_bodies(len(names))}, and the others are {others:.0%} as large as the largest; leave only "
-            "the stone in the scan, as one surface"
+            "the boulder in the scan, as one surface"
         )
     return faces[body == names[largest]], len(names) - 1
 

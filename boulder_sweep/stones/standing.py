@@ -126,7 +126,7 @@ class Stone:
         doubled = self._whole_doubled()
         if doubled > MOST_DOUBLED:
             raise ScanError(
-                f"{file}: the surface crosses itself: {doubled:.0%} of the stone lies inside it twice or inside out; "
+                f"{file}: the surface crosses itself: {doubled:.0%} of the boulder lies inside it twice or inside out; "
                 "repair the scan first, for example in MeshLab"
             )
 
@@ -148,7 +148,7 @@ class Stone:
 
     @cached_property
     def _hull(self) -> Any:
-        """The convex hull."""
+        """Convex hull of the scan."""
         import trimesh
 
         return trimesh.Trimesh(self.solid.vertices, self.solid.faces, process=False).convex_hull
@@ -193,7 +193,7 @@ class Stone:
         """
         for key, end in (("up", up), ("facing", facing)):
             if end not in DIRECTIONS:
-                raise ScanError(f"{key}: '{end}' is no end of a stone; there are {', '.join(DIRECTIONS)}")
+                raise ScanError(f"{key}: '{end}' is no end of a boulder; there are {', '.join(DIRECTIONS)}")
         if up[-1] == facing[-1] or (up[-1] in OF_STONE) != (facing[-1] in OF_STONE):
             kinds = "one of a, b, c or one of x, y, z each"
             raise ScanError(f"up: {up} and facing: {facing} do not go together: give two different axes, {kinds}")
@@ -311,12 +311,12 @@ class Stone:
                 enough = float(cut) if enough is None else enough
         return enough or 0.0
 
-    def _left(self, frame: np.ndarray, cut: float) -> _Left:
+    def _left(self, frame: np.ndarray, cut: float) -> _Remainder:
         """Return what is left above a cut, in the axes of a frame whose origin is the centre of mass of the whole."""
         solid = self.solid
         moment = solid.moment(frame[1])
         if cut == 0.0:
-            return _Left(solid.volume, 0.0, 0.0, moment)
+            return _Remainder(solid.volume, 0.0, 0.0, moment)
         foot = float(((solid.vertices - solid.centre) @ frame[2]).min())
         nodes, weights = np.polynomial.legendre.leggauss(16)
         below = sections_of(solid, frame, 0.5 * cut * (1.0 + nodes))
@@ -324,10 +324,10 @@ class Stone:
         volume = solid.volume - float(slices.sum())
         x, z = -float((slices * below.middle[:, 0]).sum()) / volume, -float((slices * height).sum()) / volume
         lost = float((0.5 * cut * weights * below.second[:, 0] + slices * height**2).sum())
-        return _Left(volume, x, z, moment - lost - volume * (x**2 + z**2))
+        return _Remainder(volume, x, z, moment - lost - volume * (x**2 + z**2))
 
 
-class _Left(NamedTuple):
+class _Remainder(NamedTuple):
     """What is left of a stone above a cut: volume, centre of mass, moment of inertia about y through it."""
 
     volume: float

@@ -24,7 +24,7 @@ MUCH_OVER = 0.1
 """Part of the volume over what was added from which this is said."""
 COARSE_M = 1e-3
 """Spacing of coordinates from which their rounding is said [m]."""
-NEARER = "subtract a point near the stone from all coordinates before you export them"
+NEARER = "subtract a point near the boulder from all coordinates before you export them"
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,7 @@ class ScannedStone:
             )
         if solid.over > MUCH_OVER:
             cautions.append(
-                f"{solid.over:.0%} of its volume lies over what was added to close it: what the stone has beyond, in "
+                f"{solid.over:.0%} of its volume lies over what was added to close it: what the boulder has beyond, in "
                 "the ground for example, is missing from volume and sides"
             )
         if self.step_m > COARSE_M:
@@ -174,7 +174,7 @@ def scanned(
         solid = solid_of(scan)
     except ScanError:
         if scan.step_m > COARSE_M:  # which makes holes and flat faces
-            raise ScanError(f"{scan.file}: {_coarse(scan.step_m)}, too far for a stone; {NEARER}") from None
+            raise ScanError(f"{scan.file}: {_coarse(scan.step_m)}, too far for a boulder; {NEARER}") from None
         raise
     stone = Stone(solid, scan.file)
     if mass_kg is not None:

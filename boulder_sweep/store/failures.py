@@ -106,7 +106,7 @@ class DamagedError(StoreError):
 
 
 class TwoResultsError(DamagedError):
-    """The same rows are there twice, with different content."""
+    """Two parts hold the same rows with different content."""
 
     exit_code = EXIT_CONFLICT
 

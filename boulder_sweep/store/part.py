@@ -177,7 +177,7 @@ def _input_array(column: Column) -> pa.Array:
 
 
 def _outcome_array(spec: OutcomeColumn, judged: Judged) -> pa.Array:
-    """One outcome column."""
+    """Return one outcome column as an Arrow array."""
     values = judged[spec.name]
     if spec.type == "dictionary":
         return word_array(values, judged.words[spec.name])

@@ -68,12 +68,12 @@ class Table(NamedTuple):
         return (*(spec.name for spec in COLUMNS), *more)
 
 
-class Described(NamedTuple):
+class PartSummary(NamedTuple):
     """What a part says of itself."""
 
     table: Table
     verdicts: dict[str, int]
-    """Its rows of each verdict and reason, see `part.verdict_counts`."""
+    """Number of rows of each verdict and reason, from `part.verdict_counts`."""
     bytes: int
     """Size of its file."""
 
@@ -82,7 +82,7 @@ class Described(NamedTuple):
 class Contents:
     """The parts in a folder: those that are intact, by their names, and what is wrong with the others."""
 
-    intact: dict[PartFile, Described] = field(default_factory=dict)
+    intact: dict[PartFile, PartSummary] = field(default_factory=dict)
     damaged: dict[str, str] = field(default_factory=dict)
 
 
@@ -124,7 +124,7 @@ def _ahead(read: Callable[[PartFile], Found], parts: Iterable[PartFile]) -> Iter
             yield found
 
 
-def _described(folder: Location, part: PartFile, known: dict[frozenset[Any], Table]) -> Described | str:
+def _described(folder: Location, part: PartFile, known: dict[frozenset[Any], Table]) -> PartSummary | str:
     """Return what a part says of itself, or what is wrong with it; `known` are tables that were checked already."""
     try:
         content = read_bytes(folder / part.name)
@@ -137,7 +137,7 @@ def _described(folder: Location, part: PartFile, known: dict[frozenset[Any], Tab
         common = frozenset(common_in(file.schema.metadata).items())
         table = known.get(common) or _table_of(folder, part, file)
         known[common] = table
-        return Described(table, _own(folder, part, file, table), len(content))
+        return PartSummary(table, _own(folder, part, file, table), len(content))
     except (failures.DamagedError, ParquetError) as problem:
         return problem.what if isinstance(problem, failures.ImpossibleRecordsError) else str(problem)
 
@@ -390,7 +390,7 @@ class FinishedRows:
             raise failures.StoreError(f"{self._folder} cannot be read: {why(problem)}") from None
 
     def _read(self, part: PartFile, columns: list[str] | None, verify: bool) -> pa.Table:
-        """Read a part."""
+        """Read columns of a part, or all of them."""
         with self._open(part) as source:
             try:
                 file = _opened(_source(source.read(), part) if verify else source)

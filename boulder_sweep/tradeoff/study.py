@@ -104,7 +104,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Tradeoff:
-    """What was measured."""
+    """Speed and accuracy of several methods, measured on one grid."""
 
     sweep: Sweep
     points: tuple[Point, ...]

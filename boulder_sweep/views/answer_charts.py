@@ -63,9 +63,9 @@ ACROSS = (
 CURVES = ("friction_angle_deg", "subgrade_reaction_MN_m3", "boulder_width_m", "impact_speed_m_s")
 """What is across and what tells curves apart: the first of each that varies."""
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
-"""Of as many curves as can be told apart with their bands."""
+"""Colours of as many curves as can be told apart with their bands."""
 SET_COLOURS = (*COLOURS, SKY, AMBER, BLACK)
-"""Of the curves of named soils or vehicles; with more curves the dashes differ."""
+"""Colours of the curves of named soils or vehicles; with more curves the dashes differ."""
 ANSWERS = {
     "withstands_speed_m_s": ("largest impact speed", "m/s"),
     "withstands_mass_kg": ("largest mass of the truck", "kg"),

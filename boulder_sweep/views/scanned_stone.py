@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 PANEL_IN = 3.1
 ROOM_M = 0.25
-"""Around the largest stone of a picture."""
+"""Room around the largest boulder of a picture [m]."""
 
 
 def draw_stone(scan: ScannedStone, path: str | Path) -> None:
@@ -51,7 +51,7 @@ def draw_stone(scan: ScannedStone, path: str | Path) -> None:
         headline(fig, f"{scan.file}: {scan.mass_kg / 1e3:.3g} t")
         caption(
             fig,
-            "From the side, the vehicle coming from the left. Grey: the stone as scanned, dashed what is cut off; "
+            "From the side, the vehicle coming from the left. Grey: the boulder as scanned, dashed what is cut off; "
             "blue: the profile, whose sections are rectangles of the same area. Dot: centre of mass. Metres.",
         )
 

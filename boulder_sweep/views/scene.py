@@ -41,10 +41,10 @@ class Style(NamedTuple):
     fill: str = "none"
     line: str = "none"
     width: float = 0.0
-    """Of the line, in points."""
+    """Width of the line in points."""
     dash: tuple[float, ...] = ()
     size: float = 9.0
-    """Of a text, in points."""
+    """Size of a text in points."""
 
 
 STYLES: dict[str, Style] = {

@@ -31,8 +31,8 @@ _RASTER = 500
 """Distinct positions along an axis of a map; more than it has pixels."""
 
 Pieces = Callable[[Sequence[str]], Iterable["pd.DataFrame"]]
-"""Yields the named columns of a table, `RATIO` among them, piece by piece; further columns may come along, and those
-of `boulder_sweep.columns.OPTIONAL_COLUMNS` are left out where the table does not have them."""
+"""Yields the named columns of a table, `RATIO` among them, piece by piece; further columns may come along, and
+any of `boulder_sweep.columns.OPTIONAL_COLUMNS` is left out where the table does not have it."""
 
 
 def pieces_of(table: pd.DataFrame | Pieces) -> Pieces:
@@ -123,7 +123,7 @@ class PictureRows:
         self._held = 0
 
     def add(self, rows: pd.DataFrame) -> None:
-        """Add rows."""
+        """Add rows, and thin them where they are too many."""
         self.count += len(rows)
         if VERDICT in rows:
             passes = rows[VERDICT] == "pass"
@@ -182,8 +182,8 @@ class Slice:
     Attributes
     ----------
     rows : DataFrame
-        The rows shown, with ``embedment_ratio`` beside the columns of the table; where they are thinned, those of them
-        that can be told apart in a picture.
+        The rows shown, with the columns of the table and ``embedment_ratio``; where they are thinned, only rows that
+        can be told apart in a picture.
     across, up : str
         Inputs on the axes of each picture.
     columns, rows_over : str or None
@@ -195,7 +195,7 @@ class Slice:
     constants : dict of str to float
         Inputs that have one value in the whole table.
     total, count, passing : int
-        Rows of the table, those of them in the plane, and those of these that pass.
+        Rows of the table, rows in the plane, and rows in the plane that pass.
     thinned : bool
         Whether there were too many rows to keep them all.
     flags : dict of str to int

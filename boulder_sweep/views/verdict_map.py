@@ -46,7 +46,7 @@ AXIS_IN = 0.8
 LINE_IN = {"title": 0.19, "map": 0.14}
 """Height of a further line of a title."""
 CHARACTERS_PER_INCH = 15
-"""Of the caption."""
+"""Characters of the caption in one inch of the figure."""
 CAPTION_LINE_IN = 0.15
 """Height of a line of the caption."""
 

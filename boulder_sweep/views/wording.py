@@ -139,7 +139,7 @@ def terms_line(settings: Mapping[str, Any], units: str = "si") -> str:
 
 
 def model_words(settings: Mapping[str, Any], units: str = "si") -> str:
-    """Return the readings of the paper, and the laws of the soil and its ground where they are not the paper's."""
+    """Return the readings of the paper, and soil model and ground where they are not the paper's."""
     model = settings["model"]
     law = LAW_WORDS.get(model.get("resistance", ""), "")
     words = (

@@ -31,7 +31,7 @@ def api_sand(design: Design) -> Soil:
     """Return the p-y curve of API RP 2GEO for sand under static load (Reese et al., 1974; Murchison and O'Neill, 1984).
 
     p = A p_u tanh(k z y / (A p_u)), p_u = min((C_1 z + C_2 W) gamma z, C_3 W gamma z), A = max(3 - 0.8 z/W, 0.9). The
-    initial stiffness k is that of the design.
+    design gives the initial stiffness k.
     """
     phi, width, gamma = design.phi, design.W, design.rho_s * G
     alpha, beta, K_0 = 0.5 * phi, 0.25 * math.pi + 0.5 * phi, 0.4

@@ -26,7 +26,7 @@ NUMBERS = tuple(steps for steps in LADDER if finer_step(steps.step_s) in (0.006,
 
 
 LEAST, LEAST_UNCONFIRMED = 0.99, 0.98
-"""Least share of the errors that must be covered, and that of one solution as printed."""
+"""Least share of the errors that must be covered, and the share for one solution as printed."""
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ SPEEDS = {"M30": "30 mph", "M40": "40 mph"}
 DRAWN, SEED = 1200, 1
 """Passes, and fails, that are drawn of each grid."""
 RANDOM = 30_000
-"""Random designs."""
+"""Number of random designs."""
 FAILS_ASKED = 5000
 """Fails of these that are simulated again."""
 BUMPER_M, HOOD_M, BED_OFFSET_M = 0.5, 1.4, 2.9

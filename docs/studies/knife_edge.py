@@ -36,7 +36,7 @@ EXAMPLE = Design(
 )
 """A tall granite boulder in loose soil before a light truck at 83 km/h."""
 SPAN = 0.02
-"""Speeds around that of the example that are looked at, as a share of it."""
+"""Half the range of speeds around the example's speed, as a share of it."""
 STEP_S = 2.5e-4
 
 

@@ -92,7 +92,7 @@ class ReadingsStudy:
     rows: list[ReadingRow]
 
     def row(self, base: str, switch: str = "") -> ReadingRow:
-        """Return one row."""
+        """Return the row of one reading."""
         return next(row for row in self.rows if (row.base, row.switch) == (base, switch))
 
     @property

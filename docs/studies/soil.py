@@ -26,7 +26,7 @@ def _by(law: str, sweep: Sweep) -> Sweep:
 
 
 LOOSE = {"density_kg_m3": 1700.0, "friction_angle_deg": 34.0, "subgrade_reaction_MN_m3": 20.0}
-"""A loose sand."""
+"""Constants of a loose sand."""
 GROUNDS: dict[str, tuple[Ground, dict[str, float]]] = {
     "as given": (Ground(), {}),
     "water table 1 m down": (Ground(water_table_m=1.0), {}),

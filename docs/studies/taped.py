@@ -61,8 +61,8 @@ def stone(rng: np.random.Generator) -> tuple[np.ndarray, float]:
     """Return the profile of a stone in shares of its overall sizes, shape (P, 4), and its fill.
 
     A superellipsoid of random exponents, the radius of which has noise, is cut flat below, where its section has at
-    least half the sides of the largest. A section becomes the rectangle of its area, middle and proportions, as that of
-    a scan does.
+    least half the sides of the largest. As in a scan,
+    a section becomes the rectangle of its area, middle and proportions.
     """
     while True:
         plan, upright = np.exp(rng.uniform(*np.transpose(np.log([PLAN, UPRIGHT]))))

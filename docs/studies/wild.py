@@ -29,7 +29,7 @@ from docs.studies.coverage import (
 )
 
 DESIGNS = 20_000
-"""Of each family."""
+"""Designs of each family."""
 SEED = 7
 """Of the random numbers: not one of those by which `boulder_kernels.error_estimates` was chosen."""
 HOOD_M = 1.45
@@ -45,7 +45,7 @@ SAME_END_S = 0.02
 def wild_families(count: int, seed: int) -> dict[str, DesignTable]:
     """Return twelve families of designs, made of usual ones.
 
-    Those of wide and flat boulders have the truck strike them as high as its own height and theirs allow.
+    The truck strikes wide and flat boulders as high as its own height and theirs allow.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def late_designs(count: int, seed: int) -> Designs:
     return Designs(some_rows(table, late), offset)
 
 
-class Compared(NamedTuple):
+class FamilyScore(NamedTuple):
     """One accuracy on the designs of a family."""
 
     standing: int
@@ -115,7 +115,8 @@ class Compared(NamedTuple):
     rotation: float
     """Share of these whose estimated error of the rotation is no smaller than the true one."""
     displacement: float
-    """The same of the displacements, over all designs that both solutions or neither stopped at the limit."""
+    """Share whose estimated error of the displacements is no smaller than the true one, of all designs that both
+    solutions or neither stopped at the limit."""
     wrong: int
     """Designs on the wrong side of the limit that are not undecided."""
 
@@ -130,7 +131,7 @@ def _solved(
     return simulate_table(table, corrected(), control)
 
 
-def _compared(found: OutcomeTable, known: OutcomeTable) -> Compared:
+def _compared(found: OutcomeTable, known: OutcomeTable) -> FamilyScore:
     """Compare estimated with true errors, which are known to within the errors of `known`."""
     computed = np.isfinite(found.theta_max) & np.isfinite(known.theta_max)
     fell, falls = found.status == Status.LIMIT, known.status == Status.LIMIT
@@ -138,7 +139,7 @@ def _compared(found: OutcomeTable, known: OutcomeTable) -> Compared:
     turned = np.abs(found.theta_max - known.theta_max)
     moved = np.maximum(np.abs(found.x_b_max - known.x_b_max), np.abs(found.x_v_max - known.x_v_max))
     unsure = ~fell & (LIMIT - found.theta_max < found.theta_error) | np.isinf(found.theta_error)
-    return Compared(
+    return FamilyScore(
         int(standing.sum()),
         math.degrees(float(turned[standing].max(initial=0.0))),
         float(np.mean((turned <= found.theta_error + known.theta_error)[standing])),
@@ -147,7 +148,7 @@ def _compared(found: OutcomeTable, known: OutcomeTable) -> Compared:
     )
 
 
-def _measured(designs: DesignTable) -> dict[str, Compared]:
+def _measured(designs: DesignTable) -> dict[str, FamilyScore]:
     """Compare the named accuracies."""
     known = _solved(designs, Steps(REFERENCE_STEP_S, locate_yield=True), estimate=False)
     known.theta_error[:], known.x_error[:] = ROUNDING_RAD, ROUNDING_M
@@ -192,7 +193,7 @@ def _judged_late(designs: Designs, grid: Path, accuracy: str) -> OutcomeTable:
     )
 
 
-def _measured_late(designs: Designs, grid: Path) -> dict[str, Compared]:
+def _measured_late(designs: Designs, grid: Path) -> dict[str, FamilyScore]:
     """Compare what tables of the named accuracies say of late designs. Both end by proof, not always at one time."""
     known = _known_late(designs)
     found = {}
@@ -203,10 +204,10 @@ def _measured_late(designs: Designs, grid: Path) -> dict[str, Compared]:
     return found
 
 
-def _worst(families: list[Compared]) -> Compared:
+def _worst(families: list[FamilyScore]) -> FamilyScore:
     """Return the worst of each number, and how many designs stand and are wrong in all."""
     standing, largest, rotation, displacement, wrong = zip(*families, strict=True)
-    return Compared(sum(standing), max(largest), min(rotation), min(displacement), sum(wrong))
+    return FamilyScore(sum(standing), max(largest), min(rotation), min(displacement), sum(wrong))
 
 
 def _degrees(angle: float) -> str:
@@ -214,7 +215,7 @@ def _degrees(angle: float) -> str:
     return f"{angle:.1g}" if angle < 1.0 else f"{angle:.0f}"
 
 
-def _covered(one: Compared) -> str:
+def _covered(one: FamilyScore) -> str:
     """Shares covered of rotation and displacement, in per cent."""
     return f"{100.0 * one.rotation:.2f}, {100.0 * one.displacement:.2f}"
 

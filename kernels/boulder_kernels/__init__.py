@@ -1,6 +1,6 @@
 """Compiled kernels of boulder-sweep: the low-order model of a truck that hits an embedded boulder.
 
-The model is that of Brown et al., Low-order modeling of vehicle impacts upon boulders embedded in cohesionless soil;
+The model is from Brown et al., Low-order modeling of vehicle impacts upon boulders embedded in cohesionless soil;
 equation numbers in this package are theirs. Everything here is plain numbers in SI units (angles in radians, the
 subgrade reaction beta in MN/m^3 as in Eq 24), and nothing here knows of files, units or tables on disk.
 """

@@ -93,7 +93,7 @@ def _type_of(value: Any) -> Any:
 class Kernel:
     """A kernel that is compiled when it is first called, by Python or by another kernel; see `kernel`.
 
-    What is not defined here is that of Numba's dispatcher.
+    Numba's dispatcher supplies every attribute that is not defined here.
 
     Attributes
     ----------
@@ -249,7 +249,7 @@ def _align_stack() -> Callable[..., None]:
 
 
 def _compiled(function: Callable[..., Any], fastmath: set[str], *, inline: bool = False) -> Callable[..., Any]:
-    """Decorate one function."""
+    """Decorate one function as a kernel."""
     options: dict[str, Any] = {"nogil": True, "no_cfunc_wrapper": True, "error_model": "numpy"}
     return function if IS_PLAIN else Kernel(function, options | {"fastmath": fastmath, "forceinline": inline})
 

@@ -33,7 +33,7 @@ VALID_ROTATION = math.radians(20.0)
 """Rotation up to which the model is valid [rad]: beyond, the boulder climbs out of its bed, as the paper says. What
 turns further is never a pass, whatever the limit of its criterion."""
 STEP_RATIO = 3.0
-"""Step of the coarser of the two solutions that an error is estimated from, over that of the finer."""
+"""Ratio of the steps of the two solutions that an error is estimated from, coarser over finer."""
 
 
 class Control(NamedTuple):
@@ -49,7 +49,7 @@ class Control(NamedTuple):
     """Number N of soil elements; 0 for the closed form."""
     error_estimate: bool
     """Whether the estimated error of a design is confirmed by a second solution where one could be wrong, see
-    `boulder_kernels.table.simulate_table`. Without, it is that of the steps of one solution."""
+    `boulder_kernels.table.simulate_table`. Without, the steps of one solution give it."""
     stop_at_limit: bool = True
     """Whether the simulation ends where the rotation reaches its limit."""
     locate_yield: bool = False
@@ -83,11 +83,11 @@ for none is 1.0), which the damping of the soil and the length of an impact more
 STABLE_DECAY = 3.0
 """Largest step times rate of decay (the method's limit on the negative real axis is 3.3)."""
 MOST_SHORTENING = 25.0
-"""No design takes more than this many times the steps asked for,"""
+"""A design may take this many times the steps asked for, or `STEPS_ALWAYS` if that is more."""
 STEPS_ALWAYS = 2_500
-"""unless it needs no more than these to the horizon;"""
+"""Steps to the horizon that every design may take."""
 MOST_STEPS = 500_000
-"""and none takes more than these."""
+"""Most steps that any design takes."""
 RETRY = 0.25
 """Factor on the step of a design whose motion became non-finite all the same, for its retry."""
 ACCEPTED = -1
@@ -136,9 +136,9 @@ class Rates(NamedTuple):
     soil: float
     """Squared angular frequency [1/s^2] by the springs of the soil."""
     truck: float
-    """The same by the spring of the truck."""
+    """Squared angular frequency [1/s^2] by the spring of the truck."""
     turning: float
-    """The same by forces that turn with the boulder: weight, contact and soil times the arm gained per angle."""
+    """Squared angular frequency [1/s^2] by weight, contact and soil, whose arms grow with the rotation."""
     relaxation: float
     """Rate [1/s] of the truck's spring against its damper, k_v/c_v."""
     drag: float
@@ -190,10 +190,10 @@ def rates_of(theta_stop: float, c: Constants) -> Rates:
 
     Notes
     -----
-    The stiffness matrix of boulder and truck is a sum, and its largest eigenvalue at most the sum of those of its
-    terms. The soil's follows from the integrals of r, r lever and r lever^2 over the depth, r = 0 ... 1, with the
-    lever (r d - z_0) cos(theta) + l_n sin(theta). Where the printed restoring moment doubles the net moment, the
-    boulder turns as if half as heavy.
+    The stiffness matrix of boulder and truck is a sum, and its largest eigenvalue at most the sum of the largest
+    eigenvalues of its terms. The soil's follows from the integrals of r, r lever and r lever^2 over the depth,
+    r = 0 ... 1, with the lever (r d - z_0) cos(theta) + l_n sin(theta). Where the printed restoring moment doubles the
+    net moment, the boulder turns as if half as heavy.
     """
     sin = sine_versine(theta_stop).sin if theta_stop < QUARTER_TURN else 1.0
     inverse_J = 2.0 * c.inverse_J_eff if c.theta_corner < theta_stop else c.inverse_J_eff

@@ -40,7 +40,7 @@ def corrected() -> Readings:
 
 
 G = 9.80665
-"""Standard gravity [m/s^2]."""
+"""Standard acceleration of gravity [m/s^2]."""
 
 
 class Design(NamedTuple):
@@ -49,13 +49,13 @@ class Design(NamedTuple):
     L: float
     """Boulder length, along the direction of travel [m]."""
     W: float
-    """Boulder width [m]."""
+    """Width of the boulder [m]."""
     H: float
-    """Boulder height [m]."""
+    """Height of the boulder [m]."""
     rho_b: float
     """Density of the boulder [kg/m^3]."""
     d: float
-    """Embedment depth [m]."""
+    """Embedment depth of the boulder [m]."""
     e: float
     """Height of the blow over the soil line [m] (Eq 9)."""
     rho_s: float
@@ -133,9 +133,9 @@ class Constants(NamedTuple):
     J_eff: float
     """Moment of inertia of boulder and lumped soil about their centre of mass [kg m^2] (Eq 13)."""
     inverse_m_eff: float
-    """1/m_eff [1/kg]."""
+    """Reciprocal of m_eff [1/kg]."""
     inverse_J_eff: float
-    """1/J_eff [1/(kg m^2)]."""
+    """Reciprocal of J_eff [1/(kg m^2)]."""
     c_x: float
     """Centre of mass from the lower left corner, in X [m] (Eq 3)."""
     c_y: float
@@ -145,7 +145,7 @@ class Constants(NamedTuple):
     z_0: float
     """Depth of the centre of mass below the soil line, d - c_y [m]."""
     d: float
-    """Embedment depth [m]."""
+    """Embedment depth of the boulder [m]."""
     elements: int
     """Number N of soil elements; 0 stands for the limit N -> infinity in closed form."""
     K_soil: float
@@ -169,7 +169,7 @@ class Constants(NamedTuple):
     C_cos: float
     """Couple against turning, part that goes with cos(theta_b) [N m] (Eqs 37-39)."""
     C_sin: float
-    """The same, part that goes with |sin(theta_b)| [N m]."""
+    """Couple against turning, part that goes with |sin(theta_b)| [N m]."""
     d_N: float
     """Depth of the lowest element below the centre of mass [m]."""
     theta_corner: float
@@ -219,7 +219,7 @@ class Body(NamedTuple):
     J: float
     """Moment of inertia about its own centre [kg m^2] (Eq 16, first term)."""
     x: float
-    """Its centre, in X [m]."""
+    """X of the boulder's centre of mass [m]."""
     y: float
     """Height of its centre [m]."""
     line: float
@@ -227,7 +227,7 @@ class Body(NamedTuple):
     foot: float
     """Half the length of its foot [m]."""
     lean: float
-    """Its centre before the middle of the foot, towards the vehicle [m]."""
+    """Distance of the boulder's centre from the middle of the foot, towards the vehicle [m]."""
 
 
 @exact_inlined
@@ -241,8 +241,8 @@ def body_of_box(design: Design) -> Body:
 def boulder_inertia(body: Body, c_x: float, c_y: float, box: bool) -> float:
     """Moment of inertia J_b of the boulder about the common centre of mass [kg m^2] (Eq 16).
 
-    Departs from print where ``box``: the first term is that of a box, m_b/12 (H^2 + L^2), or of the boulder that there
-    is; printed, it has the half lengths and so a quarter of it.
+    Departs from print where ``box``: the first term is the inertia of a box, m_b/12 (H^2 + L^2), or of the actual
+    boulder; printed, it has the half lengths and so a quarter of it.
     """
     J = body.J
     if not box:
@@ -344,14 +344,18 @@ def constants_with(
 
     Parameters
     ----------
-    design, readings, elements
-        As of `constants_of`.
+    design
+        The design, SI.
+    readings
+        Which formulas are read as printed.
+    elements
+        Number N of soil elements; 0 for the closed form.
     body
         The boulder.
     soil
         The soil lumped on the boulder.
     K_soil, R_soil, x_yield
-        As of `Constants`.
+        Spring [N/m], drag [kg/m] and yield displacement [m] of the soil, see `Constants`.
     """
     d = design.d
     m_b = body.m_b

@@ -12,8 +12,8 @@ which is the same method on the same system with fewer numbers to keep.
 
 **Within a step** the motion is given by polynomials through both of its ends. Displacement, velocity and acceleration
 are known at either end of a step, and together they fix a polynomial of degree five in each degree of freedom. Its
-error is of the order h^6, as that of a step itself, one order better than the continuous extension that goes with the
-pair, and no stage has to be kept for it.
+error is of the order h^6, like the error of a step itself, one order better than the continuous extension that goes
+with the pair, and no stage has to be kept for it.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def _check() -> None:
 _check()
 
 C = tuple(float(c) for c in _C)
-"""Nodes, shape (7,)."""
+"""Nodes of the stages, shape (7,)."""
 A = tuple(tuple(float(_entry(i, j)) for j in range(STAGES)) for i in range(STAGES))
 """Stage weights, shape (7, 7); the last row is the fifth-order solution."""
 ERROR = tuple(float(_entry(6, j) - _B_FOURTH[j]) for j in range(STAGES))
@@ -165,8 +165,8 @@ def step(y: State, k1: Acceleration, h: float, s: Switches, c: Constants) -> tup
     Acceleration
         Acceleration there, which the next step starts with.
     float
-        Difference of the solutions of fifth and of fourth order: the sum of those of the velocities, that of the
-        rotation at the arm of `boulder_kernels.design.error_arm` [m/s].
+        Difference of the solutions of fifth and of fourth order: the sum over the velocities, the rotation counted
+        at the arm of `boulder_kernels.design.error_arm` [m/s].
     """
     b = stage_2(y.x_b, y.v_b, h, k1.a_b)
     r = stage_2(y.theta_b, y.omega_b, h, k1.alpha_b)

@@ -69,7 +69,7 @@ class Modes(NamedTuple):
     yielded_top: int
     """Soil at the soil line: 0 below its ultimate resistance, 1 at it forwards, -1 backwards."""
     yielded_base: int
-    """The same at the base of the boulder."""
+    """Soil at the foot of the boulder: 0 below its ultimate resistance, 1 at it forwards, -1 backwards."""
 
 
 class Switches(NamedTuple):
@@ -164,15 +164,15 @@ class State(NamedTuple):
     x_b: float
     """Displacement of the common centre of mass of boulder and soil [m]."""
     v_b: float
-    """Its velocity [m/s]."""
+    """Velocity of that centre of mass [m/s]."""
     theta_b: float
     """Rotation of the boulder [rad]."""
     omega_b: float
-    """Its angular velocity [rad/s]."""
+    """Angular velocity of the boulder [rad/s]."""
     x_v: float
     """Displacement of the truck [m]."""
     v_v: float
-    """Its velocity [m/s]."""
+    """Velocity of the truck [m/s]."""
 
 
 class Acceleration(NamedTuple):

@@ -1,16 +1,16 @@
-"""The numerical error: of one solution, by that of its steps, and of two, by their difference.
+"""Estimates of the numerical error: from the steps of one solution, or from the difference of two.
 
-Dormand and Prince's method has a solution of fourth order embedded in that of fifth; their difference is known in every
-step at little cost. Summed over all steps it is an error of the speed, and the error of a displacement is that times
-the time for which it acts, `error_time`. This time is not derived but measured, so that the estimate covers the true
-error of 99.9 % of random designs, usual ones and families far from them.
+Dormand and Prince's method computes a fourth-order solution with its fifth-order one, at little cost, and so yields a
+difference in every step. Summed over all steps, the differences give an error of the speed. Multiplied by the time for
+which it acts, `error_time`, this gives the error of a displacement. We measured this time instead of deriving it, so
+that the estimate covers the true error of 99.9 % of random designs, of usual ones and of families far from them.
 
-The sum cannot see that a motion took a wrong branch, as that of a rocking boulder may, or what the location of an event
-adds. Designs to which this may happen are *doubtful* and are solved a second time by half the step. Where it may hardly
-happen but a verdict depends on it, near the limit, a coarser solution confirms the first. Beyond the horizon the
-difference of the two is the error: the sum would grow without end, and further solutions are compared there anyway,
-see `boulder_kernels.rules`. The numbers below were chosen with one set of random designs and tested with others, see
-`docs/studies/wild.py`.
+The sum does not notice a motion that takes a wrong branch, as a rocking boulder may, nor the error in locating an
+event. A design to which this may happen is *doubtful*, and is solved again with half the step. Near the limit, where
+it is unlikely but would change the verdict, a coarser solution confirms the first. Beyond the horizon the sum would
+grow without end, so the difference of two solutions is the error; `boulder_kernels.rules` compares further solutions
+there anyway. The numbers below were chosen with one set of random designs and tested with others
+(`docs/studies/wild.py`).
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ changed before."""
 LASTING = 0.5
 """Simulated time from which the factor of a long motion counts [s]."""
 LONG_MOTION = 5.0
-"""That factor on the error."""
+"""Factor of a long motion on the error."""
 LONG = 1.0
 """Simulated time from which the motion of a shallow or wide boulder is doubtful [s]."""
 SHALLOW, VERY_SHALLOW = 0.42, 0.3
@@ -72,15 +72,15 @@ NEAR_LIMIT, MANY_ERRORS = 0.017453292519943295, 100.0
 """Distance from the limit of rotation below which a design is confirmed: one degree [rad], by a coarser solution, and
 so many errors, by a finer one."""
 GRAZING = 0.01
-"""Speed at an arm as long as the boulder is deep, over that of the impact, below which the limit is just reached."""
+"""Below this share of the speed of impact, at an arm as long as the boulder is deep, the limit is just reached."""
 SAFETY = 1.5
 """Factor from the difference of two solutions to the error that is reported: it makes the estimate hold for 99 % and
 more of all designs, and for those that are not stopped at the limit of rotation alone."""
 SAFETY_PRINTED = 5.0
-"""The same where the restoring moment is read as printed: two of its jumps can come and go within a step of either
+"""Factor where the restoring moment is read as printed: two of its jumps can come and go within a step of either
 solution, and both then miss them alike."""
 SAFETY_CONFIRMED = 4.0
-"""The same where a doubtful design is solved again by half the step."""
+"""Factor for a doubtful design, which is solved again by half the step."""
 LEAST_CONFIRMED_RAD, LEAST_CONFIRMED_M = 1e-8, 2e-7
 """Least error of a design that has a second solution."""
 LEAST_LATE_M = 1e-4
@@ -177,7 +177,7 @@ def estimate_error(coarse: OutcomeTable, fine: OutcomeTable, design: Design, saf
 
     Notes
     -----
-    The difference of two solutions is nearly the error of the coarser, many times that of the finer. It can be small
+    The difference of two solutions is nearly the error of the coarser, many times the finer one's. It can be small
     by chance, where two errors cross zero, but hardly in all that is reported at once. So the largest difference
     counts: displacements and angles compared over the embedment depth, or half the height of the boulder where that is
     more, and times over the speed of impact. A boulder that hardly turns owes its rotation no more than that rotation

@@ -58,7 +58,7 @@ from .outcomes import (
 )
 from .settling import NO_PROOF, barrier_energy, boulder_energy, inside_maxima, proof_is_possible, stays_below
 from .soil import soil_kinematics
-from .time_history import Exchanged, Record, add_exchanged, nothing_exchanged, write_samples
+from .time_history import ExchangedEnergies, Record, add_exchanged, nothing_exchanged, write_samples
 
 FULL_TURN = math.pi
 """Rotation at which a simulation that does not stop at the limit ends [rad]: the boulder is upside down."""
@@ -70,13 +70,13 @@ class Clock(NamedTuple):
     """How far the simulation of an impact has come."""
 
     t: float
-    """Time [s]."""
+    """Time since first touch [s]."""
     h: float
     """Length of the next step [s]."""
     h_full: float
     """Length of a step that nothing shortens [s]."""
     attempts: float
-    """Steps tried."""
+    """Number of steps tried."""
     barrier: float
     """Energy below which the motion has settled [J], see `boulder_kernels.settling`."""
     horizon: float
@@ -93,7 +93,7 @@ class Pace(NamedTuple):
     h_touching: float
     """Length of a step that nothing shortens while the truck touches [s]."""
     h_apart: float
-    """The same while it does not [s]."""
+    """Length of a step that nothing shortens while truck and boulder are apart [s]."""
     budget: float
     """Steps that may be tried."""
 
@@ -116,7 +116,7 @@ class Impact(NamedTuple):
     """What follows from the modes."""
 
 
-class Followed(NamedTuple):
+class StepResult(NamedTuple):
     """What follows from a step."""
 
     status: int
@@ -324,7 +324,7 @@ def decide(
 @inlined
 def follow(
     i: Impact, y_end: State, k_end: Acceleration, error: float, c: Constants, readings: Readings, control: Control
-) -> Followed:
+) -> StepResult:
     """Find what follows from a step that is not plain: its first event, its peaks, the modes behind it, or the end.
 
     Parameters
@@ -340,16 +340,16 @@ def follow(
     """
     clock, g, modes, switches = i.clock, i.factors, i.modes, i.switches
     if not is_finite(y_end):
-        return Followed(Status.UNSTABLE.value, NONE, i)
+        return StepResult(Status.UNSTABLE.value, NONE, i)
     if clock.attempts >= i.pace.budget:
-        return Followed(Status.STEP_BUDGET.value, NONE, i)
+        return StepResult(Status.STEP_BUDGET.value, NONE, i)
     h, attempts = clock.h, clock.attempts + 1.0
     dense = dense_output(i.y, i.k, y_end, k_end, h)
     event, tau = first_event(i.y, i.k.M, gaps_at(y_end, k_end.M, g, c), dense, g, switches, c)
     if event == SHORTEN:
         t, h = clock.t, tau * h
         again = Clock(t, h, clock.h_full, attempts, clock.barrier, clock.horizon, clock.error, clock.rotation_changes)
-        return Followed(RUNNING, event, Impact(i.pace, i.y, i.k, i.front, i.maxima, again, modes, switches, g))
+        return StepResult(RUNNING, event, Impact(i.pace, i.y, i.k, i.front, i.maxima, again, modes, switches, g))
     y = y_end if tau >= 1.0 else state_at(dense, tau)
     m, front = updated_maxima(i.maxima, clock.t, tau, i.front, y, dense, switches, c)
     t = clock.horizon if h >= clock.horizon - clock.t and tau >= 1.0 else clock.t + tau * h
@@ -372,7 +372,7 @@ def follow(
         h_full = i.pace.h_touching if modes.touching else i.pace.h_apart
         h = length_after(event, min(h_full, horizon - t), y.omega_b, k.alpha_b)
     after = Clock(t, h, h_full, attempts, barrier, horizon, clock.error + error, changes)
-    return Followed(status, event, Impact(i.pace, y, k, front, m, after, modes, switches, g))
+    return StepResult(status, event, Impact(i.pace, y, k, front, m, after, modes, switches, g))
 
 
 @inlined
@@ -428,26 +428,26 @@ def first_touch(h_touching: float, h_apart: float, c: Constants, readings: Readi
     return Impact(pace, y, k, front, no_maxima(), clock, modes, switches, g)
 
 
-class Watched(NamedTuple):
+class ImpactNotes(NamedTuple):
     """What is noted of an impact while it goes on."""
 
     t_limit: float
     """When it reached a limit at which it does not stop [s]; NaN before."""
     written: int
     """Samples of its record that have been written."""
-    exchanged: Exchanged
+    exchanged: ExchangedEnergies
     """Energies exchanged so far."""
 
 
 @inlined
-def nothing_watched() -> Watched:
+def nothing_watched() -> ImpactNotes:
     """Return what is noted before the first step."""
-    return Watched(np.nan, 0, nothing_exchanged())
+    return ImpactNotes(np.nan, 0, nothing_exchanged())
 
 
 @inlined
 def watch(
-    w: Watched,
+    w: ImpactNotes,
     i: Impact,
     y_end: State,
     k_end: Acceleration,
@@ -455,7 +455,7 @@ def watch(
     c: Constants,
     control: Control,
     record: Record,
-) -> Watched:
+) -> ImpactNotes:
     """Note what there is of a step, from an impact at its start and after it; other arguments: see `follow`."""
     t, h, t_end = i.clock.t, i.clock.h, after.clock.t
     dense = dense_output(i.y, i.k, y_end, k_end, h)
@@ -467,12 +467,12 @@ def watch(
     if record.times.size > 0:
         written = write_samples(record, written, t, t_end, dense, i.modes, i.switches, c, exchanged)
         exchanged = add_exchanged(exchanged, dense, (t_end - t) / h, i.modes, i.switches, c)
-    return Watched(t_limit, written, exchanged)
+    return ImpactNotes(t_limit, written, exchanged)
 
 
 @inlined
 def outcome_of(i: Impact, status: int, t_limit: float, control: Control) -> Outcome:
-    """Return the outcome of an impact that has ended; t_limit is of `Watched`."""
+    """Return the outcome of an impact that has ended; t_limit is of `ImpactNotes`."""
     clock = i.clock
     if status == Status.LIMIT.value and control.stop_at_limit:
         t_limit = clock.t

@@ -36,7 +36,7 @@ WATER = 1000.0
 
 
 class Ground(NamedTuple):
-    """What lies around a boulder beside the uppermost layer, whose constants are those of the design."""
+    """The soil around a boulder, apart from the constants of the uppermost layer, which the design holds."""
 
     law: int
     """Law of the ultimate resistance."""
@@ -83,7 +83,7 @@ def capped_coefficient(K_p: float, W: float, d: float) -> float:
 def coefficient_of(law: int, K_p: float, W: float, d: float) -> float:
     """Coefficient K of a law [-], of Rankine's coefficient, the width and the depth of embedment [m].
 
-    The paper's is K_p^2, for slender piles (Eq 27); that of Broms (1964), for short rigid piles, 3 K_p (Eq 101).
+    The paper takes K_p^2, for slender piles (Eq 27); Broms (1964), for short rigid piles, 3 K_p (Eq 101).
     """
     if law == BROMS:
         return 3.0 * K_p
@@ -152,7 +152,7 @@ def put_layers(table: DesignTable, row: int, ground: Ground, layers: np.ndarray)
 
 @exact_inlined
 def put_slices(table: DesignTable, row: int, slices: int, profile: np.ndarray, layers: np.ndarray) -> None:
-    """Cut the layers of a design into slices, with the law that depends on the width by that of the middle of each.
+    """Cut the layers of a design into slices; the soil model that depends on the width takes the width at mid-slice.
 
     The pressure is no line along the depth then. The slices fill `layers` from its first row on, the layers to be cut
     are its last rows. As many rows as there are cuts lie between, so none is written over before it has been cut.

@@ -39,9 +39,9 @@ sides, and their friction per depth; what all pieces have of five sums."""
 ROOM = 11 * ROW
 """Numbers in the workspace."""
 SIDE_POINTS = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262)
-"""Gauss's four points of a length 1,"""
+"""Gauss's four points of a length 1: the sides are four points by four."""
 SIDE_WEIGHTS = (0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692)
-"""and their weights: the sides are four points by four."""
+"""Weights of Gauss's four points."""
 
 
 class Base(NamedTuple):
@@ -92,9 +92,9 @@ class HeaveConstants(NamedTuple):
     k_foot: float
     """Stiffness of the base under the whole foot [N/m]."""
     c_foot: float
-    """Its dashpot [N s/m]."""
+    """Dashpot under the whole foot [N s/m]."""
     q_foot: float
-    """Its bearing capacity [N]."""
+    """Bearing capacity of the whole foot [N]."""
     s_0: float
     """Settlement under the weight of the boulder [m]."""
     friction: float
@@ -111,7 +111,7 @@ class Forces(NamedTuple):
     Q_x: float
     """Force along X [N]."""
     Q_y: float
-    """Force upwards [N]."""
+    """Force upwards, along Y [N]."""
     Q_theta: float
     """Moment about the common centre of mass [N m]."""
     u: float
@@ -218,13 +218,13 @@ class Parts(NamedTuple):
     w: float
     """Difference of the displacements at its ends [m]."""
     inverse_w: float
-    """1/w [1/m]."""
+    """Reciprocal of w [1/m]."""
     slope_w: float
     """Slope of w by the rotation [m]."""
     stiffness: float
     """Stiffness of its springs per depth [N/m^2]."""
     drag: float
-    """Its drag at a velocity of 1 m/s [N s^2/m^2]."""
+    """Drag of the part at a velocity of 1 m/s [N s^2/m^2]."""
     inverse_cover: float
     """What its depth is multiplied by for the share of its drag: it drags in full where half of it is covered [1/m]."""
 
@@ -251,7 +251,7 @@ class Beyond(NamedTuple):
     slope: float
     """Slope of that average by u at the middle [m]: u - q where u > q."""
     widening: float
-    """Its slope by w [m]."""
+    """Slope of that average by w [m]."""
 
 
 @inlined
@@ -264,13 +264,13 @@ def beyond(u: float, q: float, p: Parts) -> Beyond:
     return Beyond(share, energy, share * mean, share * length * (0.25 - (1.0 / 6.0) * share))
 
 
-class Pressed(NamedTuple):
+class FaceForces(NamedTuple):
     """What one part of the soil does to one face."""
 
     spring: float
     """Force of its springs [N]."""
     drag: float
-    """Its share of the drag, along X [N]."""
+    """Drag on that face, along X [N]."""
     widening: float
     """Slope of the energy by the difference of the displacements at its ends [N]."""
     lift: float
@@ -280,13 +280,13 @@ class Pressed(NamedTuple):
 
 
 @inlined
-def pressed(u: float, drag: float, z: float, p: Parts, f: HeaveConstants) -> Pressed:
+def pressed(u: float, drag: float, z: float, p: Parts, f: HeaveConstants) -> FaceForces:
     """Return what a part does to a face that presses on it where u > 0 and is in soil z deep, by its middle."""
     all_of_it, yielded = beyond(u, 0.0, p), beyond(u, f.c.x_yield, p)
     depth = max(z, 0.0)
     energy = p.stiffness * (all_of_it.energy - yielded.energy)
     covered = min(depth * p.inverse_cover, 1.0)
-    return Pressed(
+    return FaceForces(
         p.stiffness * depth * (all_of_it.slope - yielded.slope),
         all_of_it.share * covered * drag,
         p.stiffness * depth * (all_of_it.widening - yielded.widening),
@@ -303,11 +303,11 @@ class Element(NamedTuple):
     far: float
     """Force of springs and drag where it is pushed forward [N]."""
     near: float
-    """And where it is pushed back [N]."""
+    """Force of springs and drag where it is pushed back [N]."""
     turning: float
     """Moment of these and of the lift about the common centre of mass [N m]."""
     lift: float
-    """Vertical force [N]."""
+    """Vertical force on the boulder [N]."""
     energy: float
     """Energy in its springs [J]."""
 
@@ -354,8 +354,8 @@ def foot_strip(
 ) -> Strip:
     """Forces under strip j of the foot.
 
-    The dashpot grows with the pressure up to that of the boulder at rest, so that a strip that touches down meets no
-    jump, and base and dashpot together neither pull nor push more than the bearing capacity.
+    The dashpot grows with the pressure up to the pressure at rest, so that a strip that touches down meets no jump,
+    and spring and dashpot together neither pull nor push more than the bearing capacity.
     """
     a, cos, share = field(work, FOOT, j), 1.0 - versin, field(work, STRIP, j)
     X, Y = a * cos - f.c.c_y * sin, -a * sin - f.c.c_y * cos
@@ -383,8 +383,10 @@ def forces(
 
     Parameters
     ----------
-    x_b, v_b, theta_b, omega_b
-        As of `boulder_kernels.dynamics.State`.
+    x_b, v_b
+        Displacement of the common centre of mass [m] and its velocity [m/s].
+    theta_b, omega_b
+        Rotation [rad] and angular velocity [rad/s].
     y_b, w_b
         Rise of the common centre of mass [m] and its velocity [m/s].
     x_v, v_v

@@ -6,10 +6,10 @@ number of steps lasts. Three things make such designs affordable.
 1. They are given a number of steps (`MOST_STEPS`), not a number up to the horizon: many are decided long before it.
 2. The stiff truck asks for short steps only while it touches; released, it coasts.
 3. A spring that relaxes against its damper faster than the steps can follow passes on the force of the damper, however
-   stiff it is: F = c_v times the speed of crush, with an error of the order of the relaxation time c_v/k_v over that of
-   the impact. So a softer spring stands for it, which relaxes within a step, and at least `DAMPED` times as fast as the
-   damper slows the masses. A third of the step comes with a spring three times as stiff, so the estimated error covers
-   the spring.
+   stiff it is: F = c_v times the speed of crush, with an error of the order of the relaxation time c_v/k_v over the
+   time of the impact. So a softer spring stands for it, which relaxes within a step, and at least `DAMPED` times as
+   fast as the damper slows the masses. A third of the step comes with a spring three times as stiff, so the estimated
+   error covers the spring.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Problem(NamedTuple):
     """One impact to be simulated."""
 
     design: Design
-    """The design, SI."""
+    """The design in SI units."""
     profile: Any
     """`SoilProfile` of its soil; None for the uniform soil of the design."""
 

@@ -21,8 +21,8 @@ from .events import NONE
 from .following import (
     RUNNING,
     Clock,
+    ImpactNotes,
     Pace,
-    Watched,
     begin_to_turn,
     failed,
     first_touch,
@@ -224,7 +224,7 @@ def write_lane(
 
 
 @kernel
-def watch_lane(groups: Any, w: Watched, control: Control, record: Record) -> Watched:
+def watch_lane(groups: Any, w: ImpactNotes, control: Control, record: Record) -> ImpactNotes:
     """Note what there is of a step of the first lane, whose impact at its start lies in the group of starts."""
     running, before = groups[0], groups[1]
     i, after = load_impact(before, 0), load_impact(running, 0)

@@ -43,7 +43,7 @@ ARM = 4
 YIELD_TOP = 5
 """The soil at the soil line reaches its ultimate resistance, or falls below it."""
 YIELD_BASE = 6
-"""The same at the base of the boulder."""
+"""The soil at the foot of the boulder reaches its ultimate resistance, or falls below it."""
 LIMIT = 7
 """The rotation reaches the limit."""
 
@@ -65,25 +65,25 @@ class GapFactors(NamedTuple):
     """What the gaps of a mode are made of; all of them are constant while the mode lasts."""
 
     contact: float
-    """Of the compression u: 1 where the truck touches, -1 where it has come off."""
+    """Factor of the compression u: 1 where the truck touches, -1 where it has come off."""
     rotation_0: float
     rotation_abs_M: float
-    """Of the modulus of the net moment M."""
+    """Factor of the modulus of the net moment M."""
     rotation_theta: float
     rotation_omega: float
     couple_M: float
-    """Of M."""
+    """Factor of the net moment M."""
     couple_abs_M: float
     couple_limit: float
-    """Of the limit of the restoring moment; 0 where the event cannot happen."""
+    """Factor of the limit of the restoring moment; 0 where the event cannot happen."""
     corner_0: float
     corner_theta: float
     arm: float
-    """Of the signed arm of the weight; 0 where the event cannot happen."""
+    """Factor of the signed arm of the weight; 0 where the event cannot happen."""
     top: float
-    """Of the displacement at the soil line: 1 or -1 beyond the ultimate resistance, 0 below, or UNSOUGHT."""
+    """Factor of the displacement at the soil line: 1 or -1 beyond the ultimate resistance, 0 below, or UNSOUGHT."""
     base: float
-    """The same at the base."""
+    """Factor of the displacement at the foot: 1 or -1 beyond the ultimate resistance, 0 below, or UNSOUGHT."""
     limit: float
     """Limit of rotation [rad]."""
     tolerance: float
@@ -168,7 +168,7 @@ def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: boo
 
 @inlined
 def yield_gap(displacement: float, sign: float, c: Constants) -> float:
-    """Gap of the soil's ultimate resistance where it is displaced [m], by the sign as of `GapFactors`."""
+    """Gap of the soil's ultimate resistance where it is displaced [m]; `GapFactors` gives the sign."""
     gap = c.x_yield - abs(displacement) if sign == 0.0 else sign * displacement - c.x_yield
     return NEVER if sign == UNSOUGHT else gap
 
@@ -204,7 +204,7 @@ def gaps_of(
     M
         Net moment of soil and truck [N m].
     arm
-        Signed arm of the weight, as of `signed_arm` [N m].
+        Signed arm of the weight [N m], from `signed_arm`.
     g, c
         Factors of the present modes, and constants of the design.
     """
@@ -298,7 +298,7 @@ def changes_counted(event: float, begun: float, modes: Modes) -> float:
     begun
         Start of the step [s]. That a boulder begins to turn in the first step does not count.
     modes
-        Modes before; those of printed readings do not count.
+        Modes before; modes of printed readings do not count.
     """
     return 1.0 if event == ROTATION and begun > 0.0 and modes.turning <= LAST_OF_GRAVITY else 0.0
 

@@ -23,11 +23,11 @@ class Status(IntEnum):
     LIMIT = 1
     """The rotation reached its limit."""
     SETTLED = 2
-    """It is proved that nothing that is reported can still grow."""
+    """Proved: nothing that is reported can still grow."""
     HORIZON = 3
     """The longest horizon was reached, and nothing is proved of later times."""
     OUTWARD = 4
-    """The same, with rotation or truck at its maximum and still growing."""
+    """The longest horizon was reached with rotation or truck at its maximum and still growing."""
     UNSTABLE = 5
     """The state became non-finite."""
     STEP_BUDGET = 6
@@ -37,13 +37,13 @@ class Status(IntEnum):
     STIFF_SOIL = 8
     """The design needs more steps than are allowed: the soil springs back too fast for the boulder's mass."""
     STIFF_VEHICLE = 9
-    """The same: the vehicle's spring is too stiff for the masses on either side."""
+    """The design needs too many steps: the vehicle's spring is too stiff for the masses on either side."""
     WEAK_DAMPER = 10
-    """The same: the vehicle's spring relaxes too fast against its damper."""
+    """The design needs too many steps: the vehicle's spring relaxes too fast against its damper."""
     THICK_SOIL = 11
-    """The same: the drag of the soil slows the boulder too fast."""
+    """The design needs too many steps: the drag of the soil slows the boulder too fast."""
     LITTLE_INERTIA = 12
-    """The same: the boulder has too little inertia for the forces that turn it."""
+    """The design needs too many steps: the boulder has too little inertia for the forces that turn it."""
     BELOW_LIMIT = 13
     """A horizon was reached, and it is proved that the rotation can never reach its limit, and that truck and crush are
     what they will ever be. Rotation, displacement and force are the largest up to then: they may still grow."""
@@ -67,13 +67,13 @@ class Maxima(NamedTuple):
     """Largest values so far, and their times [s]."""
 
     theta: float
-    """Largest |theta_b| [rad]."""
+    """Largest modulus of theta_b [rad]."""
     t_theta: float
     x_b: float
-    """Largest x_b [m]."""
+    """Largest displacement x_b [m]."""
     t_x_b: float
     x_v: float
-    """Largest x_v [m]."""
+    """Largest displacement x_v [m]."""
     t_x_v: float
     F_v: float
     """Largest contact force [N]."""
@@ -92,11 +92,11 @@ class Outcome(NamedTuple):
     t_limit: float
     """Time at which the rotation reached its limit [s]."""
     t_end: float
-    """Simulated time [s]."""
+    """Simulated time at the end [s]."""
     attempts: int
-    """Steps tried."""
+    """Number of steps tried."""
     moved: float
-    """Error of the displacements by those of all steps [m], see `boulder_kernels.error_estimates`."""
+    """Error of the displacements that the steps add up to [m], see `boulder_kernels.error_estimates`."""
     omega_b: float
     """Rate of rotation in the end [rad/s]."""
     rotation_changes: float
@@ -109,7 +109,7 @@ LEAST_ROTATION = 1e-4
 
 NONE_NEEDED, FINER, COARSER, PAIR = range(4)
 """Second solutions of a design: none; by half the step, which is reported; by three times the step, which confirms that
-the error is no larger; and the same where the error is that of the two solutions alone."""
+the error is no larger; by three times the step, where the two solutions alone give the error."""
 
 
 class StepErrors(NamedTuple):
@@ -118,7 +118,7 @@ class StepErrors(NamedTuple):
     theta: float
     """Estimated error of the largest rotation [rad]; 0 where that is the limit."""
     x: float
-    """The same of the displacements; at the limit, of the truck's way until the limit is reached, too [m]."""
+    """Estimated error of the largest displacements; at the limit, also of the truck's way up to it [m]."""
     second: int
     """Which second solution is needed, `NONE_NEEDED` to `PAIR`."""
 
@@ -127,13 +127,13 @@ class OutcomeTable(NamedTuple):
     """Results of many designs, arrays of shape (n,), or of one, numbers; NaN where not computed."""
 
     status: Any
-    """int8, see `Status`."""
+    """Codes of `Status`, int8."""
     theta_max: Any
-    """Largest |theta_b| [rad]."""
+    """Largest modulus of theta_b [rad]."""
     x_b_max: Any
-    """Largest x_b [m]."""
+    """Largest displacement x_b [m]."""
     x_v_max: Any
-    """Largest x_v [m]."""
+    """Largest displacement x_v [m]."""
     F_v_max: Any
     """Largest contact force [N]."""
     crush_max: Any
@@ -141,7 +141,7 @@ class OutcomeTable(NamedTuple):
     t_limit: Any
     """Time at which the rotation reached its limit [s]."""
     t_end: Any
-    """Simulated time [s]."""
+    """Simulated time at the end [s]."""
     theta_error: Any
     """Estimated numerical error of theta_max [rad]."""
     x_error: Any
@@ -231,11 +231,11 @@ class Compression(NamedTuple):
     u: float
     """Compression of the spring [m]."""
     rate: float
-    """Its rate [m/s]; the contact force peaks where it is zero."""
+    """Rate of u [m/s]; the contact force peaks where it is zero."""
     crush: float
     """Crush of the front: spring and damper together [m]."""
     crush_rate: float
-    """Its rate [m/s]."""
+    """Rate of the crush [m/s]."""
 
 
 @inlined

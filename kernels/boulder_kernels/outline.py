@@ -59,7 +59,7 @@ def body_of_outline(design: Design, outline: np.ndarray) -> Body:
     Parameters
     ----------
     design
-        The design, SI; its density is that of the volume within the outline.
+        The design, SI; its density is the mass over the volume within the outline.
     outline
         The outline, shape (P, 4).
     """

@@ -1,20 +1,21 @@
-"""Soil in pieces over the depth (Eqs 105 to 108, 145 to 147): all that is no uniform soil beside a box.
+"""Soil in pieces over the depth (Eqs 105 to 108, 145 to 147), for every soil but a uniform one beside a box.
 
-A piece has one soil and one linear width. Layers, water, cohesion and a slope give its constants
-(`boulder_kernels.ground`), the outline of the boulder its width: where a layer or a piece of the outline ends, a piece
-ends. The ultimate pressure of a layer is linear in the depth, p_0 + p_1 alpha, whatever law it comes from, since
-vertical stress grows linearly within a layer, above or below the water.
+A piece has one soil and one linear width. Layers, water, cohesion and slope give the constants of its soil
+(`boulder_kernels.ground`), and the outline of the boulder gives its width. A piece ends where a layer or a part of the
+outline ends. Within a layer vertical stress grows linearly, above or below the water, so every soil model has an
+ultimate pressure that is linear in the depth, p_0 + p_1 alpha.
 
-At the ratio r = alpha/d of the depth a slice of a piece presses with w(r) times the spring K r x, but no more than
-w(r) times P(r) = P_0 + P_1 r; its drag is w(r) R v|v|. Displacement x = A - s r and velocity are linear in the depth,
-as in `boulder_kernels.soil`, and the width is w(r) = w_0 + w_1 r over that of the design. Let s be positive: it is the
-mirror image otherwise. Then
+Let r = alpha/d be the ratio of the depth. A slice of a piece presses with w(r) times the spring force K r x, but no
+more than w(r) times P(r) = P_0 + P_1 r. Its drag is w(r) R v|v|. The width w(r) = w_0 + w_1 r is a ratio of the
+design's width. Displacement x = A - s r and velocity are linear in the depth, as in `boulder_kernels.soil`. We take s
+as positive; a negative s is the mirror image. Then
 
     clip(K r x, -P, P) = -P - max(K r x - P, 0) + max(K r x + P, 0)
 
-and both excesses are quadratic in r and positive between their roots only (Eq 146). What is integrated over all of a
-piece is known before (`SoilSums`); what changes with the state is two integrals of polynomials between roots, and the
-drag up to where the velocity changes its sign: without a branch, as loops over lanes need it (Eqs 108, 147).
+Both excesses are quadratic in r, and positive only between their roots (Eq 146). Integrals over a whole piece do not
+depend on the state and are computed once (`SoilSums`). The state decides two integrals of polynomials between roots,
+and how far down the drag acts before the velocity changes its sign. None of this branches, because loops over lanes
+must not (Eqs 108, 147).
 """
 
 from __future__ import annotations
@@ -65,10 +66,10 @@ class GivenPiece(NamedTuple):
     subgrade: float
     p_0: float
     p_1: float
-    """Its layer, see `PRESSURE_SLOPE`."""
+    """Constants of its layer, in the units of `PRESSURE_SLOPE`."""
     w_0: float
     w_1: float
-    """Width w_0 + w_1 r over that of the design [-]."""
+    """Width w_0 + w_1 r as a ratio of the design's width [-]."""
 
 
 class Piece(NamedTuple):
@@ -76,11 +77,11 @@ class Piece(NamedTuple):
 
     low: float
     to: float
-    """Its ends as ratios of the depth [-]."""
+    """Upper and lower end as ratios of the depth [-]."""
     K: float
     """Spring per ratio of the depth, squared [N/m] (Eqs 24, 25)."""
     inverse_K: float
-    """1/K [m/N]."""
+    """Reciprocal of K [m/N]."""
     P_0: float
     P_1: float
     """Ultimate force per ratio of the depth [N] (Eqs 28, 105)."""
@@ -88,7 +89,7 @@ class Piece(NamedTuple):
     """Drag over the velocity squared, per ratio of the depth [kg/m] (Eq 36)."""
     w_0: float
     w_1: float
-    """As of `GivenPiece`; K, P and R are those at the width of the design."""
+    """Width w_0 + w_1 r as a ratio of the design's width [-], for which K, P and R are given."""
 
 
 class SoilSums(NamedTuple):
@@ -109,14 +110,14 @@ class SoilSums(NamedTuple):
 
 
 class FewPieces(NamedTuple):
-    """As many pieces as its type says, number by number: the soil of a design in a lane."""
+    """The pieces of one design in a lane, number by number; its type says how many they are."""
 
     sums: SoilSums
     pieces: tuple[Piece, ...]
 
 
 class ManyPieces(NamedTuple):
-    """The same as arrays."""
+    """The pieces of one design as arrays."""
 
     sums: np.ndarray
     """The fields of `SoilSums`, shape (9,)."""
@@ -138,7 +139,7 @@ class SoilElements(NamedTuple):
 
 
 class SoilProfile(NamedTuple):
-    """The soil of one design where it is not that of its `Design` all the way down, or the boulder no box."""
+    """The soil of one design that changes with depth or lies around a boulder that is no box."""
 
     layers: np.ndarray
     """Layers from the top down, shape (M, 6)."""
@@ -152,7 +153,7 @@ _record: Any = namedtuple
 SoilConstants = _record("SoilConstants", (*Constants._fields, "lean", "soil"))
 """The fields of `Constants`; ``lean``, the part D of the moment of the weight that a boulder has whose centre does not
 lie over the middle of its foot, over the depth [N] (Eq 144); and ``soil``: `FewPieces`, `ManyPieces` or `SoilElements`.
-Of the soil as a whole they hold bounds: K_soil and R_soil are those of the stiffest and of the heaviest piece all the
+Of the soil as a whole they hold bounds: K_soil and R_soil hold for the stiffest and the heaviest piece all the
 way down, x_yield the last displacement at which one reaches its ultimate resistance."""
 PiecewiseTable = _record("PiecewiseTable", (*DesignTable._fields, "layers", "outlines"))
 """Many designs whose soil is in pieces: the fields of `DesignTable`, ``layers`` of shape (n, M, 6), and ``outlines`` of
@@ -165,7 +166,7 @@ def table_in_layers(table: DesignTable, layers: np.ndarray) -> Any:
 
 
 class Bounds(NamedTuple):
-    """Number of elements, and bounds of the soil as a whole, as of `SoilConstants`."""
+    """Number of elements, and bounds of the soil as a whole, fields of `SoilConstants`."""
 
     elements: int
     K_soil: float
@@ -173,21 +174,21 @@ class Bounds(NamedTuple):
     x_yield: float
 
 
-class Lumped(NamedTuple):
+class LumpedSoil(NamedTuple):
     """What follows from the soil of a design, or from its pieces down to one of them."""
 
     mass: SoilMass
     """What the wedge of Eqs 1, 2 weighs."""
     bounds: Bounds
     sums: SoilSums
-    """Of pieces; zero for elements."""
+    """Integrals over whole pieces; zero for elements."""
 
 
 @exact_inlined
-def nothing_lumped() -> Lumped:
+def nothing_lumped() -> LumpedSoil:
     """Return what follows from no piece."""
     sums = SoilSums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    return Lumped(SoilMass(0.0, 0.0, 0.0), Bounds(0, 0.0, 0.0, 0.0), sums)
+    return LumpedSoil(SoilMass(0.0, 0.0, 0.0), Bounds(0, 0.0, 0.0, 0.0), sums)
 
 
 class Cursor(NamedTuple):
@@ -212,9 +213,9 @@ def next_piece(
     Parameters
     ----------
     design
-        The design, SI; density, friction angle and subgrade reaction of its soil are those of the layers.
+        The design, SI; the layers replace density, friction angle and subgrade reaction of its soil.
     layers, outline
-        As of `SoilProfile`.
+        Layers, shape (M, 6), and outline, shape (P, 4), of the design.
     low
         Where it begins.
     at
@@ -249,7 +250,7 @@ def pieces_count(layers: int, points: int) -> int:
 
 @exact_inlined
 def in_soil(design: Design, given: GivenPiece) -> Design:
-    """Return a design in the soil of one piece; K_epsilon is that of the design."""
+    """Return a design in the soil of one piece; K_epsilon stays."""
     p = design
     return Design(
         p.L,
@@ -310,7 +311,7 @@ def combined(p: Powers, sign: float, q: Powers) -> Powers:
 
 
 @exact_inlined
-def lumped_with(so_far: Lumped, piece: Piece, given: GivenPiece, design: Design) -> Lumped:
+def lumped_with(so_far: LumpedSoil, piece: Piece, given: GivenPiece, design: Design) -> LumpedSoil:
     """Add a piece to what follows from those above it."""
     low, to, K, R, P_0, P_1 = piece.low, piece.to, piece.K, piece.R, piece.P_0, piece.P_1
     w_0, w_1, d, s, b = piece.w_0, piece.w_1, design.d, so_far.sums, so_far.bounds
@@ -343,17 +344,19 @@ def lumped_with(so_far: Lumped, piece: Piece, given: GivenPiece, design: Design)
         max(b.R_soil, R * widest if within else 0.0),
         max(b.x_yield, max(at_low, at_to) if within else 0.0),
     )
-    return Lumped(mass, bounds, sums)
+    return LumpedSoil(mass, bounds, sums)
 
 
 @exact_kernel
-def fill_pieces(design: Design, layers: np.ndarray, outline: np.ndarray, soil: ManyPieces) -> Lumped:
+def fill_pieces(design: Design, layers: np.ndarray, outline: np.ndarray, soil: ManyPieces) -> LumpedSoil:
     """Cut layers and outline into pieces (Eq 145), and return what follows from them.
 
     Parameters
     ----------
-    design, layers, outline
-        As of `next_piece`.
+    design
+        The design, SI; the layers replace density, friction angle and subgrade reaction of its soil.
+    layers, outline
+        Layers, shape (M, 6), and outline, shape (P, 4), of the design.
     soil
         Pieces to fill.
     """
@@ -370,7 +373,7 @@ def fill_pieces(design: Design, layers: np.ndarray, outline: np.ndarray, soil: M
 
 
 @exact_kernel
-def fill_elements(design: Design, layers: np.ndarray, outline: np.ndarray, soil: SoilElements) -> Lumped:
+def fill_elements(design: Design, layers: np.ndarray, outline: np.ndarray, soil: SoilElements) -> LumpedSoil:
     """Give N elements the values of the pieces that their middles lie in (Eqs 105, 145); see `fill_pieces`."""
     elements, d = soil.ratio.size, design.d
     h_e = d / elements
@@ -398,7 +401,7 @@ def fill_elements(design: Design, layers: np.ndarray, outline: np.ndarray, soil:
         R_soil = max(R_soil, soil.drag[n] * elements)
         x_yield = max(x_yield, soil.ultimate[n] / soil.stiffness[n])
     bounds = Bounds(elements, K_soil, R_soil, x_yield)
-    return Lumped(SoilMass(mass, first, second), bounds, nothing_lumped().sums)
+    return LumpedSoil(SoilMass(mass, first, second), bounds, nothing_lumped().sums)
 
 
 def uniform_layers(design: Design) -> np.ndarray:
@@ -408,7 +411,7 @@ def uniform_layers(design: Design) -> np.ndarray:
 
 
 @exact_inlined
-def constants_in_soil(design: Design, readings: Readings, body: Body, lumped: Lumped, soil: Any) -> Any:
+def constants_in_soil(design: Design, readings: Readings, body: Body, lumped: LumpedSoil, soil: Any) -> Any:
     """Return the constants of a design together with the record of its soil, from which `lumped` follows."""
     b = lumped.bounds
     c = constants_with(design, body, readings, b.elements, lumped.mass, b.K_soil, b.R_soil, b.x_yield)
@@ -484,7 +487,7 @@ def write_given(designs: np.ndarray, layers: np.ndarray, outlines: np.ndarray, o
     designs
         The designs, SI, shape (15, n).
     layers, outlines
-        As of `PiecewiseTable`.
+        Layers, shape (n, M, 6), and outlines, shape (n, P, 4).
     out
         Shape (7 + 8 C, n), of C pieces.
     """
@@ -521,14 +524,14 @@ class Line(NamedTuple):
     S: float
     """Decrease of displacement over the depth, positive [m]."""
     inverse_S: float
-    """1/S [1/m]."""
+    """Reciprocal of S [1/m]."""
     turn: float
     """Ratio of the depth at which the velocity changes its sign."""
 
 
 @inlined
 def side_of(slope: float) -> float:
-    """Return the sign of a slope; that of zero is positive, whatever sign zero has."""
+    """Return the sign of a slope; zero counts as positive, whatever sign it has."""
     return 1.0 if slope >= 0.0 else -1.0
 
 
@@ -608,7 +611,7 @@ def released(KS: float, n: float, p: float, r: Powers, piece: Piece) -> float:
     return 0.5 * piece.inverse_K * (piece.w_0 * zeroth + times(piece.w_1, first))
 
 
-class Released(NamedTuple):
+class ReleasedEnergy(NamedTuple):
     """What springs hold less for their yielding [J], and a bound from below."""
 
     energy: float
@@ -616,7 +619,7 @@ class Released(NamedTuple):
 
 
 @inlined
-def released_by_strength(s: Section, piece: Piece) -> Released:
+def released_by_strength(s: Section, piece: Piece) -> ReleasedEnergy:
     """Half the integral of P_0^2 w/(K r) over a section: a logarithm, and for the bound the tangent to 1/r, without."""
     length, middle = s.high - s.low, 0.5 * (s.low + s.high)
     logarithm = piece.w_0 * math.log(max(s.high, TINY) / max(s.low, TINY)) + times(piece.w_1, length)
@@ -624,7 +627,7 @@ def released_by_strength(s: Section, piece: Piece) -> Released:
     ratio = length * inverse
     tangent = ratio * (piece.w_0 + times(piece.w_1, middle)) - times(piece.w_1, (1.0 / 12.0) * ratio * ratio * length)
     share = 0.5 * piece.inverse_K * piece.P_0 * piece.P_0
-    return Released(times(share, logarithm), times(share, tangent))
+    return ReleasedEnergy(times(share, logarithm), times(share, tangent))
 
 
 class Walk(NamedTuple):
@@ -635,7 +638,7 @@ class Walk(NamedTuple):
     """What the springs press if soil not met yet is at its limit backwards, mirrored, and the same times r [N]."""
     energy: float
     least_energy: float
-    """As of `Released` [J]."""
+    """Energy of the springs less what yielding released, and a bound from below [J]."""
     D_0: float
     D_1: float
     D_2: float
@@ -786,7 +789,7 @@ def reaction_of_elements(k: Kinematics, soil: SoilElements) -> Reaction:
 
 @kernel
 def potential_of_elements(A: float, slope_x: float, soil: SoilElements) -> Potential:
-    """Elastic energy of elements with values of their own, as convex as that of each."""
+    """Elastic energy of elements with values of their own; a sum of convex energies is convex."""
     V = V_A = V_X = 0.0
     for n in range(soil.ratio.size):
         ratio = soil.ratio[n]

@@ -51,9 +51,9 @@ class VerdictLimits(NamedTuple):
     """Limits of the criterion."""
 
     rotation: float
-    """Largest rotation [rad]."""
+    """Largest rotation that passes [rad]."""
     penetration: float
-    """Largest penetration [m]."""
+    """Largest penetration that passes [m]."""
     guarded: float
     """1 where a row nearer to a limit than its error is undecided, or 0."""
     min_overlap_m: float
@@ -68,7 +68,7 @@ class Sizes(NamedTuple):
     H: float
     """Height of the boulder [m]."""
     d: float
-    """Embedment depth [m]."""
+    """Embedment depth of the boulder [m]."""
     e_bumper: float
     """Height of the underside of the bumper [m]."""
     bed_offset: float
@@ -76,9 +76,9 @@ class Sizes(NamedTuple):
     v_0: float
     """Speed of impact [m/s]."""
     flat_foot: float
-    """1 or 0: whether the foot of the boulder is flat,"""
+    """1 or 0: whether the foot of the boulder is flat."""
     known_shape: float
-    """and whether what was simulated has its shape."""
+    """1 or 0: whether the simulated boulder has its shape."""
 
 
 class Course(NamedTuple):
@@ -224,13 +224,13 @@ UNSTUDIED = ("size", "embedment", "rock_density", "soil_pair", "vehicle", "soil"
 """Flags of designs outside the ranges from which the study of second opinions draws."""
 
 
-class Tested(NamedTuple):
+class TestedRange(NamedTuple):
     """What the model was tested on, and what is usual."""
 
     crush: float
-    """Largest crush [m]."""
+    """Largest crush without a flag [m]."""
     rotation: float
-    """Largest rotation [rad]."""
+    """Largest rotation without a flag [rad]."""
     overlap: float
     """Least overlap of boulder and bumper [m]."""
     least_L: float
@@ -251,16 +251,16 @@ class Tested(NamedTuple):
     """Mass of the vehicle [kg]."""
     least_rate: float
     most_rate: float
-    """Its angular frequency sqrt(k_v/m_v) [1/s]."""
+    """Angular frequency sqrt(k_v/m_v) of the vehicle [1/s]."""
     least_damping: float
     most_damping: float
-    """Its damper over sqrt(k_v m_v) [-]."""
+    """Damper of the vehicle over sqrt(k_v m_v) [-]."""
     least_v_0: float
     most_v_0: float
-    """Its speed [m/s]."""
+    """Speed of the vehicle [m/s]."""
     least_phi_deg: float
     most_phi_deg: float
-    """Friction angle [deg]."""
+    """Friction angle of the soil [deg]."""
     least_rho_s: float
     most_rho_s: float
     """Density of the soil [kg/m^3]."""
@@ -277,7 +277,7 @@ class FlagInputs(NamedTuple):
     H: float
     """Sides of the boulder [m]."""
     d: float
-    """Embedment depth [m]."""
+    """Embedment depth of the boulder [m]."""
     rock: float
     """Density of its rock [kg/m^3]."""
     beta: float
@@ -302,7 +302,7 @@ def is_outside(value: float, least: float, most: float) -> bool:
 
 
 @exact_inlined
-def flags_of(o: OutcomeTable, overlap: float, r: FlagInputs, t: Tested) -> int:
+def flags_of(o: OutcomeTable, overlap: float, r: FlagInputs, t: TestedRange) -> int:
     """Flags of a row, bits of a whole number in the order of `FLAGS`.
 
     Parameters
@@ -345,7 +345,9 @@ def flags_of(o: OutcomeTable, overlap: float, r: FlagInputs, t: Tested) -> int:
 
 
 @exact_kernel
-def write_flags(counted: np.ndarray, overlap: np.ndarray, inputs: np.ndarray, tested: Tested, out: np.ndarray) -> None:
+def write_flags(
+    counted: np.ndarray, overlap: np.ndarray, inputs: np.ndarray, tested: TestedRange, out: np.ndarray
+) -> None:
     """Raise the flags of n rows.
 
     Parameters

@@ -51,7 +51,7 @@ def _check() -> None:
 _check()
 
 C = tuple(float(c) for c in _C)
-"""Nodes, shape (4,)."""
+"""Nodes of the stages, shape (4,)."""
 A = tuple(tuple(float(_entry(i, j)) for j in range(STAGES)) for i in range(STAGES))
 """Stage weights, shape (4, 4); the last row is the third-order solution."""
 ERROR = tuple(float(_entry(3, j) - _B_SECOND[j]) for j in range(STAGES))
@@ -73,7 +73,7 @@ WORKSPACE = RATES + STAGES * AXES
 
 @inlined
 def write_rate(work: np.ndarray, at: int, stage: int, touching: bool, f: HeaveConstants) -> float:
-    """Write the accelerations at a state as those of a stage, and return the compression of the vehicle's spring."""
+    """Write the accelerations at a state into a stage, and return the compression of the vehicle's spring."""
     x, theta, y, x_v = field(work, at, 0), field(work, at, 1), field(work, at, 2), field(work, at, 3)
     v, omega, w, v_v = field(work, at, 4), field(work, at, 5), field(work, at, 6), field(work, at, 7)
     Q = forces(x, v, theta, omega, y, w, x_v, v_v, touching, work, f)

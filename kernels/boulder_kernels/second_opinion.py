@@ -1,12 +1,13 @@
-"""Second opinions: impacts with heave and friction, from the first touch to a verdict that is proved.
+"""Second opinions: an impact with friction and vertical motion, from first touch to a proved verdict.
 
-Nothing jumps in this motion, but forces bend where the truck comes off, where a strip of the foot touches or leaves and
-where a slip turns. So the step follows the embedded error of its method (`boulder_kernels.runge_kutta`), and is cut at
-some instants: where the truck comes off or touches again, where the rotation reaches its limit, and where a strip of
-the foot that is being pressed in comes back.
+Nothing jumps in this motion, but forces have kinks where the truck comes off, where a strip of the foot touches or
+leaves, and where slip changes its direction. The embedded error of the method (`boulder_kernels.runge_kutta`) sets the
+length of a step. A step also ends where the truck comes off or touches again, where the rotation reaches its limit, and
+where a strip of the foot that is being pressed in comes back.
 
-Once the truck no longer drives forward, the energy of boulder, soil, base and crush can only fall. If it is below the
-least potential energy at the limit of rotation, forward and back, the boulder never gets there, and the motion ends.
+Once the truck no longer drives forward, the energy of boulder, soil, foot and crush can only fall. The motion ends as
+soon as this energy is below the least potential energy at the limit of rotation, forward and back: the boulder then
+never reaches the limit.
 """
 
 from __future__ import annotations
@@ -83,11 +84,11 @@ class HeaveControl(NamedTuple):
     longest: float
     """Longest simulated time [s]; a motion that is not proved to stay below the limit by then is not decided."""
     tolerance: float = 2e-4
-    """Error of one step [m]: of velocities times its length, that of the rotation at `error_arm`."""
+    """Error of one step [m]: error of the velocities times its length, the rotation at `error_arm`."""
     fineness: int = 1
     """1 for 16 parts of the soil, strips of the foot and points of the sides, up to 4 for 256."""
     margin: float = 0.0
-    """By how much the motion is proved to stay below the limit, unless it comes that near to it [rad]."""
+    """Distance that the motion provably keeps from the limit, unless it comes that near to it [rad]."""
     stop: bool = True
     """Whether the simulation ends at the limit, and where it is proved that it is not reached."""
 
@@ -111,7 +112,7 @@ class HeaveOutcome(NamedTuple):
     theta_max: float
     """Largest |theta_b| up to the end [rad]."""
     x_b_max: float
-    """Largest x_b [m]."""
+    """Largest displacement x_b [m]."""
     y_b_max: float
     """Largest rise of the common centre of mass [m]."""
     x_v_max: float
@@ -119,9 +120,9 @@ class HeaveOutcome(NamedTuple):
     t_limit: float
     """Time at which the rotation reached its limit [s]."""
     t_end: float
-    """Simulated time [s]."""
+    """Simulated time at the end [s]."""
     attempts: float
-    """Steps tried."""
+    """Number of steps tried."""
 
 
 def no_heave_record() -> HeaveRecord:
@@ -233,9 +234,9 @@ class Equilibrium(NamedTuple):
     """Where the boulder stands at some rotation."""
 
     x: float
-    """Displacement [m]."""
+    """Displacement along X [m]."""
     y: float
-    """Rise [m]."""
+    """Rise of the boulder [m]."""
     energy: float
     """Potential energy there [J]."""
 
@@ -263,7 +264,7 @@ def move_to_least_energy(
 
 @inlined
 def growth(tolerance: float, error: float) -> float:
-    """By what the next step may be longer: the error of one grows with the fourth power of its length."""
+    """Return the factor for the next step: the error of a step grows with the fourth power of its length."""
     return 0.9 * math.sqrt(math.sqrt(tolerance / error))
 
 

@@ -51,7 +51,7 @@ CAUTION = 1.0 - 1e-6
 LEAST_ANGLE = 1e-9
 """No smaller angle is looked at [rad]."""
 CAUTION_AT_LIMIT = 0.99
-"""The same at the limit: there no later step looks again, and steps may be long."""
+"""Share of the barrier that counts at the limit: no later step looks again, and steps may be long."""
 
 
 @kernel

@@ -63,9 +63,9 @@ class Potential(NamedTuple):
     V: float
     """Energy stored in the springs [J]."""
     V_A: float
-    """Its derivative by the displacement at the soil line [N]."""
+    """Derivative of V by the displacement at the soil line [N]."""
     V_X: float
-    """Its derivative by the decrease of displacement over the depth [N]."""
+    """Derivative of V by the decrease of displacement over the depth [N]."""
     highest: float
     """Upper bound of V, nearly V itself, that loops over lanes can work out [J]."""
 
@@ -136,7 +136,7 @@ def element_sums(k: Kinematics, c: Constants) -> Reaction:
 def closed_form(k: Kinematics, c: Constants) -> Reaction:
     """Integrate force and moment over the depth exactly: the limit N -> infinity of `element_sums`.
 
-    With r = alpha/d in 0 ... 1 the integrals are those of r clip(A - s r, -y, y) and v|v|, each times 1 and r.
+    With r = alpha/d in 0 ... 1 the integrands are r clip(A - s r, -y, y) and v|v|, each times 1 and r.
     The clipped line takes the values +-y up to r_1 and from r_2 on; v changes sign at r_0. All three are
     clamped to 0 ... 1, so that no case needs a branch.
 
@@ -221,7 +221,7 @@ def closed_potential(A: float, slope_x: float, c: Constants) -> Potential:
 
 @kernel
 def summed_potential(A: float, slope_x: float, c: Constants) -> Potential:
-    """Elastic energy of N soil elements, as convex as that of their limit; see `closed_potential`."""
+    """Elastic energy of N soil elements, convex like its limit N -> infinity (`closed_potential`)."""
     V = V_A = V_X = 0.0
     for n in range(c.elements):
         ratio = (n + 0.5) / c.elements

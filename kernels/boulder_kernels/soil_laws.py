@@ -1,10 +1,10 @@
 """The laws of the soil in one table: the functions that the motion asks of each, and which design gets which.
 
-A law is one `SoilLaw`. Which one holds follows from the type of the constants of a design: plain `Constants` are those
-of a uniform soil beside a box, `SoilConstants` carry the record of their soil. Inside kernels the function is chosen
+A law is one `SoilLaw`. Which one holds follows from the type of the constants of a design: plain `Constants` stand
+for a uniform soil beside a box, `SoilConstants` carry the record of their soil. Inside kernels the function is chosen
 when they are compiled, so a uniform soil has the code it would have if there were no other.
 
-To add a law: write its record and functions beside those of `boulder_kernels.pieces`, and a line in `LAWS`.
+To add a law: write its record and functions next to `boulder_kernels.pieces`, and a line in `LAWS`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .design import Constants, Design, Readings, constants_of
 from .outline import body_with
 from .pieces import (
     FewPieces,
-    Lumped,
+    LumpedSoil,
     ManyPieces,
     Piece,
     SoilConstants,
@@ -42,7 +42,7 @@ from .soil import Kinematics, Potential, Reaction, uniform_drag_power, uniform_p
 
 
 class SoilLaw(NamedTuple):
-    """A law of the soil; its functions take the records of the soil, those of a uniform soil its `Constants`."""
+    """A law of the soil; its functions take the record of the soil, and in a uniform soil its `Constants`."""
 
     reaction: Callable[..., Reaction]
     """Force and moment, of `Kinematics`."""
@@ -50,7 +50,7 @@ class SoilLaw(NamedTuple):
     """Elastic energy and its slopes, convex in the displacement at the soil line and its decrease over the depth."""
     drag_power: Callable[..., float]
     """Power that the drag takes out of the motion [W], of `Kinematics`."""
-    fill: Callable[[Design, np.ndarray, np.ndarray, Any], Lumped] | None = None
+    fill: Callable[[Design, np.ndarray, np.ndarray, Any], LumpedSoil] | None = None
     """Works out the record from layers and outline of a design, and returns what follows from them."""
 
 
@@ -127,15 +127,15 @@ def _drag_power(k: Any, c: Any) -> Callable[..., float]:
     return (lambda k, c: power(k, c.soil)) if type_of(c) is SoilConstants else (lambda k, c: power(k, c))
 
 
-def fill_soil(design: Design, profile: SoilProfile) -> Lumped:
+def fill_soil(design: Design, profile: SoilProfile) -> LumpedSoil:
     """Work out the record of a profile, and return what follows from it."""
     fill: Any = LAWS[type(profile.soil)].fill
-    lumped: Lumped = fill(design, *profile)
+    lumped: LumpedSoil = fill(design, *profile)
     return lumped
 
 
 @overload(fill_soil)
-def _fill_soil(design: Any, profile: Any) -> Callable[..., Lumped]:
+def _fill_soil(design: Any, profile: Any) -> Callable[..., LumpedSoil]:
     fill: Any = law_of(profile[-1]).fill
     return lambda design, profile: fill(design, profile.layers, profile.outline, profile.soil)
 
@@ -160,7 +160,7 @@ def constants_in(design: Design, readings: Readings, elements: int, profile: Soi
     Parameters
     ----------
     design
-        The design, SI; density, friction angle and subgrade reaction of a soil in layers are those of the layers.
+        The design, SI; layers replace density, friction angle and subgrade reaction of its soil.
     readings
         Which formulas are read as printed.
     elements

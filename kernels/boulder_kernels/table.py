@@ -74,8 +74,10 @@ def run_rows(
         Of `PiecewiseTable`; None for boxes in uniform soils.
     soil
         Elements or pieces that every design fills anew; None for boxes in uniform soils.
-    readings, control
-        As of `simulate_table`.
+    readings
+        Which formulas are read as printed.
+    control
+        How the simulation is run.
     record
         Filled with the time history of one design at the times it names; for several, one that keeps nothing.
     out
@@ -94,7 +96,7 @@ def run_rows(
 def run_last_resort(
     designs: np.ndarray, readings: Readings, control: Control, record: Record, out: np.ndarray
 ) -> Outcome:
-    """Do the same for designs that need more steps than are allowed, see `simulate_last_resort`."""
+    """Simulate designs one by one by `simulate_last_resort`, which takes those that need too many steps."""
     outcome = failed(Status.INVALID.value)
     for row in range(designs.shape[1]):
         design = design_in(designs, row)
@@ -124,7 +126,7 @@ def step_of_solution(control: Control) -> float:
     return finer_step(control.h) if control.refined else control.h
 
 
-class Given(NamedTuple):
+class LaneDesigns(NamedTuple):
     """Designs as lanes take them, arguments of `simulate_lanes`."""
 
     designs: np.ndarray
@@ -133,7 +135,7 @@ class Given(NamedTuple):
     has_outline: bool = False
 
 
-def given_to_lanes(designs: np.ndarray, layers: np.ndarray | None, outlines: np.ndarray | None) -> Given | None:
+def given_to_lanes(designs: np.ndarray, layers: np.ndarray | None, outlines: np.ndarray | None) -> LaneDesigns | None:
     """Return designs as lanes take them, or None of those that they do not take.
 
     Parameters
@@ -144,12 +146,12 @@ def given_to_lanes(designs: np.ndarray, layers: np.ndarray | None, outlines: np.
         Of `PiecewiseTable`; None for boxes in uniform soils.
     """
     if layers is None or outlines is None:
-        return Given(designs)
+        return LaneDesigns(designs)
     points = outlines.shape[1]
     count = lanes_count(pieces_count(layers.shape[1], points))
     if count == 0:
         return None
-    return Given(given_pieces(designs, layers, outlines, count), count, has_strength(layers), points > 0)
+    return LaneDesigns(given_pieces(designs, layers, outlines, count), count, has_strength(layers), points > 0)
 
 
 def has_strength(layers: np.ndarray) -> bool:

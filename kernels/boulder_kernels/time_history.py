@@ -42,9 +42,9 @@ class StoredEnergies(NamedTuple):
 
     truck_kinetic: float
     boulder_kinetic: float
-    """Of boulder and lumped soil, m_eff v_b^2/2."""
+    """Translation of boulder and lumped soil, m_eff v_b^2/2."""
     boulder_rotational: float
-    """Of boulder and lumped soil, J_eff omega_b^2/2."""
+    """Rotation of boulder and lumped soil, J_eff omega_b^2/2."""
     soil_elastic: float
     crush_elastic: float
     """In the spring of the vehicle."""
@@ -53,7 +53,7 @@ class StoredEnergies(NamedTuple):
     restoring moment has no potential and counts among the exchanged energies."""
 
 
-class Exchanged(NamedTuple):
+class ExchangedEnergies(NamedTuple):
     """Energies exchanged since the impact [J]."""
 
     drag: float
@@ -67,9 +67,9 @@ class Exchanged(NamedTuple):
 
 
 @kernel
-def nothing_exchanged() -> Exchanged:
+def nothing_exchanged() -> ExchangedEnergies:
     """Exchanged energies at the impact."""
-    return Exchanged(0.0, 0.0, 0.0, 0.0)
+    return ExchangedEnergies(0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
@@ -103,7 +103,7 @@ def stored_energies(y: State, m_v: float, touching: bool, gravity_couple: bool, 
 
 
 @kernel
-def exchange_rates(y: State, modes: Modes, s: Switches, c: Constants) -> Exchanged:
+def exchange_rates(y: State, modes: Modes, s: Switches, c: Constants) -> ExchangedEnergies:
     """Powers at a state [W], in the fields of the energies they add up to."""
     sin, versin = sine_versine(y.theta_b)
     drag = drag_power(soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c), c)
@@ -117,18 +117,18 @@ def exchange_rates(y: State, modes: Modes, s: Switches, c: Constants) -> Exchang
     if not modes.touching:
         v_c = y.v_b + y.omega_b * contact_lever(sin, versin, c)
         pull = -F_truck * v_c
-    return Exchanged(drag, damper, -M_R * y.omega_b, pull)
+    return ExchangedEnergies(drag, damper, -M_R * y.omega_b, pull)
 
 
 @kernel
 def add_exchanged(
-    before: Exchanged,
+    before: ExchangedEnergies,
     dense: DenseOutput,
     tau: float,
     modes: Modes,
     switches: Switches,
     c: Constants,
-) -> Exchanged:
+) -> ExchangedEnergies:
     """Add the energies exchanged in the part 0 ... tau of a step by Gauss-Legendre quadrature."""
     drag, damper, restoring, pull = before.drag, before.damper, before.restoring, before.pull
     for node in range(4):
@@ -138,7 +138,7 @@ def add_exchanged(
         damper += weight * rates.damper
         restoring += weight * rates.restoring
         pull += weight * rates.pull
-    return Exchanged(drag, damper, restoring, pull)
+    return ExchangedEnergies(drag, damper, restoring, pull)
 
 
 class Record(NamedTuple):
@@ -153,7 +153,7 @@ class Record(NamedTuple):
     touching: np.ndarray
     """Whether the truck touched, bool, shape (n,)."""
     exchanged: np.ndarray
-    """Energy exchanged up to each [J], shape (n, 4), order of `Exchanged`."""
+    """Energy exchanged up to each [J], shape (n, 4), order of `ExchangedEnergies`."""
 
 
 def no_record() -> Record:
@@ -177,7 +177,7 @@ def write_samples(
     modes: Modes,
     switches: Switches,
     c: Constants,
-    exchanged: Exchanged,
+    exchanged: ExchangedEnergies,
 ) -> int:
     """Write the samples that lie in a step from t to t_end [s], and return how many have been written in all."""
     while written < record.times.size and record.times[written] <= t_end:
@@ -206,7 +206,7 @@ class Sample(NamedTuple):
     rate: Acceleration
     """Accelerations, and the moment of soil and truck without the restoring moment."""
     stored: StoredEnergies
-    """Stored energies [J]."""
+    """Energies stored at this instant [J]."""
 
 
 @inlined
@@ -260,7 +260,7 @@ def evaluate_samples(
     rates
         Where the fields of `Acceleration` go, shape (4, n).
     stored
-        Where those of `StoredEnergies` go, shape (6, n) [J].
+        Where the fields of `StoredEnergies` go, shape (6, n) [J].
     """
     for i in range(record.times.size):
         s = sample_of(record, i, c, m_v, readings)

@@ -1,8 +1,8 @@
-"""The numbers of many lanes: a record of each group of them, whose fields have one number for every lane.
+"""Memory of the lanes: one record for each group of lanes, in which every field has a number for each lane.
 
-``group.state.theta_b[lane]`` is one number of one lane. Neighbouring lanes are neighbours in memory, and a loop over
-them is vectorised, since the compiler sees that no store touches a later load: all fields are parts of one record. A
-soil in pieces makes fields of its own.
+``group.state.theta_b[lane]`` is one number of one lane. A field keeps the numbers of neighbouring lanes next to each
+other, and all fields are parts of one record. The compiler can then see that no store touches a later load, and
+vectorises a loop over the lanes. A soil in pieces adds fields of its own.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Attempt(NamedTuple):
     """What is known of a lane's last step, beside where it ended."""
 
     error: float
-    """Its error [m/s]."""
+    """Estimated error of the step [m/s]."""
     plain: float
     """1.0 where it has been accepted as it is."""
     status: float
@@ -118,7 +118,7 @@ def by_soil(uniform: Callable[..., Any], in_pieces: Callable[..., Any]) -> Calla
         return uniform if field_of(group, "pieces") is None else in_pieces
 
     def call(group: Any, lane: int, *others: Any) -> Any:
-        """Call it."""
+        """Call the function that suits the soil of the group."""
         return chosen(group)(group, lane, *others)
 
     def choose(group: Any, lane: Any, *others: Any) -> Callable[..., Any]:
@@ -397,12 +397,12 @@ def optional(name: str, value: float) -> tuple[Callable[[Any, int], float], Call
     """
 
     def load(record: Any, lane: int) -> float:
-        """Return the number."""
+        """Return the number of one lane."""
         numbers = field_of(record, name)
         return value if numbers is None else float(numbers[lane])
 
     def store(record: Any, lane: int, number: float) -> None:
-        """Write the number."""
+        """Write the number of one lane."""
         if field_of(record, name) is not None:
             record[name][lane] = number
 
@@ -418,7 +418,7 @@ def optional(name: str, value: float) -> tuple[Callable[[Any, int], float], Call
             return lambda record, lane, number: None
 
         def store_number(record: Any, lane: int, number: float) -> None:
-            """Write the number."""
+            """Write the number of one lane."""
             record[name][lane] = number
 
         return store_number
@@ -475,12 +475,12 @@ def by_count(load: Callable[[Any, int, int], Any]) -> Callable[[Any, int], tuple
 
     @inlined
     def two(group: Any, m: int, lane: int) -> Any:
-        """Load two."""
+        """Load two from m on, as a tuple."""
         return one(group, m, lane) + one(group, m + 1, lane)
 
     @inlined
     def four(group: Any, m: int, lane: int) -> Any:
-        """Load four."""
+        """Load four from m on, as a tuple."""
         return two(group, m, lane) + two(group, m + 2, lane)
 
     def choose(group: Any, lane: Any) -> Callable[..., Any]:
@@ -543,7 +543,7 @@ store_constants = by_soil(store_numbers, store_in_soil)
 """Write the constants of a lane."""
 
 BELOW, BODY_SIZE, PIECE_SIZE = len(Design._fields), len(Body._fields), len(GivenPiece._fields)
-"""Rows of a table of designs: those above what is given of their soil, those of the body, and those of a piece."""
+"""Rows of a table of designs: above the soil, of the body, and of each piece."""
 
 
 @inlined

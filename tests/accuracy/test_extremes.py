@@ -128,7 +128,7 @@ def test_a_limit_exactly_at_the_peak(off: float) -> None:
 )
 @pytest.mark.parametrize("step_s", [0.004, 0.016, 0.1, 1.0])
 def test_many_events_in_a_step(readings: Readings, step_s: float) -> None:
-    """Long steps hold several events each; the answer stays that of short ones as far as such steps allow."""
+    """Long steps hold several events each; the answer agrees with short ones as far as such steps allow."""
     table = DesignTable(*(np.array([value]) for value in RWG))
     long = simulate_table(table, readings, Control(step_s, 1.0, LIMIT, 0, False))
     short = simulate_table(table, readings, Control(5e-4, 1.0, LIMIT, 0, False))

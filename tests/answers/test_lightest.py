@@ -122,9 +122,9 @@ def test_no_boulder_among_many_is_lighter_than_the_lightest() -> None:
 
 
 def lighter_around(sweep: Sweep, answer: pd.Series, count: int = 2000) -> np.ndarray:
-    """Return the masses of those of many random boulders around an answer that pass and are lighter.
+    """Return the masses of random boulders around an answer that pass and are lighter.
 
-    Their sides differ from those of the answer by up to 5 mm, 2 cm or 10 cm, and half of them are as deep as any or
+    Their sides differ from the answer by up to 5 mm, 2 cm or 10 cm, and half of them are as deep as any or
     about as deep as the answer in proportion.
     """
     rng = np.random.default_rng(7)

@@ -380,7 +380,7 @@ def test_what_second_opinions_do_not_know_is_refused_in_words() -> None:
 
 
 def test_no_grade_stands_beside_a_probability() -> None:
-    """It would be that of the mean soil, and says nothing of the designs drawn."""
+    """The grade would hold for the mean soil, and says nothing about the designs drawn."""
     sweep = site(friction="{mean: 40 deg, sd: 1 deg}", height="3.4 m")
     asked = replace(sweep, model=replace(sweep.model, second_opinion=SECOND_OPINIONS))
     found, likely = uncertainty(asked, half_width=0.2), bare_need(asked, probability=0.9)

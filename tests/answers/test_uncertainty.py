@@ -327,7 +327,7 @@ def one(**changes: str) -> Sweep:
 
 
 def drawn(sweep: Sweep, name: str, mean: float) -> np.ndarray:
-    """Return the values of an input at `AT` if its mean is another than that of the file."""
+    """Return the values of an input at `AT` if its mean differs from the mean in the file."""
     rows = {own: np.repeat(values, len(AT)) for own, values in sweep.plan.given_rows(0, 1).items()}
     rows[name] = np.full(len(AT), mean)
     return Spread(sweep, name).filled(rows, AT[:, None])[name]

@@ -40,7 +40,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Callable[[], No
 
 def test_work_that_takes_half_as_long_again_fails_by_name(clock: Callable[..., object]) -> None:
     def lanes() -> None:
-        """As fast as when the record was made."""
+        """Lanes as fast as when the record was made."""
 
     clock({lanes: [4.5], nothing: [9.1]})
     found = gate.within({"lanes": lanes, "twice": nothing}, reference, {"lanes": 4.5, "twice": 6.0}, 1.5)
@@ -65,7 +65,7 @@ def test_timing_ends_with_the_first_round_that_passes_or_the_ninth(
 
 
 def test_what_disturbs_the_reference_excuses_nothing(clock: Callable[..., object]) -> None:
-    """The least time of the reference counts, not that of the same round."""
+    """The least time of the reference counts, not its time in the same round."""
     clock({nothing: [7.0], reference: [1.0, 40.0]})
     (found,) = gate.within({"lanes": nothing}, reference, {"lanes": 4.0}, 1.5)
     assert found.ratio == 7.0 / 4.0

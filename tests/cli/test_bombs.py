@@ -417,7 +417,7 @@ def test_a_footer_that_says_less_than_its_pages_is_not_believed(tmp_path):
         return out.getvalue(), pq.read_metadata(io.BytesIO(out.getvalue())).row_group(0).column(0)
 
     def number(value: int) -> bytes:
-        """As Thrift writes one from 64 to 8191."""
+        """Return a number from 64 to 8191 as Thrift writes it."""
         return bytes([value << 1 & 127 | 128, value >> 6])
 
     many, chunk = written(np.arange(1_000_000.0) % 977.0)

@@ -195,7 +195,7 @@ def test_a_row_that_came_out_otherwise(sweep, finished, monkeypatch):
     assert err.startswith("note: small-grid.sweep was judged by the rules of version ")
     assert "differs now: max_rotation_deg was " in out
     assert "\nchanged since: kernels_sha256: " in out
-    assert "\nas stored, the row was judged by the rules of version " in out
+    assert "\nas stored, the design was judged by the rules of version " in out
     assert "the same to the last bit" not in out
 
 

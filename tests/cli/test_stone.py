@@ -50,11 +50,11 @@ def test_a_slab_scanned_where_it_lies(sweep, block):
         sweep("stone", written((points, kept), Path(name)), "--mass", "18 t")
         for name, kept in (("whole.ply", faces), ("slab.ply", faces[~below]))
     )
-    assert "  repaired    base closed by a flat lid, 28 % of the surface, over 17 % of the volume\n" in found[1]
+    assert "  repaired    underside closed by a flat lid, 28 % of the surface, over 17 % of the volume\n" in found[1]
     assert found[1].split("\n", 2)[2] == whole[1].split("\n", 1)[1]
     assert re.search(r"^ c +±a +1\.10 +3\.00 +2\.20 +3\.00 × 2\.20 +0\.00 +0\.0% +100%", found[1], re.MULTILINE)
     assert (whole[0], whole[2], found[0]) == (0, "", 0)
-    assert found[2].startswith("caution: 17% of its volume lies over what was added to close it: what the stone has")
+    assert found[2].startswith("caution: 17% of its volume lies over what was added to close it: what the boulder has")
     assert found[2].count("caution") == 1
     assert json.loads(sweep("stone", "slab.ply", "--json")[1])["base_share"] == pytest.approx(0.28, abs=0.005)
 

@@ -86,7 +86,7 @@ main.main(sys.argv[2:])
 
 
 def test_a_cold_start_shows_a_bar_with_what_it_waits_for(possible_grid, tmp_path):
-    """The words stand beside a bar that moves while the kernels compile, and give way to those of the work."""
+    """The words stand beside a bar that moves while the kernels compile, and give way to the words of the work."""
     enough = tmp_path / "enough"
 
     def watch(shown):
@@ -206,13 +206,13 @@ def test_it_is_said_where_the_bar_takes_its_time(
     """The thread that waits for the command looks for signals meanwhile."""
     looks, waited = list[None](), list[bool]()
 
-    class Watched(threading.Thread):
+    class CountingThread(threading.Thread):
         def is_alive(self) -> bool:
             looks.append(None)
             return super().is_alive()
 
     functions = {name: getattr(threading, name) for name in ("current_thread", "main_thread")}
-    monkeypatch.setattr(signals, "threading", SimpleNamespace(Thread=Watched, **functions))
+    monkeypatch.setattr(signals, "threading", SimpleNamespace(Thread=CountingThread, **functions))
 
     def several_looks() -> None:
         enough = len(looks) + 3

@@ -140,7 +140,7 @@ def test_units_that_are_neither_are_refused():
 
 
 def test_no_row_depends_on_the_units(sweep):
-    """The same designs in other units are the same run."""
+    """Designs written in other units are the same run."""
     shown, plain = (load("feet.yaml", [f"units={units}"]).resolved() for units in ("us", "si"))
     assert shown != plain
     assert settings_sha256(shown) == settings_sha256(plain)

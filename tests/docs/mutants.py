@@ -55,24 +55,24 @@ PRELOADED = [
 Threads do not survive a fork. None of these starts one, but for the allocator of pyarrow, which does so anew.
 """
 OPTIONS = ("-x", "-v", "-p", "no:cacheprovider", "--strict-markers", "--import-mode=importlib", "-m", "not nightly")
-"""Of the runs; those of ``pyproject.toml`` do not count, and no plugin is loaded."""
+"""Options of the runs; the options in ``pyproject.toml`` do not count, and no plugin is loaded."""
 BROKEN_RUN = 70
 """Exit code of a run that pytest did not bring to an end, which none of its own codes is."""
 
 
 class Outcome(NamedTuple):
-    """What became of a run."""
+    """Outcome of one run of the tests."""
 
     code: int
-    """That of pytest, `BROKEN_RUN`, or minus the number of the signal that ended the process."""
+    """Exit code of pytest, `BROKEN_RUN`, or minus the number of the signal that ended the process."""
     output: str
 
 
 def copy_sources(folder: Path) -> None:
     """Copy what tests of the register need.
 
-    Bytecode is kept for the runs, and is valid by a hash of its source: by time and size it would also be taken for
-    that of a source in which a sign was changed within the same second.
+    Bytecode is kept for the runs, and is valid by a hash of its source: by time and size it would also pass for a
+    source in which a sign was changed within the same second.
     """
     for name in COPIED:
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
@@ -94,7 +94,7 @@ def broken(folder: Path, mutation: Mutation) -> Iterator[None]:
 
 
 def run_tests(folder: Path, tests: Sequence[str], *, compiled: bool) -> Outcome:
-    """Run tests of a copy, with the compiled kernels of the original, or without the compiler, with those of the copy.
+    """Run tests of a copy: with the compiled kernels of the original, or with its own kernels and no compiler.
 
     To compile them anew takes longer than the tests do.
     """

@@ -88,7 +88,7 @@ MUTATIONS = (
     Mutation((107,), _GROUND, "/ math.cos(slope))", ")"),
     Mutation((108,), _PIECES, "n, m, p = Ka - piece.P_1, Ka + piece.P_1", "n, m, p = Ka + piece.P_1, Ka + piece.P_1"),
     Mutation((108,), _PIECES, "n * r.three - KS * r.four + times(p, r.two)", "n * r.three - KS * r.four"),
-    Mutation((108,), _PIECES, "Released(times(share, logarithm)", "Released(-times(share, logarithm)"),
+    Mutation((108,), _PIECES, "ReleasedEnergy(times(share, logarithm)", "ReleasedEnergy(-times(share, logarithm)"),
     Mutation(
         (108,), _PIECES, "s.U_0 + (w_0 * (P_0 * i.one + P_1 * i.two)", "s.U_0 + (w_0 * (P_0 * i.one + P_1 * i.one)"
     ),

@@ -1,9 +1,10 @@
-"""Public text is short and plain: README, documentation, contributing guide and the top of the changelog."""
+"""Public text is short and plain: README, documentation, contributing guide and changelog; so are words in code."""
 
 from __future__ import annotations
 
+import ast
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -102,3 +103,50 @@ def test_a_banned_pattern_is_seen(text: str, better: str) -> None:
 )
 def test_it_is_short(what: str, words: Callable[[], list[object]], most: int) -> None:
     assert len(words()) <= most, what
+
+
+LEAST_WORDS = 4
+"""Words of a docstring; what a name says already needs no docstring."""
+CODE_PATTERN = r"\b(that|those|as)\s+of\b"
+
+
+def texts(source: str) -> Iterator[tuple[int, str, bool]]:
+    """Yield the line, the text and whether it is a docstring, of every string in a module."""
+    tree = ast.parse(source)
+    alone = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield node.lineno, node.value, id(node) in alone
+
+
+def faults(source: str) -> list[tuple[int, str]]:
+    """Return the line and the words of each string that has a banned pattern or is a docstring of too few words."""
+    return [
+        (line, text)
+        for line, text, is_docstring in texts(source)
+        if re.search(CODE_PATTERN, text, re.IGNORECASE) or (is_docstring and len(text.split()) < LEAST_WORDS)
+    ]
+
+
+@pytest.mark.parametrize("package", ["boulder_sweep", "kernels"])
+def test_words_in_code_are_plain(package: str) -> None:
+    files = {file: faults(file.read_text(encoding="utf-8")) for file in sorted((ROOT / package).rglob("*.py"))}
+    assert len(files) > 20
+    assert {file.relative_to(ROOT).as_posix(): found for file, found in files.items() if found} == {}
+
+
+@pytest.mark.parametrize(
+    ("source", "count"),
+    [
+        ("def f():\n    '''Return the slope of it.'''\n", 0),
+        ("X = 1\n'''Mass of the boulder.'''\n", 0),
+        ("def f():\n    '''Add rows.'''\n", 1),
+        ("X = 1\n'''Its mass [kg].'''\n", 1),
+        ("X = '''the angle and\nthat\nof the slope'''\n", 1),
+        ("def f():\n    '''Compare the speeds with those of a car.'''\n", 1),
+        ("def f(x):\n    '''As of `g`, with other units.'''\n    return f'as of {x}'\n", 2),
+        ("X = 'short'  # that of a comment\n", 0),
+    ],
+)
+def test_a_fault_in_code_is_seen(source: str, count: int) -> None:
+    assert len(faults(source)) == count

@@ -1,7 +1,7 @@
 """A process that runs a sweep, for tests that do things to processes.
 
-It prints a line for every progress report and at last the summary or the problem as JSON; its exit code is that
-of the command line. Run as ``python -m tests.faults.driver OUT [options]`` from the root of the repository.
+It prints a line for every progress report and at last the summary or the problem as JSON; it has the
+exit code of the command line. Run as ``python -m tests.faults.driver OUT [options]`` from the root of the repository.
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ class Bar:
         return len(list(self._folder.glob("begun-*")))
 
     def waiting(self) -> int:
-        """How many of them wait, those of killed workers included."""
+        """Return how many wait, killed workers included."""
         return len(list(self._folder.glob("waiting-*")))
 
     def wait_for(self, blocks: int) -> None:
@@ -83,7 +83,7 @@ def _pass(folder: Path, highest: float) -> None:
 
 
 def never_ends(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
-    """Tell that the first designs are computed, those of the sample, and go on doing so."""
+    """Tell that the first designs, the sample, are computed, and go on doing so."""
     if control.horizon > control.h:
         (Path(os.environ[BAR]) / f"waiting-{uuid.uuid4().hex}").touch()
         wait_until(lambda: False, "the process is ended")
@@ -103,7 +103,7 @@ def poisoned(table: DesignTable) -> bool:
 
 
 def ends_its_worker(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
-    """Die of a design, as of a crash in compiled code."""
+    """Die of a design, like a crash in compiled code."""
     if poisoned(table) and os.getpid() != int(os.environ[MAIN_PROCESS]):
         os.kill(os.getpid(), signal.SIGKILL)
     return plausible(table, readings, control)

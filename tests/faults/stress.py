@@ -200,7 +200,7 @@ def _disturb(cluster: Cluster, kind: str) -> None:
 
 
 def main() -> None:
-    """Disturb as many runs as asked for and print what came of it."""
+    """Disturb as many runs as asked for and print the outcome."""
     kind, folder, runs, seed = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])
     chance = random.Random(seed)
     run(grid_of(ROWS), folder / "whole", simulate=plausible)

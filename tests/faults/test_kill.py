@@ -1,4 +1,4 @@
-"""Kills, failing stores, dying workers and damage, each again and again: the table is that of an undisturbed run."""
+"""Kills, failing stores, dying workers and damage, each again and again: the table equals an undisturbed run's."""
 
 from __future__ import annotations
 

@@ -208,7 +208,7 @@ def test_a_wider_foot_holds_better_than_a_wider_top(tmp_path):
 
 
 def test_the_law_that_depends_on_the_width_takes_the_local_one():
-    """Slice by slice: pressures are to each other as those of boxes as wide as the taper is there."""
+    """Slice by slice, pressures have the ratio that boxes as wide as the taper there would have."""
     designs, shape = plain_designs().table, tapered(0.5)
     found = with_soil(designs, "width_capped", Ground(), shape=shape).layers[0]
     assert len(found) == SLICES
@@ -246,7 +246,7 @@ def test_a_small_foot_is_never_a_pass(tmp_path):
 
 
 def test_a_weighed_boulder_with_a_profile_is_decided(tmp_path):
-    """Its mass over that of a box of its rock is a column, and no box has to stand for it."""
+    """A column holds its mass over the mass of its box, and no box has to stand for it."""
     sweep = shaped(tmp_path, "taper: 0.8\n  mass: 18 t", "vehicle.speed=25 mph")
     row = table_of(sweep, tmp_path / "table").iloc[0]
     assert row.solidity == pytest.approx(18000 / (2596 * 1.65 * 1.68 * 3.44), rel=1e-9)
@@ -264,7 +264,7 @@ def test_answers_take_profiles_and_give_their_mass(tmp_path):
 
 
 def test_side_views_show_the_shape(tmp_path):
-    """Corners of the boulder at first touch are those of the profile, where it is struck at x = 0."""
+    """At first touch the boulder has the corners of the profile, struck at x = 0."""
     from boulder_sweep.views.scene import SideView
 
     sweep = shaped(tmp_path, f"profile: {LEANING}")

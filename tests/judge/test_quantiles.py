@@ -163,7 +163,7 @@ def test_need_never_answers_a_depth_that_fails_in_one_of_the_soils(tmp_path: Pat
 
 
 def test_axes_of_means_and_correlated_inputs() -> None:
-    """Every mean of an axis has its own quantile; a correlation has no part in those of single inputs."""
+    """Every mean of an axis has its own quantile; a correlation has no part in the quantiles of single inputs."""
     alone = ["soil.friction_angle={mean: [36, 40] deg, sd: 2 deg}", "soil.correlation=0.3"]
     taken = at_values(load(SITE, alone))
     (axis,) = taken.axes

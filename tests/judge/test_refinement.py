@@ -329,7 +329,7 @@ ISLAND = {
 def test_a_boulder_that_a_slower_truck_overturns_fails() -> None:
     row = BALANCED.judged(plain_designs(**ISLAND)).row(0)
     assert (row["verdict"], row["reason"]) == ("fail", "slower_truck")
-    # What is reported of the motion is that of its own truck, and nothing of it is a reserve.
+    # The motion reported is the one with its own truck, and nothing of it is a reserve.
     assert row["max_rotation_deg"] == pytest.approx(18.62, abs=0.01)
     assert row["margin"] is None
     assert row["rating"] is None

@@ -210,7 +210,7 @@ def test_where_second_opinions_know_nothing_a_pass_is_open(override: str) -> Non
 
 
 def test_another_law_of_the_file_keeps_its_second_opinions() -> None:
-    """The factor on the resistance is that of the law asked for, whatever the law of the file."""
+    """The soil model asked for gives the factor on the resistance, whatever the file says."""
     sweep = grid()
     weaker = replace(sweep, model=replace(sweep.model, resistance="broms"))
     _, ours = evaluated(sweep, *SECOND_OPINIONS)

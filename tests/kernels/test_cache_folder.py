@@ -22,7 +22,7 @@ OTHER_USER = 65534
 
 @pytest.fixture
 def place() -> Iterator[Path]:
-    """A folder of this user in the shared temporary folder; that of pytest is not open to other users."""
+    """A folder of this user in the shared temporary folder; pytest's is not open to other users."""
     folder = Path(tempfile.mkdtemp(prefix="test-cache-"))
     folder.chmod(0o755)
     yield folder
@@ -119,7 +119,7 @@ print(sine_versine(0.0)[0], _cache.CACHE_FOLDER)
 """
 
 
-class Planted:
+class FileMaker:
     """Makes a file when it is unpickled."""
 
     def __init__(self, file: Path):
@@ -148,7 +148,7 @@ def test_what_others_have_planted_does_not_run(place: Path) -> None:
     (place / "tiny.py").write_text(TINY)
     assert run_tiny(place).stdout.startswith("0.0 ")
     (index,) = (place / "cache").rglob("*.nbi")
-    content = pickle.dumps(Planted(place / "has-run"))
+    content = pickle.dumps(FileMaker(place / "has-run"))
 
     def has_run() -> bool:
         """Whether what is planted runs; the kernel must give the right number in any case."""

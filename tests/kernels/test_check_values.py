@@ -21,7 +21,7 @@ OF_ELEMENTS = 6e-4
 """Rotation of RWG with the printed arm at N = 20 000 less that in the limit [deg]."""
 
 
-class Known(NamedTuple):
+class CheckValue(NamedTuple):
     """What is known of one impact."""
 
     case: str
@@ -35,10 +35,10 @@ class Known(NamedTuple):
 
 
 CRASH_TESTS = [
-    Known("ABG", "as_printed", 114.258, 0.389, 1.6555, 2.0859, 776.55, 0.0795),
-    Known("ABG", "corrected", 157.742, 0.407, 1.4096, 3.5016, 855.44, 0.0769),
-    Known("RWG", "as_printed", 7.6946, 0.2369, 0.1505, 0.9209, 1079.79, np.nan),
-    Known("RWG", "corrected", 13.7612, 0.3039, 0.2820, 1.3243, 1027.73, np.nan),
+    CheckValue("ABG", "as_printed", 114.258, 0.389, 1.6555, 2.0859, 776.55, 0.0795),
+    CheckValue("ABG", "corrected", 157.742, 0.407, 1.4096, 3.5016, 855.44, 0.0769),
+    CheckValue("RWG", "as_printed", 7.6946, 0.2369, 0.1505, 0.9209, 1079.79, np.nan),
+    CheckValue("RWG", "corrected", 13.7612, 0.3039, 0.2820, 1.3243, 1027.73, np.nan),
 ]
 SINGLE_READINGS = {
     # largest rotation of RWG [deg] where one reading differs from the preset
@@ -72,7 +72,7 @@ def simulate(case: str, readings: bk.Readings, elements: int = 0, h: float = 1e-
     return bk.simulate_design(design, readings, control(h, 0.5, np.radians(20.0), elements), bk.no_record())
 
 
-def check(known: Known, found: bk.Outcome, of_elements: float) -> None:
+def check(known: CheckValue, found: bk.Outcome, of_elements: float) -> None:
     m = found.maxima
     assert np.degrees(m.theta) == pytest.approx(known.rotation_deg, abs=6e-4 + of_elements)
     assert m.t_theta == pytest.approx(known.at_s, abs=6e-4)
@@ -82,12 +82,12 @@ def check(known: Known, found: bk.Outcome, of_elements: float) -> None:
     assert found.t_limit == pytest.approx(known.twenty_degrees_s, abs=6e-5, nan_ok=True)
 
 
-def name_of(known: Known) -> str:
+def name_of(known: CheckValue) -> str:
     return f"{known.case} {known.preset}"
 
 
 @pytest.mark.parametrize("known", CRASH_TESTS, ids=name_of)
-def test_crash_tests_in_closed_form(known: Known) -> None:
+def test_crash_tests_in_closed_form(known: CheckValue) -> None:
     found = simulate(known.case, PRESETS[known.preset])
     check(known, found, OF_ELEMENTS if known.preset == "as_printed" else 0.0)
     assert found.maxima.t_x_b <= found.t_end == 0.5
@@ -98,7 +98,7 @@ def test_crash_tests_in_closed_form(known: Known) -> None:
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("known", CRASH_TESTS, ids=name_of)
-def test_crash_tests_by_element_sums(known: Known) -> None:
+def test_crash_tests_by_element_sums(known: CheckValue) -> None:
     check(known, simulate(known.case, PRESETS[known.preset], N), 0.0)
 
 

@@ -195,7 +195,7 @@ print(json.dumps(found))
 
 
 def test_a_wrong_soil_law_does_not_balance() -> None:
-    """No entry is what the others leave over: forces that are not those of the ledger's laws show in the balance.
+    """No entry is what the others leave over: forces that break the ledger's laws show in the balance.
 
     Springs 1 % too stiff, drag 10 % too strong, and springs that give back half of what they took.
     """

@@ -52,12 +52,12 @@ CORRECTED = bk.corrected()
 
 
 def test_the_weights_are_those_of_scipy() -> None:
-    """SciPy's are the fourth-order weights less those of fifth order."""
+    """SciPy has the fourth-order weights less the fifth-order weights."""
     assert np.allclose(ERROR, -RK45.E, rtol=1e-15, atol=0.0)
 
 
 @dataclass(frozen=True)
-class Ended:
+class EndOfMotion:
     """How a motion ended, where it does not matter more."""
 
     status: Status = Status.SETTLED
@@ -72,7 +72,7 @@ DESIGN = design_of(oracle.RWG)._replace(L=1.0, H=3.0, d=1.6, m_v=6800.0, k_v=3e6
 ARM = 1.6
 
 
-def errors(ended: Ended, **changed: float) -> tuple[float, float, int]:
+def errors(ended: EndOfMotion, **changed: float) -> tuple[float, float, int]:
     m = no_maxima()._replace(theta=ended.theta, x_b=0.2)
     o = bk.Outcome(ended.status, m, np.nan, ended.t_end, 100, ended.moved, ended.omega_b, ended.changes)
     return step_errors(o, DESIGN._replace(**changed), LIMIT, 2.0)
@@ -81,16 +81,16 @@ def errors(ended: Ended, **changed: float) -> tuple[float, float, int]:
 @pytest.mark.parametrize(
     ("ended", "changed", "factor"),
     [
-        (Ended(), {}, 1.0),
-        (Ended(changes=3.0), {}, 1.0),
-        (Ended(t_end=1.0), {}, LONG_MOTION),
-        (Ended(t_end=0.6), {}, LONG_MOTION),
-        (Ended(t_end=0.49), {"H": 4.0}, 1.0),
-        (Ended(), {"m_v": 15e3}, 1.0),
-        (Ended(changes=1.0), {"m_v": 15e3}, LONG_MOTION),
+        (EndOfMotion(), {}, 1.0),
+        (EndOfMotion(changes=3.0), {}, 1.0),
+        (EndOfMotion(t_end=1.0), {}, LONG_MOTION),
+        (EndOfMotion(t_end=0.6), {}, LONG_MOTION),
+        (EndOfMotion(t_end=0.49), {"H": 4.0}, 1.0),
+        (EndOfMotion(), {"m_v": 15e3}, 1.0),
+        (EndOfMotion(changes=1.0), {"m_v": 15e3}, LONG_MOTION),
     ],
 )
-def test_a_long_motion_has_a_larger_error(ended: Ended, changed: dict[str, float], factor: float) -> None:
+def test_a_long_motion_has_a_larger_error(ended: EndOfMotion, changed: dict[str, float], factor: float) -> None:
     theta, x, _ = errors(ended, **changed)
     assert x == pytest.approx(factor * 1e-6)
     assert theta == pytest.approx(factor * 1e-6 / max(ARM, 0.5 * changed.get("H", 3.0)))
@@ -98,13 +98,13 @@ def test_a_long_motion_has_a_larger_error(ended: Ended, changed: dict[str, float
 
 @pytest.mark.parametrize(("changes", "factor"), [(0.0, AT_LIMIT), (1.0, AT_LIMIT_AFTER_CHANGES)])
 def test_at_the_limit_the_time_is_uncertain_too(changes: float, factor: float) -> None:
-    theta, x, _ = errors(Ended(Status.LIMIT, theta=LIMIT, omega_b=-2.0, changes=changes))
+    theta, x, _ = errors(EndOfMotion(Status.LIMIT, theta=LIMIT, omega_b=-2.0, changes=changes))
     assert theta == 0.0
     assert x == pytest.approx(factor * 1e-6 * (1.0 + 13.0 / (2.0 * ARM)))
 
 
 def test_a_boulder_that_hardly_turns_has_no_large_error_of_its_rotation() -> None:
-    assert errors(Ended(theta=1e-9, moved=1.0))[0] == LEAST_ROTATION
+    assert errors(EndOfMotion(theta=1e-9, moved=1.0))[0] == LEAST_ROTATION
 
 
 def test_a_boulder_that_rocks_has_a_least_error_of_its_rotation() -> None:
@@ -114,60 +114,60 @@ def test_a_boulder_that_rocks_has_a_least_error_of_its_rotation() -> None:
         (Status.SETTLED, float(ROCKING), 1e-12 / ARM),
         (Status.LIMIT, ROCKING + 1.0, 0.0),
     ):
-        assert errors(Ended(status, moved=1e-12, changes=changes))[0] == pytest.approx(expected, rel=1e-12)
+        assert errors(EndOfMotion(status, moved=1e-12, changes=changes))[0] == pytest.approx(expected, rel=1e-12)
 
 
 def test_a_boulder_that_chatters_has_an_error_of_a_fraction() -> None:
-    theta, x, _ = errors(Ended(changes=CHATTERING + 1.0))
+    theta, x, _ = errors(EndOfMotion(changes=CHATTERING + 1.0))
     assert (theta, x) == (pytest.approx(CHATTERING_THETA * 0.1), pytest.approx(CHATTERING_X * 0.2))
-    theta, x, _ = errors(Ended(Status.LIMIT, t_end=1.5, changes=CHATTERING + 1.0))
+    theta, x, _ = errors(EndOfMotion(Status.LIMIT, t_end=1.5, changes=CHATTERING + 1.0))
     assert (theta, x) == (0.0, pytest.approx(CHATTERING_T * 13.0 * 1.5))
 
 
 @pytest.mark.parametrize(
     ("ended", "changed"),
     [
-        (Ended(changes=ROCKING + 1.0), {}),
-        (Ended(t_end=1.1), {"H": 3.9}),
-        (Ended(changes=1.0), {"H": 3.9}),
-        (Ended(t_end=1.1), {"L": 2.2}),
-        (Ended(changes=1.0), {"L": 2.2}),
-        (Ended(changes=1.0), {"m_v": 15e3}),
-        (Ended(Status.LIMIT), {"H": 5.5}),
-        (Ended(), {"m_v": 40e3}),
-        (Ended(Status.LIMIT, changes=1.0), {"m_v": 40e3}),
-        (Ended(theta=np.radians(15.0), moved=2e-3), {}),
-        (Ended(Status.LIMIT, omega_b=0.05), {}),
+        (EndOfMotion(changes=ROCKING + 1.0), {}),
+        (EndOfMotion(t_end=1.1), {"H": 3.9}),
+        (EndOfMotion(changes=1.0), {"H": 3.9}),
+        (EndOfMotion(t_end=1.1), {"L": 2.2}),
+        (EndOfMotion(changes=1.0), {"L": 2.2}),
+        (EndOfMotion(changes=1.0), {"m_v": 15e3}),
+        (EndOfMotion(Status.LIMIT), {"H": 5.5}),
+        (EndOfMotion(), {"m_v": 40e3}),
+        (EndOfMotion(Status.LIMIT, changes=1.0), {"m_v": 40e3}),
+        (EndOfMotion(theta=np.radians(15.0), moved=2e-3), {}),
+        (EndOfMotion(Status.LIMIT, omega_b=0.05), {}),
     ],
 )
-def test_what_needs_a_finer_solution(ended: Ended, changed: dict[str, float]) -> None:
+def test_what_needs_a_finer_solution(ended: EndOfMotion, changed: dict[str, float]) -> None:
     assert errors(ended, **changed)[2] == FINER
 
 
 def test_what_needs_a_coarser_one() -> None:
-    assert errors(Ended(theta=np.radians(19.1)))[2] == COARSER
-    assert errors(Ended(t_end=2.1, changes=ROCKING + 1.0))[2] == PAIR
+    assert errors(EndOfMotion(theta=np.radians(19.1)))[2] == COARSER
+    assert errors(EndOfMotion(t_end=2.1, changes=ROCKING + 1.0))[2] == PAIR
 
 
 @pytest.mark.parametrize(
     ("ended", "changed"),
     [
-        (Ended(), {}),
-        (Ended(changes=float(ROCKING)), {}),
-        (Ended(t_end=1.1), {}),
-        (Ended(t_end=0.9), {"H": 3.9}),
-        (Ended(t_end=0.9), {"L": 2.2}),
-        (Ended(t_end=1.1), {"L": 2.0}),
-        (Ended(changes=1.0), {"L": 2.0}),
-        (Ended(t_end=0.9), {"m_v": 15e3}),
-        (Ended(Status.LIMIT), {}),
-        (Ended(Status.LIMIT, changes=1.0), {"L": 2.2}),
-        (Ended(Status.LIMIT, changes=1.0), {"m_v": 15e3}),
-        (Ended(Status.LIMIT), {"m_v": 40e3}),
-        (Ended(theta=np.radians(18.9)), {}),
+        (EndOfMotion(), {}),
+        (EndOfMotion(changes=float(ROCKING)), {}),
+        (EndOfMotion(t_end=1.1), {}),
+        (EndOfMotion(t_end=0.9), {"H": 3.9}),
+        (EndOfMotion(t_end=0.9), {"L": 2.2}),
+        (EndOfMotion(t_end=1.1), {"L": 2.0}),
+        (EndOfMotion(changes=1.0), {"L": 2.0}),
+        (EndOfMotion(t_end=0.9), {"m_v": 15e3}),
+        (EndOfMotion(Status.LIMIT), {}),
+        (EndOfMotion(Status.LIMIT, changes=1.0), {"L": 2.2}),
+        (EndOfMotion(Status.LIMIT, changes=1.0), {"m_v": 15e3}),
+        (EndOfMotion(Status.LIMIT), {"m_v": 40e3}),
+        (EndOfMotion(theta=np.radians(18.9)), {}),
     ],
 )
-def test_what_needs_none(ended: Ended, changed: dict[str, float]) -> None:
+def test_what_needs_none(ended: EndOfMotion, changed: dict[str, float]) -> None:
     assert errors(ended, **changed)[2] == NONE_NEEDED
 
 

@@ -46,7 +46,7 @@ for elements in (0, 50):
 
 
 def sums(count: int) -> tuple[float, ...]:
-    """Force and moment of one design by so many elements of a uniform soil, and by those of a soil in layers."""
+    """Return force and moment of one design by so many elements, of a uniform soil and of a soil in layers."""
     design = random_designs(1, seed=31)[0]
     profile = profile_of(uniform_layers(design), count)
     fill_soil(design, profile)

@@ -78,7 +78,7 @@ def test_many_lanes_are_impacts_alone(readings: bk.Readings, h: float) -> None:
 
 @pytest.mark.parametrize("n", [0, 1, 2, LANES - 1, LANES, LANES + 1, 3 * LANES + 5])
 def test_any_number_of_rows(n: int) -> None:
-    """Rows of a table are those of a longer one: what follows in the lanes, or that nothing does, leaves no trace."""
+    """Rows equal the rows of a longer table: what follows in the lanes, or that nothing does, leaves no trace."""
     table = table_of(random_designs(3 * LANES + 5, seed=123))
     whole = bk.simulate_table(table, bk.corrected(), HOW)
     assert_same(bk.simulate_table(rows_of(table, slice(n)), bk.corrected(), HOW), whole, slice(n))

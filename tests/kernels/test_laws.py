@@ -63,7 +63,7 @@ def in_other_units(design: Design, length: float, density: float) -> Design:
 @pytest.mark.parametrize(("length", "density"), [(4.0, 1.0), (1.0, 1e3), (0.01, 7.0), (1 / 0.3048, 0.0624)])
 @pytest.mark.parametrize("readings", [bk.as_printed(), bk.corrected()], ids=["as_printed", "corrected"])
 def test_other_units_give_the_same_motion(readings: bk.Readings, length: float, density: float) -> None:
-    """The same rotation, displacements and times in the new units, force in the new unit, and the same status."""
+    """Expect equal rotation and status; displacements, times and force in the new units."""
     time, force = np.sqrt(length), density * length**3 * length / length
     for design in random_designs(10, seed=101):
         here = bk.simulate_design(design, readings, control(1e-3, 0.5, LIMIT, stop_at_limit=True), bk.no_record())

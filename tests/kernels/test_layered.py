@@ -53,7 +53,7 @@ def in_layers(design: bk.Design, elements: int, layers: np.ndarray | None = None
 
 @pytest.mark.parametrize("elements", [0, N])
 def test_one_layer_is_the_uniform_soil(elements: int) -> None:
-    """Masses, forces, moments, energy with its slopes and the power of the drag are those of the paper's soil."""
+    """Masses, forces, moments, energy with its slopes and the power of the drag equal the paper's soil."""
     rng = np.random.default_rng(5)
     for design in DESIGNS:
         c, uniform = in_layers(design, elements), constants_of(design, READINGS, elements)

@@ -112,7 +112,7 @@ def gravity_starts() -> dict[str, tuple[Start, float, set[int]]]:
 
 
 def printed_starts() -> dict[str, tuple[Start, float, set[int]]]:
-    """The same under the printed restoring rule."""
+    """Return starts under the printed restoring rule."""
     readings = bk.as_printed()
     c = constants_of(RWG, readings, 0)
     c = c._replace(**LINEAR_SOIL, K_soil=c.K_soil / 20)

@@ -227,7 +227,7 @@ def test_what_is_pressed_in_does_not_depend_on_where_steps_end() -> None:
 
 
 def test_a_step_ends_where_a_strip_that_is_pressed_in_comes_back() -> None:
-    """The step is cut at the greatest depth of the first strip, and what is pressed in is that of the interpolant."""
+    """The step is cut at the greatest depth of the first strip, and the interpolant gives what is pressed in."""
     f = heave_constants(RWG, constants_of(RWG, bk.corrected(), 0), BOTH, BASE, 1)
     work, h = np.zeros(WORKSPACE), 4e-3
     prepare(work, f)
@@ -410,7 +410,7 @@ def test_the_proof_counts_all_energy_and_waits_for_the_truck() -> None:
 
 
 def shallow(design: bk.Design) -> bk.Design:
-    """The same boulder, embedded by a sixth of its height: turned, it sinks by more than its embedment."""
+    """Return a boulder embedded by a sixth of its height: turned, it sinks by more than its embedment."""
     return design._replace(d=design.H / 6, e=(min(design.H * 5 / 6, 1.4) + design.e_bumper) / 2)
 
 

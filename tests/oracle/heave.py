@@ -355,7 +355,7 @@ def energy(body: Body, q: Array, rates: Array, sets: Array) -> float:
 
 @dataclass(frozen=True)
 class HeaveImpact:
-    """What became of an impact: largest rotation [rad], displacement, rise and way of the truck [m], when the rotation
+    """Outcome of an impact: largest rotation [rad], displacement, rise and way of the truck [m], when the rotation
     reached its limit [s] (infinity for never), the last state, what the base is pressed in for good [m], and how often
     the truck came off or touched again."""
 
@@ -403,7 +403,7 @@ class _Run:
         return np.concatenate((rates, accelerations(self.body, q, rates, forces), [state[7], a_v, third]))
 
     def gap(self, state: Array) -> float:
-        """Way of the truck less that of the point struck [m]."""
+        """Way of the truck less the way of the point struck [m]."""
         c = self.body.constants
         return float(state[6] - state[0] - c.R_v * (sin(c.gamma_v + state[1]) - sin(c.gamma_v)))
 

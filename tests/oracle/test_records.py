@@ -44,9 +44,9 @@ def chosen(count: int) -> list[dict[str, Any]]:
 def differences(again: Impact, known: Summary, *, over_kinks: bool) -> dict[str, tuple[object, object]]:
     """What is not the same on any processor: values to a part in 10^9, instants of flat maxima to a microsecond.
 
-    The last digits of sines and sums are those of a processor's libraries, and decide where steps lie. Where steps go
+    The last digits of sines and sums depend on a processor's libraries, and decide where steps lie. Where steps go
     over kinks, which costs accuracy, the values of two processors differ by up to 10^-5. Of equal maxima of the crush,
-    as of a stiff vehicle that rings, they decide which one is found: then the impact has the known value at that
+    where a stiff vehicle rings, they decide which one is found: then the impact has the known value at that
     instant as well.
     """
     value, instant = (3e-5, 1e-5) if over_kinks else (1e-9, 1e-6)
@@ -66,7 +66,7 @@ def differences(again: Impact, known: Summary, *, over_kinks: bool) -> dict[str,
 
 
 def crush(impact: Impact, t: float) -> float:
-    """Displacement of the vehicle less that of the point struck [m] at a time [s]."""
+    """Displacement of the vehicle less the displacement of the point struck [m] at a time [s]."""
     y = impact.states(t)[:, 0]
     return float(y[4]) - contact_displacement(impact.problem, y)
 

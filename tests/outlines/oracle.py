@@ -80,8 +80,8 @@ def body(stone: Stone, i: Inputs, elements: int = ELEMENTS) -> Body:
     )  # fmt: skip
 
 
-class Found(NamedTuple):
-    """Largest values of an impact, and the energy that is not accounted for over that of the truck."""
+class ImpactResult(NamedTuple):
+    """Largest values of an impact, and the energy that is not accounted for as a share of the truck's."""
 
     rotation: float
     displacement: float
@@ -90,7 +90,7 @@ class Found(NamedTuple):
     imbalance: float
 
 
-def simulate(stone: Stone, i: Inputs, horizon: float, elements: int = ELEMENTS, rtol: float = 1e-9) -> Found:
+def simulate(stone: Stone, i: Inputs, horizon: float, elements: int = ELEMENTS, rtol: float = 1e-9) -> ImpactResult:
     """Integrate an impact up to the horizon [s]."""
     b = body(stone, i, elements)
     m = b.m_b + b.M_soil
@@ -173,4 +173,4 @@ def simulate(stone: Stone, i: Inputs, horizon: float, elements: int = ELEMENTS, 
             side = (1 if loads(y)[1] > 0 else -1) if side == 0 else -side
             y[2] = 0.0
     before = i.m_v * i.v_0**2 / 2
-    return Found(*peaks, imbalance=abs(energy(y) + y[6] + y[7] - before) / before)
+    return ImpactResult(*peaks, imbalance=abs(energy(y) + y[6] + y[7] - before) / before)

@@ -15,7 +15,7 @@ def box(design: bk.Design) -> np.ndarray:
 
 
 def taper(design: bk.Design, foot: float = 1.3, top: float = 0.7) -> np.ndarray:
-    """Sides of foot and top over those of the design."""
+    """Return the outline of a taper; sides of foot and top as ratios of the design's sides."""
     return box(design) * np.array([[1.0, foot, foot, foot], [1.0, top, top, top]])
 
 

@@ -154,7 +154,7 @@ def test_a_taper_is_solved_once_for_its_error() -> None:
 @pytest.mark.compiled
 @pytest.mark.parametrize(("share", "count"), [pytest.param(0.6, 3000, marks=pytest.mark.nightly), (0.8, 1500)])
 def test_the_error_of_one_solve_covers_what_is_wrong(share: float, count: int) -> None:
-    """As of boxes: 99.9 % of the rotations, of boulders that stay upright; fewer of them do on a narrow foot."""
+    """It covers 99.9 % of the rotations of boulders that stay upright, like boxes; fewer stay so on a narrow foot."""
     designs = random_designs(count, seed=197)
     how = control(12e-3, 1.0, np.radians(20.0), stop_at_limit=True)._replace(error_estimate=True)
     for shape in (lambda design: taper(design, 1.0, share), lambda design: taper(design, share, 1.0)):

@@ -61,7 +61,7 @@ def report(result):
     return write_report(result, result.with_name("report.html"), command="sweep report sizing.sweep")
 
 
-class Opened:
+class OpenPage:
     """A page that was opened from disk, and what it said and asked for meanwhile."""
 
     def __init__(self, browser, file, before="", **options):
@@ -103,7 +103,7 @@ def opened(chromium):
     pages = []
 
     def opened(file, **options):
-        pages.append(Opened(chromium, file, **options))
+        pages.append(OpenPage(chromium, file, **options))
         return pages[-1]
 
     yield opened

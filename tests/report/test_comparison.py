@@ -139,5 +139,5 @@ def test_values_in_common_and_no_combination(made):
         made(SETS),
         made(SETS.replace("32 deg", "0 deg").replace("42 deg", "32 deg").replace("0 deg", "42 deg")),
     )
-    with pytest.raises(ReportError, match="every single value occurs in both, but no combination does"):
+    with pytest.raises(ReportError, match="every single value occurs in both, but no design does"):
         compare(one, other)

@@ -296,7 +296,7 @@ def answers(tmp_path_factory):
 
 
 def place_of_tried(name, column):
-    """Whether a column holds what was tried last in rows that have no answer, or what came of it."""
+    """Whether a column holds what was tried last in rows that have no answer, or its outcome."""
     built = ("height_above_ground_m", "excavated_m3", "backfill_m3")
     outcomes = {*OUTCOME_COLUMNS} - {"verdict", "reason"}
     return name == "need" and column in {"embedment_depth_m", "impact_height_m", *built, *outcomes}

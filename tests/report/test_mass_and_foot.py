@@ -1,4 +1,4 @@
-"""Boulders that were weighed, and rounded feet, in the page: verdicts and settings file are those of the command."""
+"""Boulders that were weighed, and rounded feet, in the page: verdicts and settings file equal the command's."""
 
 from pathlib import Path
 

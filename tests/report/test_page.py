@@ -280,7 +280,7 @@ def test_a_law_of_the_resistance_acts_in_the_simulator_and_is_copied(tmp_path, o
     assert found["max_rotation_deg"] == pytest.approx(theirs["max_rotation_deg"], rel=1e-9)
     assert found["verdict"] == theirs["verdict"] == "fail"
     assert f"resistance: {law}" in page.content()
-    assert f"Ultimate resistance of the soil: {LAW_WORDS[law]}" in page.inner_text("main")
+    assert f"Soil model: {LAW_WORDS[law]}" in page.inner_text("main")
 
 
 @pytest.mark.nightly

@@ -183,12 +183,12 @@ def test_a_pdf_has_todays_date_and_a_page_only_a_given_one(
     pages: list[str] = []
     monkeypatch.setattr(writing, "printed", lambda text: pages.append(text) or b"%PDF")
 
-    class Fixed(date):
+    class FixedDate(date):
         @classmethod
-        def today(cls) -> Fixed:
+        def today(cls) -> FixedDate:
             return cls(2031, 2, 3)
 
-    monkeypatch.setattr(writing, "date", Fixed)
+    monkeypatch.setattr(writing, "date", FixedDate)
     write_report(files["depth"], tmp_path / "page.pdf")
     write_report(files["depth"], tmp_path / "page.pdf", heading=HEADING)
     assert "<dt>date</dt><dd>2031-02-03</dd>" in pages[0]

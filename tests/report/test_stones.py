@@ -49,7 +49,7 @@ def check_design(page, sweep):
 
 
 def check_copied(page, sweep):
-    """Hold the settings file of the page against that of the design."""
+    """Hold the settings file of the page against the design's own."""
     copied = load_text(page.input_value("#yaml"), Path("copied.yaml"))
     assert copied.constants == pytest.approx(sweep.constants, rel=1e-5)
     points = [[(*point.values(),) for point in one.model.shape.as_list()] for one in (copied, sweep)]

@@ -10,7 +10,7 @@ import numpy as np
 
 GRAVITY = 9.80665
 NODE = 0.5 / sqrt(3.0)
-"""Gauss's rule with two points, 0.5 -+ NODE on 0 ... 1, is exact to the third degree, that of every integrand here."""
+"""Gauss's rule with two points, 0.5 -+ NODE on 0 ... 1, is exact to the third degree, as integrands here need."""
 CREEP = 1e-12
 """An angular velocity just over zero [rad/s]: what the literal equations arrive at when a turn back has ended."""
 

@@ -100,7 +100,7 @@ def test_a_call_returns_raises_and_is_left_at_a_signal():
         signals.call(lambda: pytest.fail("begun"))
 
 
-class Watched(Signals):
+class CountingSignals(Signals):
     """Tells how often somebody looked for a signal since one was caught."""
 
     looks, _caught = threading.Semaphore(0), None
@@ -117,7 +117,7 @@ class Watched(Signals):
 
 
 def test_a_call_waits_for_what_acts_on_signals_itself():
-    signals = Watched()
+    signals = CountingSignals()
     closed = []
 
     def orderly():

@@ -217,7 +217,7 @@ def test_what_makes_one_doubt_a_scan_is_a_note(site, tmp_path):
     points, polygons = prism(regular(8, 0.8), 2.0)
     (tmp_path / "rock.ply").write_bytes(ply(points + 20_000.0, polygons, real="f4"))
     (note,) = [note for note in load(path).notes if note.key == "boulder.scan"]
-    assert (note.line, "subtract a point near the stone" in note.message) == (2, True), note
+    assert (note.line, "subtract a point near the boulder" in note.message) == (2, True), note
     (tmp_path / "rock.ply").write_bytes(ply(points, polygons, real="f4"))
     assert not [note for note in load(path).notes if note.key == "boulder.scan"]
 
@@ -234,10 +234,10 @@ def test_a_unit(site, tmp_path):
         ("up: a, ", "", 9, "the scan lacks up"),
         ("up: a", "upp: a", 26, "'upp' is not a key of a scan .*; did you mean up"),
         ("facing: b", "facing: a", 9, "do not go together"),
-        ("facing: b", "facing: q", 9, "'q' is no end of a stone"),
+        ("facing: b", "facing: q", 9, "'q' is no end of a boulder"),
         ("rock.ply", "none.ply", 9, "none.ply: there is no such file"),
         ("facing: b", "facing: b, unit: kg", 9, "kg"),
-        ("  mass: 23.5 t\n", "", 3, "give the mass of the whole stone, or its density: one of them"),
+        ("  mass: 23.5 t\n", "", 3, "give the mass of the whole boulder, or its density: one of them"),
         ("mass: 23.5 t", "mass: 23.5 t\n  density: 2600 kg/m^3", 3, "one of them"),
         ("mass: 23.5 t", "mass: 23.5 t\n  height: 3 m", 3, "height follows from the scan; remove one of them"),
         ("mass: 23.5 t", "mass: [20 t, 23 t]", 9, "takes one value"),

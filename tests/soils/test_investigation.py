@@ -96,7 +96,7 @@ def test_relative_density_by_the_table_of_the_source(ratio, angle):
     ("angle", "pcf"), [(29.0, (95, 125)), (30.0, (95, 125)), (33.0, (110, 130)), (38.0, (110, 140)), (44.0, (110, 140))]
 )
 def test_densities_by_the_table_of_the_source(angle, pcf):
-    """The same table: moist unit weights of loose, medium and dense sand; of very dense sand those of dense one."""
+    """Moist unit weights of loose, medium and dense sand are the table's; very dense sand takes those for dense."""
     assert [density / 16.018463 for density in sand.densities(angle)] == pytest.approx(pcf, rel=1e-6)
 
 

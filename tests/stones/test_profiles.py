@@ -70,7 +70,7 @@ def test_what_is_enclosed_twice():
     crossing = dataclasses.replace(own, vertices=apart[0], faces=apart[1])
     assert doubled_share(own, UPRIGHT, np.array([0.3, 0.6])) == 0.0
     assert doubled_share(crossing, UPRIGHT, np.array([0.3, 0.6])) == pytest.approx(1.0 / 3.0)
-    with pytest.raises(ScanError, match=r"rock\.ply: the surface crosses itself: 33% of the stone"):
+    with pytest.raises(ScanError, match=r"rock\.ply: the surface crosses itself: 33% of the boulder"):
         Stone(crossing, "rock.ply")
 
 
@@ -251,7 +251,7 @@ def turned(points, seed):
 
 
 def shuffled(surface, seed):
-    """The same surface with its points, its faces and the corners of each in another order."""
+    """Return a surface with its points, its faces and the corners of each in another order."""
     points, faces = surface
     random = np.random.default_rng(seed)
     order = random.permutation(len(points))

@@ -148,7 +148,7 @@ def test_a_stone_of_two_meshes(file):
 def test_bodies_beside_the_stone(write, file, request):
     kind = request.node.callspec.id
     own = solid_of(read_scan(file(f"rock.{kind}", write(*crumbs(5)))))
-    assert own.repairs == ("5 bodies beside the stone left out",)
+    assert own.repairs == ("5 bodies beside the boulder left out",)
     assert own.volume == pytest.approx(4.8, rel=1e-6)
 
 
@@ -195,13 +195,13 @@ def test_coordinates_that_are_coarse(name, write, coarse, file):
     assert len(cautions) == coarse
     if coarse:
         assert cautions[0].startswith("the numbers in which it keeps its coordinates lie 62.5 mm apart, so far from")
-        assert cautions[0].endswith("subtract a point near the stone from all coordinates before you export them")
+        assert cautions[0].endswith("subtract a point near the boulder from all coordinates before you export them")
 
 
 def test_coordinates_too_coarse_for_a_stone(file):
     points, faces = sphere(1.0, 3)
     path = file("rock.ply", ply(points + 10.0 * MAP, faces, real="f4"))
-    with pytest.raises(ScanError, match=r"coordinates lie 500 mm apart, .*, too far for a stone; subtract a point"):
+    with pytest.raises(ScanError, match=r"coordinates lie 500 mm apart, .*, too far for a boulder; subtract a point"):
         scanned(path)
 
 
@@ -212,7 +212,7 @@ def test_a_node_far_from_the_origin_does_not_make_coordinates_coarse(file):
 
 
 MISREAD = r"\d+% of its surface was added to close holes: if the scan has no such"
-INTO_GROUND = r"\d+% of its volume lies over what was added to close it: what the stone has beyond, in the ground"
+INTO_GROUND = r"\d+% of its volume lies over what was added to close it: what the boulder has beyond, in the ground"
 
 
 @pytest.mark.parametrize(

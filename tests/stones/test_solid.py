@@ -108,7 +108,8 @@ def test_a_block_scanned_where_it_lies(sides, base, turn):
     assert (own.closed, own.base) == (0.0, pytest.approx(base, abs=5e-4))
     assert own.over == pytest.approx(1.0 / 6.0)
     assert (
-        own.repairs[0] == f"base closed by a flat lid, {100 * own.base:.2g} % of the surface, over 17 % of the volume"
+        own.repairs[0]
+        == f"underside closed by a flat lid, {100 * own.base:.2g} % of the surface, over 17 % of the volume"
     )
 
 
@@ -178,7 +179,7 @@ def test_holes_beside_a_base_are_counted_by_themselves():
     own, whole = solid((points, faces[(faces < 192).all(axis=1)])), solid((points, faces))
     assert own.volume == pytest.approx(whole.volume, rel=1e-12)
     assert own.closed == pytest.approx(0.36 * own.base, rel=1e-9)
-    assert [words.split(",")[0] for words in own.repairs] == ["base closed by a flat lid", "1 hole closed"]
+    assert [words.split(",")[0] for words in own.repairs] == ["underside closed by a flat lid", "1 hole closed"]
 
 
 def test_a_missing_triangle_is_no_base():
@@ -202,7 +203,7 @@ def test_crumbs_are_left_out():
     crumb = sphere(0.05, 1)
     both = np.concatenate([points, crumb[0] + 9.0]), np.concatenate([faces, crumb[1] + len(points)])
     own = solid(both)
-    assert own.repairs == ("1 body beside the stone left out",)
+    assert own.repairs == ("1 body beside the boulder left out",)
     assert own.volume == pytest.approx(solid((points, faces)).volume, rel=1e-12)
 
 

@@ -176,7 +176,7 @@ def _taken(out: Path, chance: Chance) -> tuple:
 
 
 def main() -> None:
-    """Damage as often as asked for, and print what came of it."""
+    """Damage as often as asked for, and print the outcome."""
     folder, damages, seed = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
     chance, kinds = random.Random(seed), list(DAMAGES)
     finished = finished_folder(folder / "whole")

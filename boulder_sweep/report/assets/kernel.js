@@ -42,7 +42,7 @@ class Kernel {
     this.layout = layout;
     this.soil = soil;
     this.exports._initialize();
-    /** Where the memory is free; the first two places are those of `call`. */
+    /** Where the memory is free; `call` takes the first two places. */
     this.base = Math.ceil(this.exports.__heap_base.value / 8) * 8;
   }
 

@@ -19,7 +19,7 @@
  */
 
 /**
- * One rectangle of a map; `names` are those of all designs that lie there, `name` is that of the worst, which is picked.
+ * One rectangle of a map; `names` has all designs that lie there, `name` the worst of them, which is picked.
  * @typedef {{x: number, y: number, name: string, margin?: number | null, pick: () => Record<string, number>,
  *   names?: string[], answer?: string}} Cell
  */

@@ -408,7 +408,7 @@ class Page {
     this.plots.write(LEAST_PX / this.shrunk);
   }
 
-  /** Put on the colours that the reader or the system wants; on paper those of the light. */
+  /** Put on the colours that the reader or the system wants; on paper the light ones. */
   paint() {
     const wanted = byId("theme").value || (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
     const dark = wanted === "dark" && !this.printing;

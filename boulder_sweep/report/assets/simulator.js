@@ -14,7 +14,7 @@ const BOX = [[0, 1, 0.5, 0.5], [1, 1, 0.5, 0.5]];
 
 /**
  * The outline of a boulder of a design, to be drawn.
- * @param {Outline} profile as shares; without points that of a box
+ * @param {Outline} profile as shares; without points a box
  * @param {{H: number, W: number, L: number}} sides [m]
  * @returns {Outline}
  */
@@ -73,9 +73,9 @@ const SEEN_AFTER = 0.5;
 const BEFORE_THE_END = 1 - 1e-14;
 
 /**
- * Volume of a boulder over that of the box of its sides: `boulder_sweep.designs.solidity_of`.
+ * Volume of a boulder over the volume of the box of its sides: `boulder_sweep.designs.solidity_of`.
  * @param {Record<string, number>} inputs
- * @param {number} filled that of the profile of the boulder
+ * @param {number} filled share of its box that the profile of the boulder fills
  * @returns {number}
  */
 function solidityOf(inputs, filled) {
@@ -211,7 +211,7 @@ class Simulator {
 
   /**
    * @param {Record<string, number>[]} designs
-   * @param {number[][]} controls as of `Kernel.rows`
+   * @param {number[][]} controls that `Kernel.rows` takes
    * @returns {Judged[]}
    */
   judged(designs, controls) {

@@ -2,7 +2,7 @@
 "use strict";
 
 /**
- * For every unit of the table, the unit to show in each system, and its value in that of the table; written by Python.
+ * For every unit of the table, the unit to show in each system, and its size in the unit of the table; written by Python.
  * @typedef {Record<string, Record<string, [string, number]>>} UnitTable
  */
 

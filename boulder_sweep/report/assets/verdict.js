@@ -25,7 +25,7 @@ const DEGREES = 180 / Math.PI;
 
 /**
  * Give the verdict on one design, as the kernel has ruled.
- * @param {Record<string, Float64Array>} results of the kernel, as of `Kernel.rows`
+ * @param {Record<string, Float64Array>} results of `Kernel.rows`
  * @param {number} row which design
  * @param {Record<string, number>} inputs the design by the names of the table
  * @param {Rules} rules
