@@ -28,12 +28,14 @@ def least_of_site(root: Path) -> str:
     """Return the least depth without margin and second opinion as a terminal shows it."""
     sweep = load(root / SITE, ["boulder.height=3.4 m"])
     found = need(sweep, margin=0.0, robust=False)
-    return _fenced(need_lines(found, again=Again(str(SITE)), table=True))
+    typed = (("--margin", "0"), ("--any",), ("--set", "boulder.height=3.4 m"))
+    return _fenced(need_lines(found, again=Again(str(SITE), typed), table=True))
 
 
 def capacity_of_site(root: Path) -> str:
     """Return what the designs of the site withstand at one depth as a terminal shows it."""
-    return _fenced(reserve_lines(capacity(load(root / SITE, ["site.embedment_depth=1.9 m"]))))
+    chosen = ["site.embedment_depth=1.9 m", "boulder.height=[3.4, 3.6] m"]
+    return _fenced(reserve_lines(capacity(load(root / SITE, chosen))))
 
 
 def uncertainty_of_site(root: Path) -> str:
@@ -43,7 +45,11 @@ def uncertainty_of_site(root: Path) -> str:
 
 def need_with_probability(root: Path) -> str:
     """Return the depth for a chance of 95 % as a terminal shows it."""
-    return _fenced(need_lines(need(load(root / UNCERTAIN), probability=0.95), again=Again(str(UNCERTAIN))))
+    return _fenced(
+        need_lines(
+            need(load(root / UNCERTAIN), probability=0.95), again=Again(str(UNCERTAIN), (("--probability", "0.95"),))
+        )
+    )
 
 
 def partial_factors(root: Path) -> str:

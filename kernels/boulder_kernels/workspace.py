@@ -87,9 +87,9 @@ def group_type(pieces: int, has_strength: bool, has_outline: bool) -> np.dtype:
 
 _SOILS = (0, True, True), *product(COUNTS, (False, True), (False, True))
 GROUP_TYPES = tuple(numba.from_dtype(group_type(*soil)) for soil in _SOILS)
-"""Numba's types of all groups, made in the same order in every process and kept. Numba names compiled code by a number of
-its record types, which it counts as they are made. Code that two processes have compiled for two kinds of groups could
-have one name, and a process that loads both would run one in place of the other."""
+"""Numba's types of all groups, made in the same order in every process and kept. Numba numbers record types as they are
+made, and names compiled code by these numbers. Code that two processes have compiled for two kinds of groups could have
+one name, and a process that loads both would run one in place of the other."""
 
 
 def empty_groups(pieces: int = 0, *, has_strength: bool = True, has_outline: bool = True) -> np.ndarray:

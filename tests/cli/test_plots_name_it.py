@@ -37,7 +37,7 @@ def test_a_chart_without_a_recommendation_marks_none(sweep, tmp_path):
 def test_a_map_of_a_run_that_asked_second_opinions(sweep, tmp_path):
     ratios = ["site.embedment_ratio=[0.6, 0.65, 0.7]", "boulder.height=[3.0, 3.4, 3.6] m"]
     options = [word for ratio in ratios for word in ("--set", ratio)]
-    for name, asked in (("asked", ["--second-opinion"]), ("not", [])):
+    for name, asked in (("asked", []), ("not", ["--no-second-opinion"])):
         sweep("run", CONFIGS / "site.yaml", "-q", "-o", tmp_path / f"{name}.sweep", *options, *asked)
         assert sweep("plot", tmp_path / f"{name}.sweep", "-o", tmp_path / f"{name}.svg")[0] == 0
     sentence = advice(answer_of(read_rows(tmp_path / "asked.sweep")).need)[0].replace("\N{NO-BREAK SPACE}", " ")

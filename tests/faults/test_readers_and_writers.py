@@ -47,9 +47,9 @@ def wait_for_rows(out, rows):
 
 def test_readers_during_a_run_see_whole_parts_in_order_and_never_fewer_than_before(tmp_path, bar):
     out = tmp_path / "out"
-    bar.allow(ROWS // 8)
+    bar.allow(ROWS // 4)
     driver = Driver(out, *OPTIONS, **bar.environment)
-    wait_for_rows(out, ROWS // 8)
+    wait_for_rows(out, ROWS // 4)
     seen = dict.fromkeys(READERS, 0)
 
     def look():
@@ -59,7 +59,7 @@ def test_readers_during_a_run_see_whole_parts_in_order_and_never_fewer_than_befo
             assert len(ids) >= seen[name], name
             seen[name] = len(ids)
 
-    for reached in (ROWS // 4, HALF, ROWS * 3 // 4):
+    for reached in (HALF, ROWS * 3 // 4):
         bar.allow(reached)
         while rows_done(out) < reached:
             look()

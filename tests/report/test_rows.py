@@ -31,7 +31,8 @@ def table(result):
 
 
 def test_every_row_has_its_verdict(rows, table):
-    names = np.where(table.reason == "", table.verdict, table.verdict.astype(str) + ": " + table.reason.astype(str))
+    told = np.where(table.verdict == "pass", table.robustness.astype(str), table.reason.astype(str))
+    names = np.where(told == "", table.verdict, table.verdict.astype(str) + ": " + told)
     assert [rows.names[code] for code in rows.codes] == list(names)
     assert rows.having("pass").ravel().tolist() == (table.verdict == "pass").tolist()
     assert rows.counts() == {name: int((names == name).sum()) for name in set(names)}
