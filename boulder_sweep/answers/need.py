@@ -229,7 +229,7 @@ def need(
         )
     if BOULDER_MASS.name in sweep.plan.given and key.name in (BOULDER_MASS.name, *SIDES, "boulder_density_kg_m3"):
         raise QuestionError(
-            f"{key.field.path} cannot be searched while boulder.mass gives the mass of one boulder; "
+            f"{key.field.path} cannot be searched while the file has boulder.mass, which holds for one boulder; "
             "remove it from the file and give boulder.density"
         )
     chance = None if probability is None else share(probability, "--probability")
