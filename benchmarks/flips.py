@@ -30,6 +30,8 @@ from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
 from .report import FOLDER
 
 RECORD = FOLDER / "flips.parquet"
+DEPTH = "site.embedment_depth=1.9 m"
+"""Of a file that leaves it to be found."""
 CONFIGS = ("m30_sizing", "site", "abg", "rwg", "crash_tests")
 """Files of ``configs/`` without distributions, which `sweep run` refuses."""
 DEGREES_PER_UNIT = 1e-4
@@ -197,7 +199,10 @@ def outcomes(cases: Mapping[str, Case], configs: tuple[str, ...], every: int = 1
         for title, file in files.items():
             # The other cases freeze what passes are worth without being asked.
             asked = SECOND_OPINIONS in cases[title].settings if title in cases else False
-            out, sweep = folder / f"{file.stem}.sweep", load(file, [] if asked else ["model.second_opinion=none"])
+            chosen = [] if asked else ["model.second_opinion=none"]
+            out, sweep = folder / f"{file.stem}.sweep", load(file, chosen)
+            if sweep.depth_sought:
+                sweep = load(file, [*chosen, DEPTH])
             run(sweep, out)
             frame = read(out)
             found = frame[SETTLED_BY].astype("string").fillna("").astype(str)
