@@ -1,7 +1,7 @@
 """Reference implementation of the vehicle-boulder-soil impact, written from the paper.
 
 The paper is Brown et al., *Low-order modeling of vehicle impacts upon boulders embedded in cohesionless
-soil*; equation numbers are the paper's. Everything here is plain NumPy and SciPy, literal rather than
+soil*; equation numbers are those of the paper. Everything here is plain NumPy and SciPy, literal rather than
 fast, and shares no code with the compiled kernels, so that agreement between the two means something.
 
 Start at :func:`tests.oracle.impact.simulate`.

@@ -69,7 +69,7 @@ class Problem:
 class Loads:
     """Forces [N] and moments [N m] at a state.
 
-    `net` is the bracket of Eq 39: the moment of soil and vehicle together. `lever` [m] is the arm of the blow,
+    `net` is the bracket of Eq 39: the moment of soil and vehicle together. `lever` [m] is that of the blow,
     `v_contact` [m/s] the velocity of the point struck.
     """
 

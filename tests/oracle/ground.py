@@ -68,7 +68,7 @@ def ultimate_pressure(inputs: Inputs, ground: Ground, alpha: float) -> float:
 class LayeredSoil:
     """The soil of one impact as N elements, in place of `tests.oracle.soil.Soil`."""
 
-    dx_yield = np.inf  # no single displacement holds for all elements
+    dx_yield = np.inf  # no displacement is that of all elements
 
     def __init__(self, inputs: Inputs, constants: Constants) -> None:
         assert inputs.ground is not None

@@ -10,8 +10,8 @@ GRAVITY = 9.80665  # standard acceleration of gravity g [m/s^2], Eqs 27 and 37
 
 @dataclass(frozen=True)
 class Layer:
-    """One layer of soil from its upper boundary `top` [m] down: density [kg/m^3], friction angle
-    [rad], subgrade reaction [MN/m^3], and cohesion [Pa]."""
+    """One layer of soil from its upper boundary `top` [m] down: density, friction angle, subgrade reaction as of
+    `Inputs`, and cohesion [Pa]."""
 
     top: float
     rho_s: float
@@ -63,7 +63,7 @@ class Inputs:
     resistance : {'kp_squared', 'broms', 'width_capped'}
         Law of the ultimate soil pressure: Eq 27, or one of the two that are not the paper's.
     ground : Ground, optional
-        The soil where it is not the same at every depth; without it, rho_s, phi and beta hold everywhere.
+        The soil where it is not the same at every depth; rho_s, phi and beta are those of `Inputs` without it.
     """
 
     L: float

@@ -128,7 +128,7 @@ def recorded_impact(inputs: Inputs, readings: Readings, *, may_be_new: bool = Fa
     may_be_new : bool
         The impact depends on what the kernels find, so that no record has it for certain.
     **options
-        Options of `simulate`.
+        Those of `simulate`.
 
     Returns
     -------
