@@ -1,4 +1,4 @@
-"""Build the documentation site into a folder: python -m docs.site [FOLDER], by default `site`."""
+"""Build the documentation site into `site`, from the root of the repository: python -m docs.site."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PAGES, BUILT = "pages", "site"
 
 
 def build(folder: Path) -> int:
-    """Build the site in place of a folder, and return the exit code of Zensical, for which a warning is an error."""
+    """Build the site into a new folder, and return the exit code of Zensical, for which a warning is an error."""
     with tempfile.TemporaryDirectory() as place:
         gather(Path(place) / PAGES)
         project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -25,12 +25,13 @@ def build(folder: Path) -> int:
         for name, value in {"root": ROOT.as_posix(), **project["urls"]}.items():
             text = text.replace(f"{{{name}}}", value)
         (Path(place) / CONFIGURATION).write_text(text, encoding="utf-8")
-        code = subprocess.run([sys.executable, "-m", "zensical", "build", "--strict"], cwd=place, check=False).returncode
+        command = [sys.executable, "-m", "zensical", "build", "--strict"]
+        code = subprocess.run(command, cwd=place, check=False).returncode
         if code == 0:
-            shutil.rmtree(folder, ignore_errors=True)
             shutil.copytree(Path(place) / BUILT, folder)
     return code
 
 
 if __name__ == "__main__":
-    sys.exit(build(Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / BUILT))
+    shutil.rmtree(ROOT / BUILT, ignore_errors=True)
+    sys.exit(build(ROOT / BUILT))
