@@ -112,6 +112,7 @@ def assembled(
     data["bokeh"] = {"docs": docs, "items": [{**item.to_json(), "roots": elements} for item in items]}
     known = dict(facts)
     origin = (f"boulder-sweep {known['version of boulder-sweep']}", f"settings {known['hash of the settings'][:12]}")
+    revision = f"revision {heading['revision']}" if "revision" in heading else ""
     script = "\n".join((ASSETS / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS)
     library = "\n".join(INLINE.clone(components=["bokeh"]).js_raw)
     environment = jinja2.Environment(
@@ -124,7 +125,7 @@ def assembled(
     return environment.get_template("page.html").render(
         title=data["title"],
         units=units,
-        footer=_css_text(" · ".join(filter(None, (heading.get("project"), data["title"], *origin)))),
+        footer=_css_text(" · ".join(filter(None, (heading.get("project"), data["title"], revision, heading.get("date"), *origin)))),
         sheet=sheet,
         sentences=sentences,
         answers=answers,

@@ -74,7 +74,7 @@ class Sheet(NamedTuple):
     title: str
     sketch: Sketch
     checks: tuple[tuple[str, Cell, Cell, str], ...]
-    """Name, computed, allowed, and how much of it is used."""
+    """Name, computed, limit, and how much of it is used."""
     build: tuple[tuple[str, Cell], ...]
     soil: tuple[tuple[str, Cell, str], ...]
     """Name, value and source of each input."""
@@ -156,7 +156,7 @@ def _checks(
         (f"penetration of cargo bed, {criterion['rating']}", "penetration_m", "m", limit),
         ("overlap, at least", "overlap_m", "m", overlap),
         ("peak force of the truck", "peak_force_kN", "kN", None),
-        ("acting at a height of", "impact_height_m", "m", None),
+        ("acting above ground at", "impact_height_m", "m", None),
     ]
     lines: list[tuple[str, Cell, Cell, str]] = []
     for words, name, unit, allowed in of:
@@ -166,6 +166,8 @@ def _checks(
             used = f"{100.0 * max(allowed / value if name == 'overlap_m' else value / allowed, 0.0):.0f} %"
         none = "no limit" if name == "max_displacement_m" else "–"
         computed: Cell = "–" if value is None else Measure(value, unit)
+        if name == "penetration_m" and value is not None and value <= 0.0:
+            computed = "none"
         lines.append((words, computed, none if allowed is None else Measure(allowed, unit), used))
     if "p_pass" in row:
         least = "–" if need.probability is None else f"≥ {100.0 * need.probability:.4g} %"
@@ -216,7 +218,7 @@ def _source(name: str, values: Sequence[float], settings: Mapping[str, Any]) -> 
     elif BY_NAME[name].default is not None and values == [BY_NAME[name].default]:
         source = "default"
     else:
-        source = "given"
+        source = "settings"
     return source if spread is None else f"{source}; {_spread(spread)}"
 
 

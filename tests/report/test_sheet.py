@@ -111,7 +111,7 @@ def test_the_limits_are_those_of_the_case_with_the_least_margin(needs: dict[str,
     assert f"friction angle φ′ {worst['friction_angle_deg']:g}°" in found.words["si"].governs
     assert found.cases is not None
     assert len(found.cases.rows) == len(best.design.rows) == 2
-    assert ("friction angle φ′, least", Measure(36.0, "deg"), "given") in found.soil
+    assert ("friction angle φ′, least", Measure(36.0, "deg"), "settings") in found.soil
     assert ("bumper above ground", Measure(0.5, "m"), "default") in found.vehicle
     assert found.grade[0] == "robust"
     assert found.qualifies
@@ -194,7 +194,7 @@ def test_a_pdf_has_todays_date_and_a_page_only_a_given_one(
     assert "<dt>date</dt><dd>2031-02-03</dd>" in pages[0]
     assert "2031-02-03" not in pages[1]
     assert "2031-02-03" not in write_report(files["depth"], tmp_path / "page.html").read_text()
-    for words in ("<dt>checked by</dt><dd>E. Fox</dd>", "<dt>revision</dt><dd>A</dd>", "Prepared by C. Day"):
+    for words in ("<dt>to be checked by</dt><dd>E. Fox</dd>", "<dt>revision</dt><dd>A</dd>", "Prepared by C. Day"):
         assert words in pages[1]
 
 
