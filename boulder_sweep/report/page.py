@@ -113,6 +113,7 @@ def assembled(
     known = dict(facts)
     origin = (f"boulder-sweep {known['version of boulder-sweep']}", f"settings {known['hash of the settings'][:12]}")
     revision = f"revision {heading['revision']}" if "revision" in heading else ""
+    footer = (heading.get("project"), data["title"], revision, heading.get("date"), *origin)
     script = "\n".join((ASSETS / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS)
     library = "\n".join(INLINE.clone(components=["bokeh"]).js_raw)
     environment = jinja2.Environment(
@@ -125,7 +126,7 @@ def assembled(
     return environment.get_template("page.html").render(
         title=data["title"],
         units=units,
-        footer=_css_text(" · ".join(filter(None, (heading.get("project"), data["title"], revision, heading.get("date"), *origin)))),
+        footer=_css_text(" · ".join(filter(None, footer))),
         sheet=sheet,
         sentences=sentences,
         answers=answers,
