@@ -100,6 +100,8 @@ def assembled(
         kept = thinned(rows)
         table = {**table_data(rows, kept), "held": held_at(rows, kept, chosen[0]["number"])}
     mapped = table is not None and table["mapped"]
+    # The simulator of the page knows one profile for all designs, and none of those that a weighed boulder may have.
+    chosen = [one for one in chosen if one.get("shape") is None]
     panels = ["live", *(f"chosen{k}" for k in range(len(chosen)))]
     document = Document()
     curved = [plot for panel in panels for plot in curves(panel)]

@@ -203,7 +203,7 @@ def test_the_name_of_a_project_stays_text_in_the_footer(files: dict[str, Path], 
     page = write_report(files["depth"], tmp_path / "page.html", heading=HEADING._replace(project=name)).read_text()
     (footer,) = re.findall(r'@bottom-left \{ content: "(.*?)"; \}', page)
     plain = re.sub(r"\\([0-9a-f]+) ", lambda code: chr(int(code[1], 16)), footer)
-    assert plain.startswith(f"{name} · site · boulder-sweep ")
+    assert plain.startswith(f"{name} · site · revision A · 2026-11-28 · boulder-sweep ")
     assert "<" not in footer
 
 
