@@ -79,7 +79,8 @@ NOTES = {
     "always": "≤, ≥: passes throughout the searched range, up to this end of it",
     "never": "never: passes nowhere in the searched range",
     "not_monotone": "*: {}; column passes_within (-o) lists all passing ranges",
-    "blocked_by_overlap": "blocked: does not pass up to where the truck would pass or ride over the boulder",
+    "blocked_by_overlap": "blocked: does not pass by what was asked, up to where the truck would pass or ride over the "
+    "boulder",
     "undecided": "undecided: no value is known to pass, and the one tried last would if it were decided",
 }
 Row = Mapping[str, Any]

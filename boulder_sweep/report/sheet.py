@@ -108,7 +108,7 @@ def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
     named = [name for name in answer.need.sweep.plan.labels if name in row]
     grade = design.grade
     worst = next(one for one in design.rows if one["robustness"] == grade)
-    means = OPEN_IN_WORDS if grade == "open" else meaning_of(worst) or ""
+    means = meaning_of(worst) or "" if grade != "open" or worst["stands_under"] else OPEN_IN_WORDS
     return Sheet(
         words={system: _words(answer, design, named or several, settings, system) for system in SYSTEMS},
         qualifies=qualifies,
