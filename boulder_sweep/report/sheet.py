@@ -108,7 +108,10 @@ def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
     named = [name for name in answer.need.sweep.plan.labels if name in row]
     grade = design.grade
     worst = next(one for one in design.rows if one["robustness"] == grade)
+    such = sum(one["robustness"] == grade for one in design.rows)
+    some = f" in {such:,} of {len(design.rows):,} cases" if such < len(design.rows) else ""
     means = meaning_of(worst) or "" if grade != "open" or worst["stands_under"] else OPEN_IN_WORDS
+    opinion = f"{grade or ''}{some}", means
     return Sheet(
         words={system: _words(answer, design, named or several, settings, system) for system in SYSTEMS},
         qualifies=qualifies,
@@ -118,7 +121,7 @@ def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
         build=_build(rows, row, design),
         soil=_inputs(design.rows, SOIL, settings),
         vehicle=_inputs(design.rows, VEHICLE, settings),
-        grade=(grade or "", means) if "p_pass" not in row else DRAWN if row.get("p_robust") is not None else NOT_ASKED,
+        grade=opinion if "p_pass" not in row else DRAWN if row.get("p_robust") is not None else NOT_ASKED,
         cases=_cases(design.rows, [*named, *several]) if len(design.rows) > 1 else None,
     )
 
