@@ -62,8 +62,6 @@ class VehicleFit:
 
     Attributes
     ----------
-    pulse : Pulse
-        What was fitted.
     wall : RigidWall
         The fitted vehicle: mass, speed, spring, damper.
     touch_s : float
@@ -124,13 +122,7 @@ class VehicleFit:
         return {name: values[name] + (self.offset_m_s2 or 0.0) * (name == "acceleration") for name in self.misfits}
 
     def plot(self, path: str | Path) -> None:
-        """Draw pulse, fit and residuals.
-
-        Raises
-        ------
-        PictureError
-            The picture cannot be written, or matplotlib is not installed.
-        """
+        """Draw pulse, fit and residuals, or raise a `PictureError`."""
         draw("crash_curves", "draw_fit", self, path)
 
 
@@ -250,20 +242,7 @@ class _Problem:
 
 
 def fit_pulse(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) -> VehicleFit:
-    """Fit spring and damper of a Maxwell element to a rigid-wall crash pulse.
-
-    Parameters
-    ----------
-    pulse
-        One or more signals over time.
-    mass_kg
-        Mass of the vehicle.
-    speed_m_s
-        Speed of impact; fitted too where it is not given.
-
-    Returns
-    -------
-    VehicleFit
+    """Fit spring and damper of a Maxwell element to a rigid-wall crash pulse; the speed too where it is not given.
 
     Raises
     ------

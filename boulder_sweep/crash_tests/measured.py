@@ -67,8 +67,6 @@ class TimeHistory:
 
     Attributes
     ----------
-    path : Path
-        The file.
     time_s : ndarray, shape (n,)
         Times, ascending [s].
     signals : dict of str to ndarray, shape (n,)
@@ -81,14 +79,7 @@ class TimeHistory:
 
 
 def read_history(path: str | Path, wanted: Sequence[Signal]) -> TimeHistory:
-    """Read a CSV file of measurements over time.
-
-    Parameters
-    ----------
-    path
-        See `boulder_sweep.settings.text_table.open_text`; the units may stand in the names, or below them.
-    wanted
-        Quantities it may hold; time among them.
+    """Read a CSV file of measurements over time; `wanted` are the quantities it may hold, time among them.
 
     Returns
     -------
@@ -134,13 +125,7 @@ class _Column(NamedTuple):
 
 
 def _columns(table: TextTable, wanted: Sequence[Signal], problems: ProblemList) -> list[_Column]:
-    """Return what the columns are.
-
-    Raises
-    ------
-    SettingsError
-        A name or a unit is not known, or time or all else is missing.
-    """
+    """Return what the columns are; refuse unknown names and units, and a file without time or all else."""
     names = _with_units(table, wanted)
     found = [_column(name, at, wanted, problems) for name, at in zip(names, table.positions, strict=True)]
     columns = [column for column in found if column is not None]
@@ -224,8 +209,6 @@ class Pulse:
 
     Attributes
     ----------
-    name : str
-        Where it comes from.
     time_s : ndarray, shape (n,)
         Times [s], ascending. Zero need not be first touch exactly, and rows before it are of use.
     signals : dict of str to ndarray, shape (n,)
