@@ -45,7 +45,7 @@ class Table:
         for row in self.rows:
             grid.add_row(*map(Text, row))
         shown = io.StringIO()
-        Console(file=shown, width=WIDTH).print(grid)
+        Console(file=shown, width=WIDTH, force_terminal=False).print(grid)
         return "\n".join(line.rstrip() for line in shown.getvalue().splitlines())
 
 
