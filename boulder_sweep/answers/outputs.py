@@ -244,13 +244,6 @@ class AnswerFile:
 def _identified(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[pa.Table, dict[str, Any], str]:
     """Read a Parquet file that a command wrote, and warn where other rules judged it.
 
-    Parameters
-    ----------
-    path
-        The file.
-    refusal
-        The error to raise.
-
     Returns
     -------
     table : Table
@@ -263,7 +256,7 @@ def _identified(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[pa.
     Raises
     ------
     BoulderSweepError
-        It cannot be read, is damaged, of another version, or no command wrote it.
+        `refusal`: it cannot be read, is damaged, of another version, or no command wrote it.
     """
     if advice := settings_file(path):
         raise refusal(advice)
@@ -352,12 +345,7 @@ def kind_of(result: FinishedRows | AnswerFile) -> str:
 def asked_sweep(identity: Mapping[str, Any], table: pa.Table) -> Sweep:
     """Return the sweep that was asked about, as far as answers are shown by it: not its distributions.
 
-    Parameters
-    ----------
-    identity
-        Of the file, see `boulder_sweep.store.provenance.identity`.
-    table
-        The answers, which hold the values of axes and lists that are too long for the settings.
+    The answers hold the values of axes and lists that are too long for the settings.
     """
     settings = identity["settings"]
     given, order, labels = settings["inputs"], settings["order"], settings.get("labels", {})
