@@ -1,11 +1,12 @@
 """End runs by SIGKILL, SIGTERM and SIGINT, again and again, and resume them.
 
 The signals come just before or after a change of the output folder: a file is made, flushed or gets its name, a folder
-is made or removed. Which signal and which change is drawn with a seed.
+is made or removed. Which signal and which change is drawn with a seed. A share of them may come after a random time
+instead: those are not the same every time.
 
 A process that has loaded everything once forks a child for every command, so that a kill costs a fraction of a
 second. Prints one JSON object: kills, kills by signal, tables finished, and what was wrong. Run from the root of the
-repository as ``python -m tests.faults.kills FOLDER KILLS SEED``.
+repository as ``python -m tests.faults.kills FOLDER KILLS SEED SHARE``, the last one the share after a random time.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import os
 import random
 import signal
 import sys
+import time
 from collections import Counter
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -36,6 +38,8 @@ from tests.waiting import HANG_GUARD_S
 
 ROWS = 20_000
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
+LONGEST_LIFE_S = 0.6
+"""Before a signal after a random time [s]; a run that is quicker is done, and another one is killed in its place."""
 CHANGES = {"mkdir": 40, "open": 120, "fsync": 80, "rename": 40, "rmdir": 40}
 """Calls that change a folder, and about how often a run makes them."""
 
@@ -76,18 +80,23 @@ def command(settings: Path, out: Path) -> int:
         return EXIT_INTERRUPTED
 
 
-def in_a_child(settings: Path, out: Path, aim: Aim | None = None, kind: signal.Signals = signal.SIGKILL) -> bool:
-    """Resume the run in a child, which gets a signal at a call; True if that has ended it."""
+def in_a_child(
+    settings: Path, out: Path, life: float | Aim | None = None, kind: signal.Signals = signal.SIGKILL
+) -> bool:
+    """Resume the run in a child, which gets a signal after a while [s] or at a call; True if that has ended it."""
     faulthandler.dump_traceback_later(HANG_GUARD_S, exit=True)  # hang guard
     child = os.fork()
     if child == 0:
         code = 1
         try:
-            if aim is not None:
-                aim.take(kind)
+            if isinstance(life, Aim):
+                life.take(kind)
             code = command(settings, out)
         finally:
             os._exit(code)
+    if isinstance(life, float):
+        time.sleep(life)
+        os.kill(child, kind)
     _, how = os.waitpid(child, 0)
     code = os.waitstatus_to_exitcode(how)
     if code not in (0, -kind, 128 + kind):
@@ -125,7 +134,7 @@ def tally(table: pa.Table, whole: pa.Table) -> dict[str, int]:
 
 def end_and_resume() -> None:
     """End runs as often as asked for, resume them, and print the result."""
-    folder, kills, seed = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
+    folder, kills, seed, by_time = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), float(sys.argv[4])
     chance = random.Random(seed)
     small = grid_of(10, soil="{elements: 100}")
     evaluation_of(small, accuracy_of(small)).warm_up()
@@ -136,7 +145,9 @@ def end_and_resume() -> None:
     done, tables, faults = Counter[str](), [], list[str]()
     outs = []
 
-    def drawn_aim() -> Aim:
+    def life() -> float | Aim:
+        if chance.random() < by_time:
+            return chance.uniform(0.0, LONGEST_LIFE_S)
         call = chance.choice(list(CHANGES))
         return Aim(call, chance.randint(1, CHANGES[call]), chance.random() < 0.5)
 
@@ -144,7 +155,7 @@ def end_and_resume() -> None:
         out = folder / f"killed-{len(outs)}"
         outs.append(out)
         clean = True
-        while done.total() < kills and in_a_child(settings, out, drawn_aim(), kind := chance.choice(SIGNALS)):
+        while done.total() < kills and in_a_child(settings, out, life(), kind := chance.choice(SIGNALS)):
             done[kind.name] += 1
             look_at(out, faults)
             clean, before = nothing_left(out), clean

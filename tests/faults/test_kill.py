@@ -1,4 +1,4 @@
-"""Kills and damage, again and again: the table equals an undisturbed run's."""
+"""Kills, failing stores, dying workers and damage, each again and again: the table equals an undisturbed run's."""
 
 from __future__ import annotations
 
@@ -15,10 +15,18 @@ from tests.waiting import HANG_GUARD_S
 pytestmark = pytest.mark.faults
 
 
-@pytest.mark.parametrize("kills", [5, pytest.param(55, marks=pytest.mark.nightly)])
-def test_many_kills_lose_no_row_and_double_none(tmp_path, kills):
+@pytest.mark.parametrize(
+    ("kills", "by_time"),
+    [
+        (5, 0.0),
+        # A third of them after a random time: by chance, so not for every commit.
+        pytest.param(55, 1 / 3, marks=pytest.mark.nightly),
+    ],
+    ids=["5", "55"],
+)
+def test_many_kills_lose_no_row_and_double_none(tmp_path, kills, by_time):
     seed = int(os.environ.get("TEST_SEED", "20261"))
-    command = [sys.executable, "-m", "tests.faults.kills", str(tmp_path), str(kills), str(seed)]
+    command = [sys.executable, "-m", "tests.faults.kills", str(tmp_path), str(kills), str(seed), str(by_time)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=HANG_GUARD_S)  # hang guard
     assert done.returncode == 0, f"TEST_SEED={seed}: {done.stderr[-3000:]}"
     found = json.loads(done.stdout.splitlines()[-1])
@@ -30,9 +38,24 @@ def test_many_kills_lose_no_row_and_double_none(tmp_path, kills):
 
 
 @pytest.mark.nightly
-def test_damage_of_a_table_is_seen(tmp_path):
-    seed = os.environ.get("TEST_SEED", "20261")
-    command = [sys.executable, "-m", "tests.store.damages", str(tmp_path), "320", seed]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=HANG_GUARD_S)  # hang guard
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("tests.store.damages", "320"),
+        ("tests.faults.stress s3", "3"),
+        ("tests.faults.stress killed", "3"),
+        ("tests.faults.stress stopped", "1"),
+    ],
+    ids=lambda command: command[0],
+)
+def test_what_disturbs_a_table_or_a_run_does_no_harm(tmp_path, command):
+    (words, times), seed = command, os.environ.get("TEST_SEED", "20261")
+    done = subprocess.run(
+        [sys.executable, "-m", *words.split(), str(tmp_path), times, seed],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=HANG_GUARD_S,  # hang guard
+    )
     assert done.returncode == 0, f"TEST_SEED={seed}: {done.stderr[-3000:]}"
     assert json.loads(done.stdout.splitlines()[-1])["faults"] == [], f"TEST_SEED={seed}"
