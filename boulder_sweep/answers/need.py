@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from boulder_sweep.settings.loader import Settings
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Need(Result):
     """Answers to a question, one row for every combination of the other inputs. Made by `need`.
 

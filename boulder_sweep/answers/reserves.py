@@ -67,7 +67,7 @@ RESERVES = (
 )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Reserves(Result):
     """What the designs of a sweep withstand: inputs, outcome and withstood values of each. Made by `capacity`."""
 

@@ -38,7 +38,7 @@ TableColumn = tuple[str, str, str, Any]
 """Name, unit, meaning, and n values: numbers, NaN for none; words, None for none; or an array of Arrow."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """Answers to a question about a sweep.
 
@@ -55,6 +55,9 @@ class Result:
 
     def __len__(self) -> int:
         return len(self.arrow)
+
+    def __repr__(self) -> str:
+        return str(draw("notebook", "text_of", self))
 
     def _repr_html_(self) -> str:
         """Return what the command prints, as a notebook shows it."""

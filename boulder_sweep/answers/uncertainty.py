@@ -48,7 +48,7 @@ SAMPLES = 4096
 """Samples kept of each row for plots and inspection."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Uncertainty(Result):
     """Probabilities of the designs of a sweep. Made by `uncertainty`.
 

@@ -89,6 +89,7 @@ def test_a_notebook_shows_what_the_commands_print(site, sweep):
     html = withstood._repr_html_()
     printed = sweep("capacity", CONFIGS / "site.yaml", "--set", DEEP[0], "-q")[1]
     assert html == f"<div><pre>{printed.rstrip()}</pre></div>"
+    assert repr(withstood) == printed.rstrip()
     chances = boulder_sweep.uncertainty(CONFIGS / "uncertain_site.yaml", half_width=0.2)
     assert "<pre>" in chances._repr_html_()
     assert "P(pass)" in chances._repr_html_()
