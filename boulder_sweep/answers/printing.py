@@ -540,7 +540,8 @@ def designs_screen(need: Need, units: str = "si") -> Screen:
     columns += [(head_of(DEPTH, units), _length(DEPTH)), _mass(units), (("least", "margin"), _margin), GRADE]
     columns += volume_columns(units)
     first = boulders[0]["rows"]
-    names = [name for name in HEADS if varies(need.sweep, pa.Table.from_pylist(first), name)]
+    table = pa.Table.from_pylist(first)
+    names = [name for name in HEADS if varies(need.sweep, table, name)]
     if need.sweep.table is None and 1 < len(first) <= MOST_SHOWN:
         columns += _across(need, names, first, _margin, units)
     return Screen(columns, boulders)

@@ -64,6 +64,8 @@ ANSWERS = ("least_", "most_", "found", "p_", "withstands_", "simulated_", "verdi
 """What names of columns begin with that are the answer, in the order in which a spreadsheet has them."""
 FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
 """First characters of text that a spreadsheet takes for a formula."""
+RAW = ("{=", "<r>")
+"""What XlsxWriter takes for an array formula, and for XML."""
 _NUMBER = re.compile(r"-?[0-9][0-9,]*(?:\.([0-9]+))?(%?)", re.ASCII)
 
 
@@ -110,15 +112,11 @@ def export(out: str | Location, file: str | Path, *, units: str | None = None) -
         raise ReportError(
             f"a sheet holds {MOST_SHEET_ROWS:,} rows, not {finished.rows_done:,}: choose .csv or .parquet"
         )
-    sheets = partial(_sheets, location=location)
-    writers: dict[str, Callable[[BinaryIO, Exportable, str], int]] = {
-        ".xlsx": sheets,
-        ".csv": _csv,
-        ".parquet": _parquet,
-    }
+    sheets = partial(_sheets, location)
+    writer: Callable[[BinaryIO, Exportable, str], int] = {".xlsx": sheets, ".csv": _csv, ".parquet": _parquet}[kind]
     try:
         with replacing(target) as passing:
-            return writers[kind](passing, finished, units)
+            return writer(passing, finished, units)
     except OSError as problem:
         raise ReportError(f"{file} cannot be written: {why(problem)}") from problem
 
@@ -270,7 +268,7 @@ def _cells(values: Iterable[Any]) -> list[Any]:
 def _cell(text: str) -> str:
     shown = printable(text)
     first = unicodedata.normalize("NFKC", shown[:1])  # some programs take a full-width sign for the plain one
-    return f"'{shown}" if first.startswith(FORMULA_SIGNS) or shown.startswith("<r>") else shown
+    return f"'{shown}" if first.startswith(FORMULA_SIGNS) or shown.startswith(RAW) else shown
 
 
 def _parquet(target: BinaryIO, finished: Exportable, units: str) -> int:
@@ -297,7 +295,7 @@ def _parquet(target: BinaryIO, finished: Exportable, units: str) -> int:
     return rows
 
 
-def _sheets(target: BinaryIO, finished: Exportable, units: str, location: Location) -> int:
+def _sheets(location: Location, target: BinaryIO, finished: Exportable, units: str) -> int:
     """Write a spreadsheet: the answer, the designs, and what a reader must know about them."""
     try:
         from xlsxwriter import Workbook
@@ -311,7 +309,7 @@ def _sheets(target: BinaryIO, finished: Exportable, units: str, location: Locati
     with TemporaryDirectory() as place:  # the library leaves files behind where it fails
         book = Workbook(whole, {"constant_memory": True, "tmpdir": place, "use_zip64": True, **plain})
         book.set_properties({"created": CREATED})
-        _write_answer(book, *_answer(finished, units, location))
+        _write_answer(book, *_answer(location, finished, units))
         designs = book.add_worksheet("designs")
         designs.freeze_panes(1, 1)
         designs.write_row(0, 0, _cells(names))
@@ -321,7 +319,8 @@ def _sheets(target: BinaryIO, finished: Exportable, units: str, location: Locati
                 designs.write_row(rows, 0, values)
         for number, name in enumerate(names):  # widths that are known before make each cell slower
             designs.set_column(number, number, max(len(name) + 4, LEAST_WIDTH))
-        designs.autofilter(0, 0, rows, len(names) - 1)
+        if rows:
+            designs.autofilter(0, 0, rows, len(names) - 1)
         sheet = book.add_worksheet("about")
         for number, width in enumerate(ABOUT_WIDTHS):
             sheet.set_column(number, number, width)
@@ -356,20 +355,20 @@ def _ordered(finished: Exportable, units: str) -> list[ShownColumn]:
     return sorted(columns, key=place)
 
 
-def _answer(finished: Exportable, units: str, location: Location) -> tuple[list[str], Screen]:
+def _answer(location: Location, finished: Exportable, units: str) -> tuple[list[str], Screen]:
     """Return what the terminal says of answers, or the page of a run; nothing of a time history."""
     if isinstance(finished, AnswerFile):
         answers = finished.answers() if finished.kind else None
         if isinstance(answers, Need):
             return [*(advice(answers, units) or [title(answers)]), *yard_lines(answers)], need_screen(answers, units)
         screens: dict[str, Callable[..., Screen]] = {UNCERTAINTY: uncertainty_screen, CAPACITY: reserve_screen}
-        return [], screens[finished.kind](answers, units) if answers else Screen([], [])
+        return [], Screen([], []) if answers is None else screens[finished.kind](answers, units)
     if not finished.rows_done:
         return ["No design is computed yet."], Screen([], [])
     from boulder_sweep.report.answers import answer_of  # loads the kernels
     from boulder_sweep.report.rows import read_rows
 
-    answer = answer_of(read_rows(location))
+    answer = answer_of(read_rows(location, finished))
     counts = ["".join(map(str, sentence)) for sentence in answer.sentences]
     return [*advice(answer.need, units), *counts], designs_screen(answer.need, units)
 

@@ -4,6 +4,7 @@ import csv
 import errno
 import math
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -215,6 +216,7 @@ def test_one_table_gives_the_same_spreadsheet(result, tmp_path):
     assert (tmp_path / "one.xlsx").read_bytes() == (tmp_path / "two.xlsx").read_bytes()
     with zipfile.ZipFile(tmp_path / "one.xlsx") as book:
         assert {entry.date_time[0] for entry in book.infolist()} == {1980}
+        assert {*re.findall(rb"\d{4}-\d\d-\d\dT", book.read("docProps/core.xml"))} == {b"1980-01-01T"}
 
 
 @pytest.mark.parametrize("where", ["rows", "file"])
@@ -301,8 +303,8 @@ def test_parquet_keeps_units_and_meanings(result, tmp_path):
 
 def test_a_text_that_looks_like_a_formula_stays_a_text(tmp_path):
     signs = [*"=+-@", *"＝＋－＠", *"﹦﹢﹣﹫⁼₌⁺₊"]
-    formulas = [*(f"{sign}HYPERLINK(1)" for sign in signs), "<r><f>1</f></r>"]  # of the last, XlsxWriter makes XML
-    others = ["plain", "a=b", "±3", "</v>&amp;", "{=1}", "https://a.b", "mailto:a", "12"]
+    formulas = [*(f"{sign}HYPERLINK(1)" for sign in signs), "{=1}", "<r><f>1</f></r>"]
+    others = ["plain", "a=b", "±3", "</v>&amp;", "https://a.b", "mailto:a", "12"]
     rows = [f"{text},3" for text in (*formulas, *others)]
     (tmp_path / "designs.csv").write_text("\n".join(("boulder_id,boulder_height_m", *rows)), encoding="utf-8")
     (tmp_path / "list.yaml").write_text(
