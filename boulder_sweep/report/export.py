@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 Exportable = FinishedRows | AnswerFile
+Writer = Callable[[BinaryIO, Exportable, str], int]
 KINDS = (".xlsx", ".csv", ".parquet")
 MOST_SHEET_ROWS = 1_048_575
 """Most rows of a spreadsheet, without the header."""
@@ -112,11 +113,10 @@ def export(out: str | Location, file: str | Path, *, units: str | None = None) -
         raise ReportError(
             f"a sheet holds {MOST_SHEET_ROWS:,} rows, not {finished.rows_done:,}: choose .csv or .parquet"
         )
-    sheets = partial(_sheets, location)
-    writer: Callable[[BinaryIO, Exportable, str], int] = {".xlsx": sheets, ".csv": _csv, ".parquet": _parquet}[kind]
+    writers: dict[str, Writer] = {".xlsx": partial(_sheets, location), ".csv": _csv, ".parquet": _parquet}
     try:
         with replacing(target) as passing:
-            return writer(passing, finished, units)
+            return writers[kind](passing, finished, units)
     except OSError as problem:
         raise ReportError(f"{file} cannot be written: {why(problem)}") from problem
 
