@@ -511,7 +511,7 @@ def _across(need: Need, names: Sequence[str], rows: Sequence[Row], cell: Cell, u
             above.append((head_of(name, units), number_of(name, units)))
     wide: list[Column] = []
     for number, row in enumerate(rows):
-        words = [(f"{head[0]} {text(row)}".strip(), head[1]) for head, text in above]
+        words = [(f"{head[0]} {text(row)}".strip(), head[1]) for head, text in above] or [("", "")]
         head = words[0] if len(words) == 1 else (words[0][0], ", ".join(word for word, _ in words[1:]))
         wide.append((head, _in_row(number, cell)))
     return wide

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import random
 import re
 from datetime import date
@@ -17,6 +18,7 @@ import boulder_sweep
 from boulder_sweep.answers.advice import advice, question
 from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.outputs import AnswerFile
+from boulder_sweep.answers.printing import need_lines
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report, writing
 from boulder_sweep.report.answers import answer_of
@@ -175,6 +177,39 @@ def test_a_damaged_recommendation_ends_in_words(files: dict[str, Path], name: st
             said.append(str(problem))
     assert len(said) > 10
     assert all("changed.parquet is damaged; write it again with `sweep need`" in words for words in said)
+
+
+@pytest.mark.parametrize("name", ["depth", "chance", "nearest", "never"])
+def test_no_null_in_a_recommendation_is_said(files: dict[str, Path], name: str, tmp_path: Path) -> None:
+    table, changed, refused = pq.read_table(files[name]), tmp_path / "changed.parquet", list[tuple[str | int, ...]]()
+    key = b"boulder_sweep.recommendation"
+    tree = json.loads(table.schema.metadata[key])
+    for *above, last in places(tree):
+        if 1 in above:
+            continue  # a second soil is read as the first
+        inner: Any = tree
+        for step in above:
+            inner = inner[step]
+        kept = inner[last]
+        for value in (None, math.nan) if isinstance(kept, float) else (None,):
+            inner[last] = value
+            metadata = table.schema.metadata | {key: json.dumps(tree).encode()}
+            pq.write_table(table.replace_schema_metadata(metadata), changed)
+            try:
+                found = AnswerFile(changed, ReportError).answers()
+                assert isinstance(found, Need)
+                said = " ".join([*advice(found, "us"), *need_lines(found, "us")])
+                assert not re.search("\\b(nan|None)\\b", said), (above, last, value)
+            except ReportError:
+                refused.append((*above, last))
+        inner[last] = kept
+    assert {last for *_, last in refused} >= {
+        "boulder_density_kg_m3",
+        "boulder_mass_kg",
+        "verdict",
+        "conditions",
+        "rows",
+    }
 
 
 def test_a_pdf_has_todays_date_and_a_page_only_a_given_one(
