@@ -219,8 +219,10 @@ class Recommendation:
         nearest = None
         if near is not None:
             built = None if near["design"] is None else design(near["design"])
-            margin, robust = float(near["margin"]), bool(near["robust"])
-            nearest = Nearest(checked(near["rows"]), built, margin, robust, by_name(near["changes"], CHANGES))
+            rows, margin, robust = checked(near["rows"]), float(near["margin"]), bool(near["robust"])
+            if "passes_at" not in rows[0] or not 0.0 <= margin <= 1.0:
+                raise ValueError("what comes nearest has no answer, or a margin that none has")
+            nearest = Nearest(rows, built, margin, robust, by_name(near["changes"], CHANGES))
         boulders, qualified, alike, conditions = (
             int(entries[name]) for name in ("boulders", "qualified", "alike", "conditions")
         )
