@@ -160,7 +160,7 @@ class Entries:
                 self._unfold_soils()
             self._read_block(section)
             if section == "boulder":
-                self._read_profile()
+                self._take_sides()
         order = [*fields.SECTIONS]
         self.leaves = dict(sorted(self.leaves.items(), key=lambda leaf: order.index(fields.BY_NAME[leaf[0]].section)))
         both = {"friction_angle_deg", "subgrade_reaction_MN_m3"}
@@ -229,23 +229,18 @@ class Entries:
             return values
         return np.minimum(spread.high, values + DRAWN_SD * spread.deviation(values))
 
-    def _read_profile(self) -> None:
-        """Take the sides of the boulder from its profile, if it has one."""
-        if "profile" in self.settings:
-            self._take_sides(self.settings["profile"])
-        elif "boulder.profile" in self.given:  # its mistakes are reported, and its sides are not missing
-            self.given |= {f"boulder.{key}" for key in SIDES}
-
-    def _take_sides(self, points: tuple[ProfilePoint, ...]) -> None:
-        """Take the sides of the boulder from its profile, which must not be given beside it."""
-        for key in (*SIDES, "taper"):
-            if f"boulder.{key}" in self.given:
-                self.report(f"boulder.{key}", "is part of boulder.profile; remove one of them")
-        position = self.position_of("boulder.profile")
-        for key, value in sides_of(points).items():
-            self.given.add(f"boulder.{key}")
-            self.leaves[f"boulder_{key}_m"] = Input(np.array([value]), False, position)
-        self.settings["profile"] = shares_of(points)
+    def _take_sides(self) -> None:
+        """Take the sides of the boulder from its profile, if it has one; they must not be given beside it."""
+        sides = {f"boulder.{key}" for key in SIDES} if "boulder.profile" in self.given else set()
+        points: tuple[ProfilePoint, ...] = self.settings.get("profile", ())
+        if points:
+            for path in sorted(self.given & {*sides, "boulder.taper"}):
+                self.report(path, "is part of boulder.profile; remove one of them")
+            for key, value in sides_of(points).items():
+                at = self.position_of("boulder.profile")
+                self.leaves[f"boulder_{key}_m"] = Input(np.array([value]), False, at)
+            self.settings["profile"] = shares_of(points)
+        self.given |= sides  # a profile with mistakes is reported, and its sides are not missing
 
     def _folder_of(self, position: Position) -> Path:
         """Return where a file lies that is named at a position: beside the settings, or in the current directory."""
@@ -361,10 +356,6 @@ class Entries:
             self.problems.add(item.position, f"{section}.name", f"'{name}' is given twice")
         return name
 
-    def inputs_of_sets(self, section: str) -> list[Field]:
-        """Return the inputs that the named sets of a block give."""
-        return [field for field in fields.fields_of(section) if field.name in self.leaves]
-
     def unknown(self, entry: Entry, section: str, known: tuple[str, ...]) -> None:
         """Report an unknown key, with the one that is meant."""
         word = entry.key.lower()
@@ -404,8 +395,7 @@ class Entries:
         """Return all values of an input, however it is given; none where it has a mistake."""
         if self.table is not None and name in self.table.columns:
             return self.table.columns[name]
-        leaf = self.leaves.get(name)
-        return np.empty(0) if leaf is None else leaf.values
+        return self.leaves[name].values if name in self.leaves else np.empty(0)
 
     @property
     def written_units(self) -> str:
@@ -474,25 +464,19 @@ def read_layers(node: Node) -> tuple[Layer, ...]:
     mistakes = Mistakes()
     for item in node.items:
         with mistakes:
-            layer = _read_layer(item)
+            own = Mistakes()
+            values = read_entries(item, LAYER_FIELDS, "a layer", own)
+            assert isinstance(item, Mapping)  # anything else has been refused
+            if missing := [key for key in LAYER_FIELDS if key not in item.entries and key != "cohesion"]:
+                own.add(item.position, f"the layer lacks {', '.join(missing)}")
+            own.raise_if_any()
+            layer = Layer(**{_NAMES[key]: value for key, value in values.items()})
             if layers and layer.from_m <= layers[-1].from_m:
                 message = f"begins at {layer.from_m:g} m, not below the layer before it ({layers[-1].from_m:g} m)"
                 mistakes.add(item.position, message)
             layers.append(layer)
     mistakes.raise_if_any()
     return tuple(layers)
-
-
-def _read_layer(node: Node) -> Layer:
-    """Read one layer; single values only."""
-    mistakes = Mistakes()
-    values = read_entries(node, LAYER_FIELDS, "a layer", mistakes)
-    assert isinstance(node, Mapping)  # anything else has been refused
-    missing = [key for key in LAYER_FIELDS if key not in node.entries and key != "cohesion"]
-    if missing:
-        mistakes.add(node.position, f"the layer lacks {', '.join(missing)}")
-    mistakes.raise_if_any()
-    return Layer(**{_NAMES[key]: value for key, value in values.items()})
 
 
 def read_profile(node: Node) -> tuple[ProfilePoint, ...]:

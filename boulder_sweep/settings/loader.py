@@ -398,7 +398,8 @@ def _axes(entries: Entries) -> tuple[Axis, ...]:
             continue
         if section.key in entries.sets:
             labels = entries.sets[section.key]
-            columns = {field.name: entries.leaves[field.name].values for field in entries.inputs_of_sets(section.key)}
+            names = [field.name for field in fields.fields_of(section.key) if field.name in entries.leaves]
+            columns = {name: entries.leaves[name].values for name in names}
             axes.append(Axis(section.key, np.arange(float(len(labels))), columns, labels))
             count *= len(labels)
         if not isinstance(section.value, Mapping):
