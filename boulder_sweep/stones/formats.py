@@ -137,7 +137,7 @@ def _ply(data: bytes) -> _Counted:
     head = re.match(rb"ply[ \t]*\r?\n.{1,100000}?\nend_header[ \t]*\r?\n", data, re.DOTALL)
     if not head:
         raise ScanError("is damaged, or the header of a PLY file is missing")
-    form, elements = "", dict[str, tuple[int, list[list[str]]]]()
+    form, elements, names = "", dict[str, tuple[int, list[list[str]]]](), set[tuple[str, str]]()
     for words in map(str.split, head[0].decode("latin-1").split("\n")[1:-2]):
         match words:
             case ["comment" | "obj_info", *_]:
@@ -147,8 +147,9 @@ def _ply(data: bytes) -> _Counted:
             case ["element", name, digits] if digits.isdecimal() and name not in elements:
                 elements[name] = int(digits), []
                 check_count(int(digits))
-            case ["property", *kinds, _] if elements:
-                [*elements.values()][-1][1].append([_TYPES[one] for one in kinds if one != "list"])
+            case ["property", *kinds, own] if elements and (name, own) not in names:
+                names.add((name, own))
+                elements[name][1].append([_TYPES[one] for one in kinds if one != "list"])
             case _:
                 raise ScanError(f"is damaged: its header holds {' '.join(words)[:60]!r}")
     start, (points, _), (faces, corners) = head.end(), elements["vertex"], elements.get("face", (0, []))
@@ -211,6 +212,7 @@ def _stl(data: bytes) -> _Counted:
     return 3 * count, count, data
 
 
+_NUMBER = re.compile(rb"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _PASSED = frozenset(
     b"vt vn vp g o s mg l p usemtl mtllib usemap maplib bevel c_interp d_interp lod shadow_obj trace_obj".split()
 )
@@ -229,7 +231,7 @@ def _obj(data: bytes) -> _Counted:
         if len(line) > MAX_LINE_BYTES:
             raise ScanError(f"line {number}: is longer than {MAX_LINE_BYTES:,} bytes; {AS_PLY}")
         word, *words = line.partition(b"#")[0].split() or [b"g"]
-        if word == b"v" and 3 <= len(words) <= 7:  # a weight or a colour may follow
+        if word == b"v" and 3 <= len(words) <= 7 and all(map(_NUMBER.fullmatch, words)):  # a colour may follow
             points.append(b"v " + b" ".join(words[:3]))
         elif word in (b"f", b"fo") and len(words) >= 3 and re.fullmatch(rb"[-\d/\s]+", b" ".join(words)):
             corners = [int(one.partition(b"/")[0]) for one in words]
@@ -264,7 +266,9 @@ def _glb(data: bytes) -> _Counted:
     accessors, nodes = header.get("accessors", []), header.get("nodes", [])
     check_count(sum(one["count"] for one in accessors), 12)
     for one in accessors:
-        if "sparse" in one or "bufferView" not in one or one["count"] < 1:
+        view = {} if "bufferView" not in one else header["bufferViews"][one["bufferView"]]
+        least = min(one["count"] - 1, one.get("byteOffset", 0), view.get("byteOffset", 0))
+        if "sparse" in one or not view or least < 0:
             raise ScanError(f"holds points that are sparse, compressed or missing, which are not read; {AS_PLY}")
     sizes = [_glb_size(mesh, accessors) for mesh in header.get("meshes", ())]
     below = {child for node in nodes for child in node.get("children", ())}
@@ -301,10 +305,8 @@ def _glb_size(mesh: dict[str, Any], accessors: list[dict[str, Any]]) -> np.ndarr
         points, numbers = accessors[place], accessors[piece.get("indices", place)]
         if points["type"] != "VEC3" or points.get("normalized"):
             raise ScanError(f"has normalized coordinates, which are not read; {AS_PLY}, or with coordinates as floats")
-        if numbers is not points and (numbers["type"], numbers["componentType"] in (5121, 5123, 5125)) != (
-            "SCALAR",
-            True,
-        ):
+        is_whole = numbers["type"] == "SCALAR" and numbers["componentType"] in (5121, 5123, 5125)
+        if not is_whole and numbers is not points:
             raise ScanError("is damaged: it numbers corners with something else than whole numbers")
         size += points["count"], numbers["count"] // 3 if mode == 4 else numbers["count"] - 2
         kinds.add(points["componentType"] == 5126)
