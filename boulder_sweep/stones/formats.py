@@ -25,6 +25,8 @@ MAX_FACES = 1_000_000
 """Most triangles, and most points where triangles share them. A phone makes 100,000, a profile needs a few thousand."""
 MAX_LINES = 8 * MAX_FACES
 """Most lines of a text: points, their normals and colours, faces."""
+MAX_TEXT_FACETS = 300_000
+"""Most facets of an STL file as text, of which each takes 2.5 kB to read."""
 MAX_LINE_BYTES = 1_000_000
 MAX_JSON_BYTES = 1_000_000
 """Largest description in a GLB file. A scan needs a few kilobytes."""
@@ -203,6 +205,8 @@ def _stl(data: bytes) -> _Counted:
         data = data.lower()
         count = data.count(b"endfacet")
         check_count(count)
+        if count > MAX_TEXT_FACETS:
+            raise ScanError(f"has {count:,} facets as text; at most {MAX_TEXT_FACETS:,} are read; {AS_PLY}")
         if not re.match(rb"\s*solid\b", data) or not re.search(rb"\bendsolid\b[^\n]*\s*\Z", data[-10_000:]):
             raise ScanError("is damaged: it ends early, or is no STL file")
         found = sum(1 for _ in _FACET.finditer(data))
