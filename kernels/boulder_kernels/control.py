@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import exact_inlined, inlined, kernel
+from ._jit import exact_inlined, inlined, kernel, taken
 from .design import Constants
 from .modes import AT_END, TOLERANCE, GapFactors, needs_moment
 from .numerics import sine_versine
@@ -105,12 +105,9 @@ BEHIND = 1.0 + 0.3 * AT_END * TOLERANCE
 
 @inlined
 def control_in(c: np.ndarray) -> Control:
-    """Return the control that an array holds, shape (13,), in the order of its fields; booleans are 0 or 1."""
-    stops, located, refined = c[5] > 0.0, c[6] > 0.0, c[7] > 0.0
-    return Control(
-        c[0], c[1], c[2], int(c[3]), c[4] > 0.0, stops, located, refined, c[8], c[9] > 0.0, c[10] > 0.0, c[11],
-        c[12] > 0.0,
-    )  # fmt: skip
+    """Return the control that an array holds, in the order of its fields; booleans are 0 or 1."""
+    control: Control = taken(c, 0, 0, Control)
+    return control
 
 
 @inlined

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import exact_inlined, inlined
+from ._jit import exact_inlined, inlined, taken
 from .numerics import direction, half_tangent
 
 
@@ -106,23 +106,8 @@ def design_at(table: DesignTable, row: int) -> Design:
 @inlined
 def design_in(a: np.ndarray, row: int) -> Design:
     """Return the design in a column of an array."""
-    return Design(
-        a[0, row],
-        a[1, row],
-        a[2, row],
-        a[3, row],
-        a[4, row],
-        a[5, row],
-        a[6, row],
-        a[7, row],
-        a[8, row],
-        a[9, row],
-        a[10, row],
-        a[11, row],
-        a[12, row],
-        a[13, row],
-        a[14, row],
-    )
+    design: Design = taken(a, 0, row, Design)
+    return design
 
 
 class Constants(NamedTuple):

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import inlined, kernel
+from ._jit import inlined, kernel, taken
 from .design import Constants
 from .dormand_prince import DenseOutput, displacement_at, state_at, turning_point
 from .dynamics import State, Switches, contact_displacement, contact_lever, spring_compression
@@ -172,19 +172,8 @@ def outcome_table(out: np.ndarray) -> OutcomeTable:
 @inlined
 def outcome_in(a: np.ndarray, row: int) -> OutcomeTable:
     """Return the outcome in a column of an array."""
-    return OutcomeTable(
-        a[0, row],
-        a[1, row],
-        a[2, row],
-        a[3, row],
-        a[4, row],
-        a[5, row],
-        a[6, row],
-        a[7, row],
-        a[8, row],
-        a[9, row],
-        a[10, row],
-    )
+    outcome: OutcomeTable = taken(a, 0, row, OutcomeTable)
+    return outcome
 
 
 @kernel

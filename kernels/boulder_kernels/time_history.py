@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import inlined, kernel
+from ._jit import inlined, kernel, taken
 from .design import Constants, Readings
 from .dormand_prince import DenseOutput, state_at
 from .dynamics import (
@@ -220,8 +220,8 @@ def modes_of(y: State, turning: int, touching: bool, c: Any) -> Modes:
 @inlined
 def state_of(record: Record, sample: int) -> State:
     """Return the state at a sample."""
-    y = record.states[sample]
-    return State(y[0], y[1], y[2], y[3], y[4], y[5])
+    y: State = taken(record.states[sample], 0, 0, State)
+    return y
 
 
 @inlined

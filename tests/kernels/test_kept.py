@@ -149,11 +149,11 @@ NAMES = """
 import re
 import sys
 import numba
-from boulder_kernels.workspace import group_type
+from boulder_kernels.lanes import group_type
 
 @numba.njit
 def first(group):
-    return group.state.theta_b[0]
+    return group.y.theta_b[0]
 
 kinds = {"dry": (1, False, True), "wet": (2, True, True)}
 for name in sys.argv[1:]:
