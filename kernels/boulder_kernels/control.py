@@ -23,11 +23,11 @@ import numpy as np
 
 from ._jit import exact_inlined, inlined, kernel, taken
 from .design import Constants
-from .modes import AT_END, TOLERANCE, GapFactors, needs_moment
+from .dynamics import soil_reaction
+from .events import AT_END, TOLERANCE, GapFactors, needs_moment
 from .numerics import sine_versine
 from .outcomes import FINER, NONE_NEEDED, Status
 from .soil import Kinematics
-from .soil_laws import soil_reaction
 
 VALID_ROTATION = math.radians(20.0)
 """Rotation up to which the model is valid [rad]: beyond, the boulder climbs out of its bed, as the paper says. What
@@ -67,7 +67,7 @@ class Control(NamedTuple):
     paired: bool = False
     """Where errors are estimated: whether every design is solved twice for it, and not only doubtful ones."""
     event_tolerance: float = TOLERANCE
-    """Precision with which events are located, as a fraction of the step; `boulder_kernels.modes.TOLERANCE` as
+    """Precision with which events are located, as a fraction of the step; `boulder_kernels.events.TOLERANCE` as
     printed."""
     side_by_side: bool = True
     """Whether designs that may go through lanes side by side do, or one after another. The two round differently."""

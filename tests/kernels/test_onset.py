@@ -10,10 +10,10 @@ from boulder_kernels.control import BEHIND, RETRY, first_length, onset_of
 from boulder_kernels.design import Constants, Design, constants_of
 from boulder_kernels.dormand_prince import step
 from boulder_kernels.dynamics import SEATED, TURNING_FORWARD, Acceleration, State
-from boulder_kernels.following import RUNNING, Impact, begin_to_turn, enter_modes, first_touch, go_on
-from boulder_kernels.lanes import LANES, empty_groups, follow_lane, start_designs
-from boulder_kernels.modes import AT_END, TOLERANCE, initial_modes
+from boulder_kernels.events import AT_END, TOLERANCE, initial_modes
+from boulder_kernels.impact import RUNNING, Impact, begin_to_turn, enter_modes, first_touch, go_on
 from boulder_kernels.pieces import PRESSURE, SUBGRADE, TO, uniform_layers
+from boulder_kernels.table import LANES, empty_groups, follow_lane, start_designs
 from tests import oracle
 from tests.kernels.samples import layered_constants
 from tests.oracle import dynamics, events, restoring
