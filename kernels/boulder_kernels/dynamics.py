@@ -1,8 +1,9 @@
 """The state of an impact and its rate (Eqs 10, 11, 52), with the forces of soil, truck and weight.
 
-**Laws of the soil** stand in one table, `LAWS`. A law is one `SoilLaw`. Which one holds follows from the type of the constants of a design: plain `Constants` stand
-for a uniform soil beside a box, `SoilConstants` carry the record of their soil. Inside kernels the function is chosen
-when they are compiled, so a uniform soil has the code it would have if there were no other.
+**Laws of the soil** stand in one table, `LAWS`. A law is one `SoilLaw`. Which one holds follows from the type of the
+constants of a design: plain `Constants` stand for a uniform soil beside a box, `SoilConstants` carry the record of
+their soil. Inside kernels the function is chosen when they are compiled, so a uniform soil has the code it would have
+if there were no other.
 
 To add a law: write its record and functions next to `boulder_kernels.pieces`, and a line in `LAWS`.
 

@@ -1,9 +1,10 @@
 """What a simulation reports: maxima and how it ended, their numerical error, and the time history.
 
-**Errors** are estimated from the steps of one solution, or from the difference of two. Dormand and Prince's method computes a fourth-order solution with its fifth-order one, at little cost, and so yields a
-difference in every step. Summed over all steps, the differences give an error of the speed. Multiplied by the time for
-which it acts, `error_time`, this gives the error of a displacement. We measured this time instead of deriving it, so
-that the estimate covers the true error of 99.9 % of random designs, of usual ones and of families far from them.
+**Errors** are estimated from the steps of one solution, or from the difference of two. Dormand and Prince's method
+computes a fourth-order solution with its fifth-order one, at little cost, and so yields a difference in every step.
+Summed over all steps, the differences give an error of the speed. Multiplied by the time for which it acts,
+`error_time`, this gives the error of a displacement. We measured this time instead of deriving it, so that the estimate
+covers the true error of 99.9 % of random designs, of usual ones and of families far from them.
 
 The sum does not notice a motion that takes a wrong branch, as a rocking boulder may, nor the error in locating an
 event. A design to which this may happen is *doubtful*, and is solved again with half the step. Near the limit, where
