@@ -413,16 +413,15 @@ def constants_of(design: Design, readings: Readings, elements: int) -> Constants
         Non-finite or non-positive where the design is impossible: see `is_computable`.
     """
     d = design.d
-    spring = spring_per_depth(design)
     return constants_with(
         design,
         body_of_box(design),
         readings,
         elements,
         soil_mass(design, elements),
-        spring * d * d,
+        spring_per_depth(design) * d * d,
         design.rho_s * design.W * d,
-        ultimate_per_depth(design) / spring,
+        yield_displacement(design),
     )
 
 
