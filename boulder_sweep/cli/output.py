@@ -83,7 +83,7 @@ def announced(say_so: Callable[[str], None], resume: Callable[[], None]) -> Iter
     `say_so` shows a line before the first kernel is compiled; `resume` is called whenever one has been compiled.
     """
     from boulder_kernels import _jit
-    from boulder_kernels._cache import CACHE_FOLDER
+    from boulder_kernels._jit import CACHE_FOLDER
 
     said = False
 

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from boulder_kernels import Constants, Control, Design, Outcome, Readings, Record
-from boulder_kernels.design import Body
+from boulder_kernels.design import Body, body_with
 from boulder_kernels.dynamics import (
+    BOX,
     FREE,
     HELD,
     LIMITED_BACK,
@@ -19,11 +20,9 @@ from boulder_kernels.dynamics import (
     TURNING_FORWARD,
     Acceleration,
 )
-from boulder_kernels.outline import body_with
+from boulder_kernels.outcomes import StoredEnergies, evaluate_samples
 from boulder_kernels.pieces import ManyPieces, Piece
 from boulder_kernels.soil import drag_force, soil_kinematics, spring_force
-from boulder_kernels.soil_laws import BOX
-from boulder_kernels.time_history import StoredEnergies, evaluate_samples
 
 MODE_NAMES = {
     SEATED: "seated",
@@ -51,7 +50,7 @@ class Motion:
     """Outcome of the whole recorded motion, beyond the limit."""
 
     given_outline: np.ndarray = field(default_factory=lambda: BOX)
-    """Outline of the boulder, shape (P, 4), see `boulder_kernels.outline`; P = 0 of a box."""
+    """Outline of the boulder, shape (P, 4), see `boulder_kernels.design`; P = 0 of a box."""
 
     @property
     def body(self) -> Body:
@@ -60,7 +59,7 @@ class Motion:
 
     @property
     def outline(self) -> np.ndarray:
-        """Outline of the boulder, shape (P, 4), see `boulder_kernels.outline`; a box has its own."""
+        """Outline of the boulder, shape (P, 4), see `boulder_kernels.design`; a box has its own."""
         if len(self.given_outline):
             return self.given_outline
         half = 0.5 * self.design.L

@@ -273,7 +273,7 @@ def compiled():
 @pytest.mark.parametrize("kept", [True, False])
 def test_every_command_that_compiles_says_so_first(compiled, sweep, words, kept, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("boulder_kernels._cache.CACHE_FOLDER", str(tmp_path) if kept else None)
+    monkeypatch.setattr("boulder_kernels._jit.CACHE_FOLDER", str(tmp_path) if kept else None)
     again = ["--overwrite"] if words[0] == "run" else []
     sweep(*words)
     assert COMPILING not in sweep(*words, *again)[2]
