@@ -65,7 +65,7 @@ def answer_of(rows: ResultRows) -> Answer:
         sentences, named = _counts(rows, n), NamedDesign("Design 0", 0)
     else:
         sentences, named = need_sentences(rows, need)
-        if len(rows.codes) > 1 and n and need.probability is None:
+        if len(rows.codes) > 1 and rows.grades.get("open", 0) < n and need.probability is None:
             sentences.append(_grades(rows, n))
     if shown is None:
         return Answer(need, rows.row(named.number), tuple(sentences), named)

@@ -81,12 +81,10 @@ def key_words(need: Need) -> str:
 
 
 def need_sentences(rows: ResultRows, need: Need) -> tuple[list[Sentence], NamedDesign]:
-    """Return how many rows have an answer, why others have none, and first, where nothing is recommended, the worst."""
+    """Return why rows have no answer, and first, where nothing is recommended, the worst answer."""
     answers = need.arrow[need.key.answer].to_numpy()
     n, total = int((~np.isnan(answers)).sum()), len(answers)
     sentences: list[Sentence] = []
-    if total > 1:
-        sentences.append((f"{n:,} of {total:,} combinations have an answer ({share(n, total)}).",))
     without = need.arrow.filter(need.arrow["passes_at"].is_null())["found"].to_pylist()
     for word, count in Counter(without).items():
         if word in NOTHING:

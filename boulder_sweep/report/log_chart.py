@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from boulder_sweep.settings.soil_readings import log_title, shown_readings, strength
+from boulder_sweep.settings.shown_units import shown_unit
 from boulder_sweep.views.log_text import layer_words, quantity
 
 _TICKS = 5
@@ -49,24 +50,28 @@ class LogChart(NamedTuple):
     """Ticks of the value; the last one is the end of the axis."""
 
 
-def log_charts(settings: Mapping[str, Any]) -> list[LogChart]:
+def log_charts(settings: Mapping[str, Any], units: str = "si") -> list[LogChart]:
     """Return a figure of each log from which the soil of a sweep was taken.
 
     Parameters
     ----------
     settings
         Resolved settings of the sweep.
+    units
+        ``si`` or ``us``: depths are marked at round numbers in these.
     """
-    return [_chart(data) for data in settings.get("derived", {}).get("soil", ()) if "log" in data]
+    return [_chart(data, shown_unit("m", units)[1]) for data in settings.get("derived", {}).get("soil", ()) if "log" in data]
 
 
-def _chart(data: dict[str, Any]) -> LogChart:
+def _chart(data: dict[str, Any], size: float) -> LogChart:
+    """Return the figure of a log; depths are marked in a unit of so many metres."""
     readings = tuple(
         Reading(one["depth_m"], strength(one), bool(one.get("at_least")), one.get("left_out", ""))
         for one in shown_readings(data)
     )
     foot = data.get("foot_m")
-    depths = _ticks(max([reading.depth for reading in readings] + ([] if foot is None else [foot])))
+    deepest = max([reading.depth for reading in readings] + ([] if foot is None else [foot]))
+    depths = tuple(depth * size for depth in _ticks(deepest / size))
     layers = [layer for layer in data.get("layers", ()) if layer["from_m"] < depths[-1]]
     words = [Label(layer["from_m"], layer_words(data, layer, at), None) for at, layer in enumerate(layers)]
     words += [] if foot is None else [Label(foot, "deepest foot", foot)]

@@ -20,6 +20,7 @@ from boulder_sweep.report.figures import curves, verdict_map
 from boulder_sweep.report.log_chart import log_charts
 from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.shown_units import shown_settings
+from boulder_sweep.settings.sweep import derived_words
 from boulder_sweep.text import script_data
 from boulder_sweep.views.wording import LAW_WORDS, ground_words
 
@@ -32,6 +33,8 @@ ASSETS = Path(__file__).with_name("assets")
 SCRIPTS = ("kernel", "verdict", "simulator", "texts", "plots", "scene", "maps", "controls", "page")
 """Our own script, in this order."""
 NOTHING: Mapping[str, str] = {}
+UNPRINTED = ("derived", "judged_at", "report")
+"""Parts of the settings that are not printed: the document says them in words, or draws them."""
 MAIN = (
     "embedment_depth_m",
     "friction_angle_deg",
@@ -116,6 +119,8 @@ def assembled(
     origin = (f"boulder-sweep {known['version of boulder-sweep']}", f"settings {known['hash of the settings'][:12]}")
     revision = f"revision {heading['revision']}" if "revision" in heading else ""
     footer = (heading.get("project"), data["title"], revision, heading.get("date"), *origin)
+    listed = shown_settings(settings, units)
+    derived = {name: listed.pop(name) for name in UNPRINTED if name in listed}
     script = "\n".join((ASSETS / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS)
     library = "\n".join(INLINE.clone(components=["bokeh"]).js_raw)
     environment = jinja2.Environment(
@@ -140,11 +145,13 @@ def assembled(
         mapped=mapped,
         said=rows is None or sheet is None or not mapped or _is_listed(rows, sheet, answers),
         facts=facts,
-        notes=notes,
+        notes=[*notes],
         heading=heading,
-        logs=log_charts(settings),
+        logs=log_charts(settings, units),
+        sources=[words[0].upper() + words[1:] for words in derived_words(settings.get("derived", {}), units)],
         settings=settings,
-        lines=setting_lines(shown_settings(settings, units)),
+        lines=setting_lines(listed),
+        derived_lines=setting_lines(derived),
         readings=reading_words(settings),
         ground=ground_words(settings, units),
         shape=Shape.of_model(settings["model"]).words,

@@ -172,9 +172,7 @@ def _checks(
         if value and allowed:
             used = f"{100.0 * max(allowed / value if name == 'overlap_m' else value / allowed, 0.0):.0f} %"
         none = "no limit" if name == "max_displacement_m" else "–"
-        computed: Cell = "–" if value is None else Measure(value, unit)
-        if name == "penetration_m" and value is not None and value <= 0.0:
-            computed = "none"
+        computed = _outcome(row, name, unit)
         lines.append((words, computed, none if allowed is None else Measure(allowed, unit), used))
     if "p_pass" in row:
         least = "–" if need.probability is None else f"≥ {100.0 * need.probability:.4g} %"
@@ -183,6 +181,14 @@ def _checks(
             chances.append(("and of a robust pass", f"{row['p_robust']:.1%}", least if need.robust else "–", "–"))
         lines = [*chances, *lines]
     return tuple(lines)
+
+
+def _outcome(row: Mapping[str, Any], name: str, unit: str) -> Cell:
+    """Return an outcome of a row; of a cargo bed that stays before the boulder, that it does not penetrate."""
+    value = row[name]
+    if name == "penetration_m" and value is not None and value <= 0.0:
+        return "none"
+    return "–" if value is None else Measure(value, unit)
 
 
 def _build(rows: ResultRows, row: Mapping[str, Any], design: Design) -> tuple[tuple[str, Cell], ...]:
@@ -264,7 +270,7 @@ def _cases(cases: Sequence[Mapping[str, Any]], names: Sequence[str]) -> AnswerTa
     lines = []
     for row in cases[:MOST_CASES]:
         line: list[Cell] = [row[n] if isinstance(row[n], str) else Measure(row[n], BY_NAME[n].unit) for n in names]
-        line += ["–" if row[name] is None else Measure(row[name], unit) for name, _, unit in outcomes]
+        line += [_outcome(row, name, unit) for name, _, unit in outcomes]
         margin = "–" if row["margin"] is None else f"{row['margin']:.1%}"
         line += [f"{row['p_pass']:.1%}"] if chance else [margin, row["robustness"] or row["reason"] or "–"]
         lines.append(tuple(line))

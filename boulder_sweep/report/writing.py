@@ -28,7 +28,7 @@ from boulder_sweep.report.sheet import sheet_of
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import FOOT_WORDS, SolverSettings
 from boulder_sweep.settings.shown_units import check_system, quantity_text
-from boulder_sweep.settings.sweep import NO_HEADING, SECTION, Heading, derived_words, units_in, wrong_with
+from boulder_sweep.settings.sweep import NO_HEADING, SECTION, Heading, units_in, wrong_with
 from boulder_sweep.signals import end_group, undone
 from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.store.folder import check_target
@@ -258,15 +258,8 @@ def _general_notes(settings: Mapping[str, Any], control: Control, units: str) ->
     if settings["model"].get("rock_assumed"):
         rock = quantity_text("kg/m^3", units, ROCK_KG_M3)
         notes.append(f"The density of the rock was not given: {rock} is assumed, and no pass is robust.")
-    notes += [
-        f"Source of {words.replace('vehicle.speed', 'vehicle speed')}."
-        for words in derived_words(settings.get("derived", {}), units)
-    ]
     if taken := [_taken(name, how, settings["inputs"], units) for name, how in settings.get("taken_at", {}).items()]:
-        judged = (
-            "; every design of the table is judged at the means and at the other ends, too, and has the worst verdict, "
-            "while simulations in this page take the values shown"
-        )
+        judged = "; every design has the worst verdict at these, the means and the other ends"
         notes.append(f"Uncertain inputs are taken at {', '.join(taken)}{judged if 'judged_at' in settings else ''}.")
     for factor in settings.get("partial_factor", {}).values():
         notes.append(f"Friction angles are design values, with a partial factor of {factor:g} on their tangent.")

@@ -207,7 +207,8 @@ def _mistakes(value: Any, kind: Any, path: str) -> Iterator[str]:
         for entry in fields(kind):
             if entry.name in value:
                 yield from _mistakes(value[entry.name], hints[entry.name], f"{path}.{entry.name}")
-            elif entry.default is MISSING and entry.default_factory is MISSING:
+            elif "entry" in entry.metadata or (entry.default is MISSING and entry.default_factory is MISSING):
+                # Defaults of a settings file are filled in, so what a result holds has them all.
                 yield f"{path}.{entry.name} is missing"
         yield from (f"{path}.{key} is no entry" for key in value if key not in hints)
     elif get_origin(kind) is dict:

@@ -96,7 +96,6 @@ def test_of_a_question_without_a_recommendation_the_governing_answer_is_named(fi
     governing = answer.sentences[0]
     assert governing[1] == Measure(speeds.min(), "m/s")
     assert str(governing[2]).startswith(f" (design {speeds.idxmin()}, margin ")
-    assert answer.sentences[1] == (f"{speeds.notna().sum()} of {len(frame)} combinations have an answer (100.0%).",)
 
 
 def test_what_has_no_answer_says_why(files: dict[str, Path]) -> None:

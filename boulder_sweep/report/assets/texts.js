@@ -43,7 +43,7 @@ class Units {
     if (value === null) return "–";
     if (typeof value === "string") return value;
     const name = this.name(unit);
-    return name === "" ? number(value) : `${number(value / this.size(unit))}${name === "°" ? "" : "\u00a0"}${name}`;
+    return name === "" ? number(value) : `${this.bare(value, unit)}${name === "°" ? "" : "\u00a0"}${name}`;
   }
 
   /**
@@ -59,7 +59,10 @@ class Units {
 
   /** @param {number | string | null} value @param {string} unit of the table @returns {string} a number without its unit */
   bare(value, unit) {
-    return typeof value === "number" ? number(value / this.size(unit)) : (value ?? "–");
+    if (typeof value !== "number") return value ?? "–";
+    const shown = value / this.size(unit);
+    // Nobody measures a boulder or its bed more finely than to the hundredth of a foot.
+    return number(this.plain(unit) === "ft" && Math.abs(shown) >= 0.1 ? Number(shown.toFixed(2)) : shown);
   }
 
   /** @param {string} words @param {string} unit of the table @returns {string} a title for an axis */
