@@ -1,7 +1,7 @@
-"""The figures of the page: plots made by Bokeh, and the recommended design as a section to scale.
+"""The figures of the page: plots made by Bokeh, the recommended design as a section to scale, and logs of the ground.
 
-The plots are named empty figures that the page fills with what it simulates. The section has dimensions and the soil as
-it lies; the template draws it.
+The plots are named empty figures that the page fills with what it simulates. The template draws the others: the section
+with dimensions and the soil as it lies, and of a borehole or a cone the readings over depth with their layers.
 
 Nothing here runs its own code in the browser (Bokeh's CustomJS would need a policy that allows text as code); the
 page's script finds figures and sources by name and sets their data.
@@ -9,26 +9,32 @@ page's script finds figures and sources by name and sets their data.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from bokeh.models import ColumnDataSource, DataRange1d, HoverTool, TapTool
-from bokeh.models.annotations import BoxAnnotation, Legend
+from bokeh.models.annotations import BoxAnnotation
 from bokeh.plotting import figure
 
 from boulder_sweep.settings.model import Ground
 from boulder_sweep.settings.shape import BOX, ProfilePoint, Shape
+from boulder_sweep.settings.shown_units import shown_unit
+from boulder_sweep.settings.soil_readings import log_title, shown_readings, strength
+from boulder_sweep.views.log_text import layer_words, quantity
 from boulder_sweep.views.pictures import VERDICTS
 
 COLOURS = {**VERDICTS, "none": "#BBBBBB"}
 """Colours of verdicts, as in `sweep plot`."""
 HATCHES = {"sensitive": "/", "open": "."}
 """Patterns of passes that are not robust, by their grade."""
+TEXT, RULE = "#1d2329", "#c9d1d8"
+"""Colours of words and of axes, as in the style of the page."""
+LEGEND_LINE_PX = 22
 LINES = ("#1E88C9", "#D55E00", "#009E73")
 PARTS = {
     "vehicle_kinetic": ("vehicle, moving", "#0072B2"),
-    "crush_damper": ("vehicle, crushed for good", "#56B4E9"),
+    "crush_damper": ("vehicle, crushed", "#56B4E9"),
     "crush_spring": ("vehicle, sprung", "#B3DDF5"),
     "boulder_linear": ("boulder, moving", "#D55E00"),
     "boulder_angular": ("boulder, turning", "#E69F00"),
@@ -49,6 +55,10 @@ LINE = 0.34
 """Distance of lines of text [m]."""
 CAB_M = 0.85
 """How far the cab stands above the hood."""
+_TICKS = 5
+"""Intervals of an axis, about."""
+_LINE = 0.07
+"""Distance of lines of text, as a share of the axis of depth."""
 
 
 def curves(panel: str) -> list[figure]:
@@ -87,12 +97,11 @@ def curves(panel: str) -> list[figure]:
         legend_label=[words for words, _ in PARTS.values()],
     )
     for plot in (displacement, energy):
-        beside = plot.legend[0]
-        plot.add_layout(beside, "right")
-        # The page shows this one in place of the other on narrow screens.
-        below = Legend(items=beside.items, visible=False, location="top_left", spacing=4, margin=0)
-        below.glyph_width, below.glyph_height = 14, 14
-        plot.add_layout(below, "below")
+        (legend,) = plot.legend
+        legend.ncols, legend.spacing, legend.glyph_width, legend.glyph_height = 2, 10, 20, 14
+        legend.label_text_color, legend.background_fill_color, legend.border_line_color = TEXT, None, None
+        plot.add_layout(legend, "below")
+        plot.height += LEGEND_LINE_PX * -(-len(legend.items) // legend.ncols)
     figures = [rotation, displacement, force, energy]
     for plot in figures:
         plot.x_range = DataRange1d(range_padding=0)
@@ -157,7 +166,10 @@ def _plot(panel: str, kind: str, tooltips: list[tuple[str, str]], height: int = 
     plot.xaxis.name, plot.yaxis.name = f"{panel}-{kind}-x", f"{panel}-{kind}-y"
     for axis in (plot.xaxis, plot.yaxis):
         axis.axis_label_text_font_style = "normal"
+        axis.axis_label_text_color = axis.major_label_text_color = TEXT
+        axis.axis_line_color = axis.major_tick_line_color = axis.minor_tick_line_color = RULE
         axis.axis_label_text_font_size = axis.major_label_text_font_size = "13px"
+    plot.grid.grid_line_color = RULE
     return plot
 
 
@@ -310,3 +322,92 @@ def sketch_of(
         plan=(wide - length, upper, length, width),
         bar=BARS[units],
     )
+
+
+class Reading(NamedTuple):
+    """A reading: its depth [m], its value, whether the ground may be stronger, and why it does not count, if so."""
+
+    depth: float
+    value: float
+    at_least: bool
+    left_out: str
+
+
+class Label(NamedTuple):
+    """Words beside the figure: the depth where they stand [m], and a length that follows them, if any [m]."""
+
+    at: float
+    words: str
+    length: float | None
+
+
+class LogChart(NamedTuple):
+    """What the template draws of a log; depths [m] below the ground."""
+
+    title: str
+    quantity: str
+    readings: tuple[Reading, ...]
+    layers: tuple[tuple[float, float], ...]
+    """Upper and lower boundary of each layer."""
+    foot: float | None
+    labels: tuple[Label, ...]
+    depths: tuple[float, ...]
+    """Ticks of the depth; the last one is the end of the axis."""
+    values: tuple[float, ...]
+    """Ticks of the value; the last one is the end of the axis."""
+
+
+def log_charts(settings: Mapping[str, Any], units: str = "si") -> list[LogChart]:
+    """Return a figure of each log from which the soil of a sweep was taken.
+
+    Parameters
+    ----------
+    settings
+        Resolved settings of the sweep.
+    units
+        ``si`` or ``us``: depths are marked at round numbers in these.
+    """
+    return [
+        _chart(data, shown_unit("m", units)[1]) for data in settings.get("derived", {}).get("soil", ()) if "log" in data
+    ]
+
+
+def _chart(data: dict[str, Any], size: float) -> LogChart:
+    """Return the figure of a log; depths are marked in a unit of so many metres."""
+    readings = tuple(
+        Reading(one["depth_m"], strength(one), bool(one.get("at_least")), one.get("left_out", ""))
+        for one in shown_readings(data)
+    )
+    foot = data.get("foot_m")
+    deepest = max([reading.depth for reading in readings] + ([] if foot is None else [foot]))
+    depths = tuple(depth * size for depth in _ticks(deepest / size))
+    layers = [layer for layer in data.get("layers", ()) if layer["from_m"] < depths[-1]]
+    words = [Label(layer["from_m"], layer_words(data, layer, at), None) for at, layer in enumerate(layers)]
+    words += [] if foot is None else [Label(foot, "deepest foot", foot)]
+    return LogChart(
+        log_title(data),
+        quantity(data),
+        readings,
+        tuple((layer["from_m"], min(layer["to_m"], depths[-1])) for layer in layers),
+        foot,
+        tuple(_apart(sorted(words), _LINE * depths[-1])),
+        depths,
+        _ticks(max(reading.value for reading in readings)),
+    )
+
+
+def _apart(labels: list[Label], distance: float) -> Iterator[Label]:
+    """Yield labels from the top down, moved down where one would touch another."""
+    free = 0.5 * distance
+    for label in labels:
+        at = max(label.at, free)
+        free = at + distance
+        yield label._replace(at=at)
+
+
+def _ticks(most: float) -> tuple[float, ...]:
+    """Return round numbers from 0 to the first one that is `most` or more."""
+    rough = max(most, 1e-9) / _TICKS
+    power = 10.0 ** np.floor(np.log10(rough))
+    step = power * next(factor for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= rough)
+    return tuple(round(float(tick), 9) for tick in step * np.arange(np.ceil(most / step - 1e-9) + 1))

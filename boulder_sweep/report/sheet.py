@@ -17,8 +17,7 @@ from boulder_sweep.answers.recommendation import Design
 from boulder_sweep.columns import BOULDER_MASS, SHAPES, TO_BUILD
 from boulder_sweep.judge.robustness import meaning_of
 from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
-from boulder_sweep.report.answers import Answer
-from boulder_sweep.report.asked import AnswerTable, Measure
+from boulder_sweep.report.answers import Answer, AnswerTable, Measure
 from boulder_sweep.report.figures import Sketch, sketch_of
 from boulder_sweep.report.rows import DEPTH, ResultRows, inputs_of, label_of
 from boulder_sweep.settings.fields import BY_NAME

@@ -20,11 +20,9 @@ from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.accuracy import accuracy_of, control_of, readings_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import Location, location_of, replacing
-from boulder_sweep.report.answers import answer_of
-from boulder_sweep.report.asked import NamedDesign, answers_table
+from boulder_sweep.report.answers import NamedDesign, answer_of, answers_table
 from boulder_sweep.report.build import kernel
 from boulder_sweep.report.rows import MOST_ELEMENTS, inputs_of, read_rows
-from boulder_sweep.report.sheet import sheet_of
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import FOOT_WORDS, SolverSettings
 from boulder_sweep.settings.shown_units import check_system, quantity_text
@@ -120,6 +118,8 @@ def write_report(
         if wrong := wrong_with(text):
             raise ReportError(f"--{key.replace('_', '-')}: {wrong}")
     assembled = _page_maker()
+    from boulder_sweep.report.sheet import sheet_of  # needs the extra, too
+
     rows = dataclasses.replace(read_rows(location_of(out)), asks=second_opinion)
     target = checked_page(page)
     if rows.finished.rows_done == 0:

@@ -29,8 +29,7 @@ import boulder_sweep
 from boulder_sweep.answers.outputs import AnswerFile
 from boulder_sweep.answers.reserves import capacity
 from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning, ReportError
-from boulder_sweep.report.answers import answer_of
-from boulder_sweep.report.asked import answers_table
+from boulder_sweep.report.answers import answer_of, answers_table
 from boulder_sweep.report.comparison import compare
 from boulder_sweep.report.export import export
 from boulder_sweep.report.rows import read_rows

@@ -21,8 +21,7 @@ from boulder_sweep.answers.outputs import AnswerFile
 from boulder_sweep.answers.reserves import capacity
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report
-from boulder_sweep.report.answers import answer_of
-from boulder_sweep.report.asked import Measure, answers_table
+from boulder_sweep.report.answers import Measure, answer_of, answers_table
 from boulder_sweep.report.comparison import compare
 from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import load_text

@@ -15,8 +15,7 @@ from boulder_sweep.answers.advice import advice
 from boulder_sweep.answers.outputs import AnswerFile
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report
-from boulder_sweep.report.answers import answer_of
-from boulder_sweep.report.asked import answers_table
+from boulder_sweep.report.answers import answer_of, answers_table
 from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import load_text
 from boulder_sweep.store.provenance import sha256_of

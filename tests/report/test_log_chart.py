@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from boulder_sweep.report.log_chart import log_charts
+from boulder_sweep.report.figures import log_charts
 from boulder_sweep.report.writing import write_report
 from boulder_sweep.runner.run import run
 from boulder_sweep.settings import load

@@ -108,7 +108,9 @@ def check_map(page, table):
         return
     told = table.reason
     if "robustness" in table:
-        told = told.where(table.verdict != "pass", table.robustness.astype(object).fillna(""))  # none where none was asked for
+        told = told.where(
+            table.verdict != "pass", table.robustness.astype(object).fillna("")
+        )  # none where none was asked for
     verdicts = (table.verdict + told.where(told == "", ": " + told)).to_numpy()
     rows = page.evaluate("({ grid: page.data.rows.grid, values: page.data.rows.values, held: page.held })")
     if rows["grid"]:

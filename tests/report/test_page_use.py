@@ -326,8 +326,8 @@ def test_the_colours_of_legends_are_printed(report, opened):
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize(("width", "below"), [(390, True), (1280, False)])
-def test_on_a_phone_legends_are_below_their_figures(report, opened, width, below):
+@pytest.mark.parametrize("width", [390, 1280])
+def test_legends_leave_room_for_their_figures(report, opened, width):
     page = opened(report, viewport={"width": width, "height": 844})
     page.wait_until_it_is_true("Bokeh.documents.every((one) => one.is_idle)")
     page.wait_for_frames(10)
@@ -337,10 +337,5 @@ def test_on_a_phone_legends_are_below_their_figures(report, opened, width, below
     )
     assert frame[0] > 220
     assert frame[1] > 120
-    shown = page.evaluate(
-        "['right', 'below'].map((side) => page.plots.find('live-energy')[side]"
-        ".filter((part) => part.type === 'Legend').map((part) => part.visible)[0])"
-    )
-    assert shown == [not below, below]
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert page.complaints == []

@@ -12,7 +12,7 @@ from boulder_sweep.answers.advice import advice
 from boulder_sweep.judge.quantities import quantities
 from boulder_sweep.report import write_report
 from boulder_sweep.report.answers import answer_of
-from boulder_sweep.report.contents import table_data, thinned
+from boulder_sweep.report.page import table_data, thinned
 from boulder_sweep.report.rows import NOT_YET, read_rows
 from boulder_sweep.settings.model import Ground
 from boulder_sweep.settings.shape import Shape

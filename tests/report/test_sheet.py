@@ -20,8 +20,7 @@ from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.outputs import AnswerFile
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report, writing
-from boulder_sweep.report.answers import answer_of
-from boulder_sweep.report.asked import Measure
+from boulder_sweep.report.answers import Measure, answer_of
 from boulder_sweep.report.rows import read_rows
 from boulder_sweep.report.sheet import Sheet, sheet_of
 from boulder_sweep.settings.sweep import Heading

@@ -9,8 +9,6 @@ const SPREAD = 0.25;
 const PAUSE = 150;
 /** Time for which the map around a design is computed before the page answers its reader again [ms]. */
 const LONGEST_BLOCK_MS = 100;
-/** Screens on which legends stand below their figures; the style of the page has the same. */
-const NARROW = "(max-width: 46rem)";
 /** Width that is printed on a page [px], and heights of A4 and Letter between their margins; a little less than there is. */
 const PAPER = { width: 676, si: 994, us: 928 };
 /** Least size of what is written beside a figure on paper [px]: 8 pt. */
@@ -39,7 +37,6 @@ class Page {
     this.waiting = 0;
     /** Of maps around a design; another change makes the one that is being computed the last but one. */
     this.rounds = 0;
-    this.printing = false;
     this.axes = { live: new Axes("live-across", "live-up"), sweep: data.rows?.mapped ? new Axes("across", "up") : null };
     const panels = ["live", ...data.chosen.map((/** @type {any} */ _, /** @type {number} */ k) => `chosen${k}`)];
     /** @type {Record<string, Player>} */
@@ -266,10 +263,9 @@ class Page {
     return csvOf(names, this.list.map((design, k) => ({ ...this.simulator.completed(design).inputs, ...found[k] })));
   }
 
-  /** Show everything anew, in other units or colours. */
+  /** Show everything anew, in other units. */
   refresh() {
     document.documentElement.dataset.units = this.units.system;
-    this.plots.recolour();
     for (const place of document.querySelectorAll(".quantity")) {
       const { value, unit } = /** @type {HTMLElement} */ (place).dataset;
       place.textContent = this.units.text(Number(value), String(unit));
@@ -366,11 +362,6 @@ class Page {
       this.controls.refused = {};
       this.refresh();
     });
-    byId("theme").addEventListener("change", () => this.paint());
-    const narrow = matchMedia(NARROW);
-    narrow.addEventListener("change", () => this.plots.place(narrow.matches));
-    this.plots.place(narrow.matches);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.paint());
     /** @type {HTMLDetailsElement[]} */
     let opened = [];
     window.addEventListener("beforeprint", () => {
@@ -381,14 +372,10 @@ class Page {
       document.documentElement.style.setProperty("--paper", String(size));
       const above = document.querySelector("header")?.offsetHeight ?? 0;
       document.documentElement.style.setProperty("--sheet", `${PAPER[/** @type {"si" | "us"} */ (data.units)] / size - above}px`);
-      this.printing = true;
-      this.paint();
     });
     window.addEventListener("afterprint", () => {
       for (const one of opened) one.open = false;
-      this.printing = false;
       this.plots.write(WRITTEN);
-      this.paint();
     });
     for (const button of document.querySelectorAll(".load")) {
       button.addEventListener("click", () => {
@@ -406,14 +393,6 @@ class Page {
   /** Write beside figures so large that it can be read on paper. */
   writeForPaper() {
     this.plots.write(LEAST_PX / this.shrunk);
-  }
-
-  /** Put on the colours that the reader or the system wants; on paper the light ones. */
-  paint() {
-    const wanted = byId("theme").value || (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
-    const dark = wanted === "dark" && !this.printing;
-    document.documentElement.toggleAttribute("data-dark", dark);
-    this.plots.recolour();
   }
 
   async copy() {
@@ -458,7 +437,6 @@ async function main() {
   const page = new Page(data, kernel, plots, codes);
   page.offer();
   page.listen();
-  page.paint();
   page.refresh();
   Object.assign(window, { page });
   if (location.hash === "#paper") page.writeForPaper();
