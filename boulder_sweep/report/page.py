@@ -36,15 +36,7 @@ from boulder_sweep.report.build import kernel
 from boulder_sweep.report.export import setting_lines
 from boulder_sweep.report.figures import COLOURS, PARTS, curves, log_charts, verdict_map
 from boulder_sweep.report.rows import MOST_ELEMENTS, NOT_YET, ResultRows, label_of
-from boulder_sweep.settings.checks import (
-    BEYOND_FRONT,
-    FLOATS,
-    LEAST_CRUSH,
-    MOST_CRUSH,
-    SHORT_OF_FRONT,
-    SLIDES,
-    uppermost_is_wet,
-)
+from boulder_sweep.settings.checks import FLOATS, SLIDES, uppermost_is_wet
 from boulder_sweep.settings.entries import LAYER_FIELDS
 from boulder_sweep.settings.fields import BY_NAME, fields_of
 from boulder_sweep.settings.model import FEET, RESISTANCES, WATER_KG_M3, Ground
@@ -291,13 +283,6 @@ def page_data(
         "face": isinstance(settings["inputs"]["impact_height_m"], str),
         "refusals": [*zip(REASONS, REFUSED_AT, strict=True), (TAPED, "boulder_mass_kg")],
         "refused": {"outside": OUTSIDE, "empty": EMPTY, "not_a_number": NOT_A_NUMBER},
-        "front": {
-            "calibrated": settings["model"]["calibrated_crush_m"],
-            "least": LEAST_CRUSH,
-            "most": MOST_CRUSH,
-            "beyond": BEYOND_FRONT,
-            "short": SHORT_OF_FRONT,
-        },
         "boulder": {
             "flat_foot": float(settings["model"]["foot"] == FEET[0] and shape.stands_flat),
             "profile": [] if shape.is_box else [astuple(point) for point in shape.points],

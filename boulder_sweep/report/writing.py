@@ -8,7 +8,6 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -45,13 +44,6 @@ BROWSERS = (
     r"C:\Program Files (x86)\Microsoft\Edge\Application\msedge.exe",
 )
 """Executables that print, the first found is taken."""
-PLAYWRIGHT = (
-    "chromium-*/chrome-linux*/chrome",
-    "chromium-*/chrome-mac*/*.app/Contents/MacOS/*",
-    "chromium-*/*/chrome.exe",
-)
-"""Where Playwright keeps its browser, within its folder."""
-PLAYWRIGHT_FOLDERS = (".cache/ms-playwright", "Library/Caches/ms-playwright", "AppData/Local/ms-playwright")
 HELP = "write the page as .html and print it from a browser"
 MOST_SECONDS = 300
 """After so long a browser that has not printed the page hangs and is ended; it works for five seconds, of which a busy
@@ -316,15 +308,9 @@ def browser() -> str:
         There is none.
     """
     named = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if named:
-        return named
-    folders: list[Path] = []
-    with suppress(RuntimeError):  # a user without a home
-        folders += [Path.home() / folder for folder in PLAYWRIGHT_FOLDERS]
-    executables = [path for folder in folders for pattern in PLAYWRIGHT for path in sorted(folder.glob(pattern))]
-    if not executables:
+    if not named:
         raise ReportError(f"a PDF is printed by Chromium, which was not found: install Chromium or Chrome, or {HELP}")
-    return str(executables[-1])
+    return named
 
 
 def printed(html: str) -> bytes:

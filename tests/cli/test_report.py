@@ -157,10 +157,9 @@ def test_another_client_neither_refuses_a_resume_nor_changes_a_byte(sweep, heade
     assert ("client", "County") in heading_of("small-grid.html")
 
 
-def test_without_a_browser_a_pdf_is_refused_with_what_to_do(sweep, possible_grid, monkeypatch, tmp_path):
+def test_without_a_browser_a_pdf_is_refused_with_what_to_do(sweep, possible_grid, monkeypatch):
     assert sweep("run", possible_grid, "-q")[0] == 0
     monkeypatch.setattr("shutil.which", lambda name: None)
-    monkeypatch.setenv("HOME", str(tmp_path / "empty"))
     code, out, err = sweep("report", "small-grid.sweep", "-o", "page.pdf")
     assert (code, out) == (2, "")
     assert err == (

@@ -253,24 +253,6 @@ def test_the_copied_file_is_in_the_units_shown_to_six_digits(units, tmp_path, op
         assert astuple(ours) == pytest.approx(astuple(theirs), rel=1e-5)
 
 
-@pytest.mark.nightly
-def test_a_vehicle_far_from_its_spring_has_the_caution_of_the_command(explorer, opened):
-    page = opened(explorer)
-    for name, value, override in (
-        ("vehicle_mass_kg", 29483.5, "vehicle.mass=29483.5 kg"),
-        ("vehicle_mass_kg", 1100, "vehicle.mass=1100 kg"),
-        ("impact_speed_m_s", 22, "vehicle.speed=22 m/s"),
-        ("vehicle_damper_N_s_m", 5e4, "vehicle.damper=50 kN*s/m"),
-    ):
-        page.evaluate(f"page.take({{ ...page.data.start, {name}: {value} }})")
-        (note,) = [
-            str(note) for note in boulder_sweep.load("configs/rwg.yaml", [override]).notes if "wall" in str(note)
-        ]
-        assert note.split("vehicle.spring: ")[1] in page.inner_text("#flags")
-    page.click("#reset")
-    assert "rigid wall" not in page.inner_text("#flags")
-
-
 OWN_CLOCK = """(() => {
     const draw = window.requestAnimationFrame.bind(window);
     window.milliseconds = 0;

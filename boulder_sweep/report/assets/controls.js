@@ -7,10 +7,8 @@
  *   usual: [number, number, string] | null}} Input `above`: what a value must be more than, and what is said otherwise
  */
 /**
- * What is said of the value of an input that a settings file is refused for, and of a vehicle whose front is crushed
- * further, or less far, than its spring and damper were fitted to; written by Python.
+ * What is said of the value of an input that a settings file is refused for; written by Python.
  * @typedef {{outside: string, empty: string, not_a_number: string}} Refused
- * @typedef {{calibrated: number, least: number, most: number, beyond: string, short: string}} Front
  */
 
 /** Values that differ by less are the same in the six digits of a box. */
@@ -54,8 +52,6 @@ class Controls {
     this.fixed = [...data.boulder.fixed, ...(data.face ? ["impact_height_m"] : [])];
     /** @type {Refused} */
     this.words = data.refused;
-    /** @type {Front} */
-    this.front = data.front;
     /** Why what stands in the box of an input is refused, by its name. @type {Record<string, string>} */
     this.refused = {};
     /** @type {Record<string, number>} the design that was simulated last */
@@ -151,25 +147,8 @@ class Controls {
       const range = `${number(low / this.units.size(input.unit))} to ${this.units.text(high, input.unit)}`;
       return `${input.label}: outside the usual ${range} (${remark})`;
     });
-    byId("flags").replaceChildren(...[...words, ...this.cautions(design)].map((one) => element("li", one)));
+    byId("flags").replaceChildren(...words.map((one) => element("li", one)));
   }
-
-  /** @param {Record<string, number>} design @returns {string[]} cautions on its vehicle: `boulder_sweep.settings.checks` */
-  cautions(design) {
-    const { calibrated, least, most, beyond, short } = this.front;
-    const crush = wallCrush(design);
-    const values = { crush: this.units.written(crush, "m", 3), calibrated: this.units.written(calibrated, "m") };
-    if (crush > most * calibrated) return [filled(beyond, values)];
-    return crush < least * calibrated ? [filled(short, values)] : [];
-  }
-}
-
-/** @param {Record<string, number>} design @returns {number} crush of its vehicle at a rigid wall [m]: `wall_crush` of the same module */
-function wallCrush({ vehicle_mass_kg: m, impact_speed_m_s: v, vehicle_spring_N_m: k, vehicle_damper_N_s_m: c }) {
-  const decay = (-0.5 * k) / c;
-  const b = Math.sqrt(Math.max(k / m - decay ** 2, 0));
-  const stops = Math.atan2(b, decay);
-  return (m * v) / c + (b > 0 ? ((v * Math.exp((decay * stops) / b)) / b) * Math.sin(stops) : 0);
 }
 
 /** The two lists that the axes of a map are chosen from. Choosing what the other holds exchanges them. */
