@@ -320,6 +320,19 @@ def test_one_changed_place_in_the_settings_ends_in_words(
     assert refused > many
 
 
+@pytest.mark.parametrize("entry", ["max_rotation_deg", "rating", "min_overlap_m"])
+def test_a_criterion_without_an_entry_is_refused(files: dict[str, Path], tmp_path: Path, entry: str) -> None:
+    """A settings file may leave it to its default, which is in every result."""
+    table = pq.read_table(files["one"])
+    settings = json.loads(table.schema.metadata[b"boulder_sweep.settings"])
+    del settings["criterion"][entry]
+    hashed = {b"boulder_sweep.settings_sha256": settings_sha256(settings).encode()}
+    metadata = table.schema.metadata | {b"boulder_sweep.settings": json.dumps(settings).encode()} | hashed
+    pq.write_table(table.replace_schema_metadata(metadata), tmp_path / "one.parquet")
+    with pytest.raises(ReportError, match=f"damaged .settings.criterion.{entry} is missing.; write it again"):
+        AnswerFile(tmp_path / "one.parquet", ReportError)
+
+
 def test_files_beside_answers_belong_to_them(files: dict[str, Path], tmp_path: Path, sweep: Command) -> None:
     """Samples of other answers, and of none."""
     for name in ("uncertainty.parquet", "uncertainty.samples.parquet"):
