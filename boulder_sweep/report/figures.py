@@ -30,7 +30,8 @@ HATCHES = {"sensitive": "/", "open": "."}
 """Patterns of passes that are not robust, by their grade."""
 TEXT, RULE = "#1d2329", "#c9d1d8"
 """Colours of words and of axes, as in the style of the page."""
-LEGEND_LINE_PX = 22
+HEIGHT_PX, LEGEND_LINE_PX = 240, 22
+"""Height of the curves, and of a line of a legend below them, which has two entries."""
 LINES = ("#1E88C9", "#D55E00", "#009E73")
 PARTS = {
     "vehicle_kinetic": ("vehicle, moving", "#0072B2"),
@@ -81,6 +82,7 @@ def curves(panel: str) -> list[figure]:
         panel,
         "displacement",
         [("time", "@time{0.000} s"), ("vehicle", "@vehicle{0.000}"), ("boulder", "@boulder{0.000}")],
+        height=HEIGHT_PX + LEGEND_LINE_PX,
     )
     displacement.line("time", "vehicle", source=motion, line_width=2, color=LINES[0], legend_label="vehicle")
     displacement.line(
@@ -88,7 +90,7 @@ def curves(panel: str) -> list[figure]:
     )
     force = _plot(panel, "force", [("time", "@time{0.000} s"), ("force", "@force{0.0}")])
     force.line("time", "force", source=motion, line_width=2, color=LINES[0])
-    energy = _plot(panel, "energy", [])
+    energy = _plot(panel, "energy", [], height=HEIGHT_PX + len(PARTS) // 2 * LEGEND_LINE_PX)
     energy.varea_stack(
         list(PARTS),
         x="time",
@@ -101,7 +103,6 @@ def curves(panel: str) -> list[figure]:
         legend.ncols, legend.spacing, legend.glyph_width, legend.glyph_height = 2, 10, 20, 14
         legend.label_text_color, legend.background_fill_color, legend.border_line_color = TEXT, None, None
         plot.add_layout(legend, "below")
-        plot.height += LEGEND_LINE_PX * -(-len(legend.items) // legend.ncols)
     figures = [rotation, displacement, force, energy]
     for plot in figures:
         plot.x_range = DataRange1d(range_padding=0)
@@ -147,7 +148,7 @@ def verdict_map(panel: str) -> figure:
     return plot
 
 
-def _plot(panel: str, kind: str, tooltips: list[tuple[str, str]], height: int = 240) -> figure:
+def _plot(panel: str, kind: str, tooltips: list[tuple[str, str]], height: int = HEIGHT_PX) -> figure:
     """Return an empty figure in the style of the page."""
     plot = figure(
         name=f"{panel}-{kind}",
