@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow as pa
 
+from boulder_sweep.answers.advice import listed
 from boulder_sweep.answers.keys import key_of
 from boulder_sweep.answers.need import MARGIN, Need
 from boulder_sweep.answers.outputs import CAPACITY, NEED, UNCERTAINTY, AnswerFile, asked_sweep
@@ -71,11 +72,6 @@ def verb(count: int, many: str, one: str) -> str:
 def share(n: int, total: int) -> str:
     """Share of a total in per cent; never rounded to 0 % or 100 % unless exact."""
     return f"{n / total if n in (0, total) else min(max(n / total, 0.001), 0.999):.1%}"
-
-
-def listed(words: tuple[str, ...] | list[str]) -> str:
-    """Words as a list in a sentence."""
-    return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0]
 
 
 class AnswerTable(NamedTuple):
