@@ -138,8 +138,8 @@ def stages(i: int) -> Callable[..., Any]:
         x_b, v_b = at(y.x_b, y.v_b, h, m.a_b)
         theta_b, omega_b = at(y.theta_b, y.omega_b, h, m.alpha_b)
         x_v, v_v = at(y.x_v, y.v_v, h, m.a_v)
-        k = acceleration(x_b, v_b, theta_b, omega_b, x_v, v_v, s, c)
         y_i = State(x_b, v_b, theta_b, omega_b, x_v, v_v)
+        k = acceleration(y_i, s, c)
         return Stages(y_i, k, (*m.a_b, k.a_b), (*m.alpha_b, k.alpha_b), (*m.a_v, k.a_v))
 
     return up_to

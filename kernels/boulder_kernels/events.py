@@ -28,9 +28,9 @@ from .dynamics import (
     Modes,
     State,
     Switches,
+    acceleration,
     contact_displacement,
     holding_moment,
-    rate_of,
     signed_arm,
     spring_compression,
 )
@@ -449,7 +449,7 @@ def least_within(
     forces = (weights.rotation > 0.0 and needs_moment(g)) or weights.couple > 0.0
     if forces or weights.arm > 0.0 or weights.top > 0.0 or weights.base > 0.0:
         y = state_at(dense, tau)
-        return least_gap(gaps_at(y, rate_of(y, switches, c).M if forces else 0.0, g, c), weights)
+        return least_gap(gaps_at(y, acceleration(y, switches, c).M if forces else 0.0, g, c), weights)
     least, event = NEVER, NONE
     theta_b = displacement_at(dense.rotation, tau)
     if weights.contact > 0.0:

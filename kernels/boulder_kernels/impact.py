@@ -46,8 +46,8 @@ from .dynamics import (
     Modes,
     State,
     Switches,
+    acceleration,
     constants_in,
-    rate_of,
     signed_arm,
     switches_of,
 )
@@ -314,7 +314,7 @@ def begin_to_turn(
     m = passed_maxima(i.maxima, 0.0, clock.h, i.y, y_end, i.front, front, i.switches)
     h = min(clock.h_full, clock.horizon - clock.h)
     after = Clock(clock.h, h, clock.h_full, 1.0, clock.barrier, clock.horizon, error, 0.0)
-    return turns, Impact(i.pace, y_end, rate_of(y_end, switches, c), front, m, after, modes, switches, g)
+    return turns, Impact(i.pace, y_end, acceleration(y_end, switches, c), front, m, after, modes, switches, g)
 
 
 @inlined
@@ -399,10 +399,10 @@ def follow(
         changes += changes_counted(event, clock.t, modes)
         M = k_end.M
         if (event == ROTATION or event == COUPLE) and tau < 1.0:
-            M = rate_of(y, switches, c).M
+            M = acceleration(y, switches, c).M
         y, modes = change_mode(event, y, M, modes, c)
         switches, g = enter_modes(modes, readings, g.limit, control.locate_yield, control.event_tolerance, c)
-        k, front = rate_of(y, switches, c), compression_at(y, switches, c)
+        k, front = acceleration(y, switches, c), compression_at(y, switches, c)
         h_full = i.pace.h_touching if modes.touching else i.pace.h_apart
         h = length_after(event, min(h_full, horizon - t), y.omega_b, k.alpha_b)
     after = Clock(t, h, h_full, attempts, barrier, horizon, clock.error + error, changes)
@@ -458,7 +458,7 @@ def first_touch(h_touching: float, h_apart: float, c: Constants, readings: Readi
     pace = Pace(h_touching, h_apart, float(MOST_STEPS) if control.last_resort else budget)
     h = min(first_length(h_touching, g, c), control.horizon)
     clock = Clock(0.0, h, h_touching, 0.0, NO_PROOF, control.horizon, 0.0, 0.0)
-    k, front = rate_of(y, switches, c), compression_at(y, switches, c)
+    k, front = acceleration(y, switches, c), compression_at(y, switches, c)
     return Impact(pace, y, k, front, no_maxima(), clock, modes, switches, g)
 
 

@@ -187,6 +187,13 @@ def put(values: np.ndarray, offset: int, index: int, value: float) -> None:
     values[np.uintp(offset + index)] = value
 
 
+@inlined
+def write_numbers(to: np.ndarray, numbers: tuple[float, ...]) -> None:
+    """Write the numbers of a tuple into the first places of an array, shape (m,)."""
+    for i in range(len(numbers)):
+        to[i] = numbers[i]
+
+
 @numba.extending.intrinsic
 def _room_for_sums(typing: Any) -> Any:
     """Return where there is room for partial sums on the stack, free again when the function returns; all zero."""

@@ -669,7 +669,7 @@ def exchange_rates(y: State, modes: Modes, s: Switches, c: Constants) -> Exchang
     F_truck = s.k_truck * u / c.k_m * c.k_v
     # tau_v = m_v/c_v and k_v/k_m = m_v, so 1/c_v = tau_v k_m / k_v.
     damper = F_truck * F_truck * c.tau_v * c.k_m / c.k_v
-    M = acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, s, c).M
+    M = acceleration(y, s, c).M
     M_R = (s.net - 1.0) * M + couple_moment(sin, versin, s, c)
     pull = 0.0
     if not modes.touching:
@@ -788,7 +788,7 @@ def sample_of(record: Record, sample: int, c: Any, m_v: float, readings: Reading
     y = state_of(record, sample)
     touching = record.touching[sample] > 0
     modes = modes_of(y, int(record.turning[sample]), touching, c)
-    rate = acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, switches_of(modes, readings, c), c)
+    rate = acceleration(y, switches_of(modes, readings, c), c)
     # Printed separation: the spring goes on pulling the truck after release, so it holds energy all along.
     holds = touching or not readings.separation_released
     return Sample(rate, stored_energies(y, m_v, holds, readings.restoring_gravity, c))

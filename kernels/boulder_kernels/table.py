@@ -21,7 +21,21 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 
-from ._jit import IS_PLAIN, LINE, align_stack, fields_of, inlined, is_none, kernel, load, overload, plain, store, taken
+from ._jit import (
+    IS_PLAIN,
+    LINE,
+    align_stack,
+    by_types,
+    fields_of,
+    inlined,
+    is_none,
+    kernel,
+    load,
+    plain,
+    store,
+    taken,
+    through,
+)
 from .control import ACCEPTED, MOST_STEPS, RETRY, STEP_RATIO, Control, control_for, first_step
 from .design import Body, Constants, Design, DesignTable, Readings, constants_of, design_at, design_in, is_computable
 from .dormand_prince import step
@@ -68,7 +82,9 @@ from .outcomes import (
     write_outcome,
 )
 from .pieces import (
+    BODY_SIZE,
     COUNTS,
+    PIECE_SIZE,
     PRESSURE,
     FewPieces,
     GivenPiece,
@@ -170,29 +186,9 @@ def field_of(group: Any, name: str) -> Any:
     return group[name] if name in group.dtype.names else None
 
 
-def by_soil(uniform: Callable[..., Any], in_pieces: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function that calls one for groups of uniform soils, and another where the soil is in pieces."""
-
-    def chosen(group: Any) -> Callable[..., Any]:
-        """Return the one for a group or its type."""
-        return uniform if field_of(group, "pieces") is None else in_pieces
-
-    def call(group: Any, lane: int, *others: Any) -> Any:
-        """Call the function that suits the soil of the group."""
-        return chosen(group)(group, lane, *others)
-
-    def choose(group: Any, lane: Any, *others: Any) -> Callable[..., Any]:
-        """Return the call for these types."""
-        of_soil = chosen(group)
-        calls: list[Callable[..., Any]] = [
-            lambda group, lane: of_soil(group, lane),
-            lambda group, lane, c: of_soil(group, lane, c),
-            lambda group, lane, one, other: of_soil(group, lane, one, other),
-        ]
-        return calls[len(others)]  # Numba inlines nothing whose number of arguments is open
-
-    overload(call)(choose)
-    return call
+def is_uniform(group: Any) -> bool:
+    """Return whether a group of lanes, or its type, is of uniform soils."""
+    return field_of(group, "pieces") is None
 
 
 @inlined
@@ -230,42 +226,29 @@ def load_given(group: Any, m: int, lane: int) -> GivenPiece:
     return piece
 
 
-def by_count(load_one: Callable[[Any, int, int], Any]) -> Callable[[Any, int], tuple[Any, ...]]:
-    """Return a function that loads a record of each piece, one after another, into a tuple."""
-
-    def load_all(group: Any, lane: int) -> tuple[Any, ...]:
-        """Return all of them."""
-        return tuple(load_one(group, m, lane) for m in range(len(group.pieces)))
-
-    @inlined
-    def one(group: Any, m: int, lane: int) -> Any:
-        """Load one, as a tuple."""
-        return (load_one(group, m, lane),)
-
-    @inlined
-    def two(group: Any, m: int, lane: int) -> Any:
-        """Load two from m on, as a tuple."""
-        return one(group, m, lane) + one(group, m + 1, lane)
-
-    @inlined
-    def four(group: Any, m: int, lane: int) -> Any:
-        """Load four from m on, as a tuple."""
-        return two(group, m, lane) + two(group, m + 2, lane)
-
-    def choose(group: Any, lane: Any) -> Callable[..., Any]:
-        """Return the function for so many."""
-        return {
-            1: lambda group, lane: one(group, 0, lane),
-            2: lambda group, lane: two(group, 0, lane),
-            4: lambda group, lane: four(group, 0, lane),
-            8: lambda group, lane: four(group, 0, lane) + four(group, 4, lane),
-        }[field_of(group, "pieces").shape[0]]
-
-    overload(load_all)(choose)
-    return load_all
+@inlined
+def load_next(above: Any, at: Any, m: int) -> Any:
+    """Return the pieces above, and one more."""
+    group, lane = at
+    return (*above, load_piece(group, m, lane))
 
 
-load_pieces, load_all_given = by_count(load_piece), by_count(load_given)
+@inlined
+def load_next_given(above: Any, at: Any, m: int) -> Any:
+    """Return the pieces above as they are given, and one more."""
+    group, lane = at
+    return (*above, load_given(group, m, lane))
+
+
+load_all, load_all_given = through(load_next), through(load_next_given)
+
+
+@by_types
+def numbers_of_pieces(group: Any) -> Callable[..., tuple[int, ...]]:
+    """Return the numbers of the pieces of a soil, which the compiler knows."""
+    pieces = field_of(group, "pieces")
+    numbers = tuple(range(pieces.shape[0]))
+    return lambda group: numbers
 
 
 @inlined
@@ -278,18 +261,16 @@ def load_numbers(group: Any, lane: int) -> Constants:
 @inlined
 def load_in_soil(group: Any, lane: int) -> Any:
     """Return the constants of a lane whose soil is in pieces."""
-    soil = FewPieces(load(group.sums, lane, SoilSums), load_pieces(group, lane))
+    soil = FewPieces(load(group.sums, lane, SoilSums), load_all((), (group, lane), numbers_of_pieces(group)))
     return with_soil(load_numbers(group, lane), load(group, lane, Leaning).lean, soil)
 
 
-load_constants = by_soil(load_numbers, load_in_soil)
-"""Return the constants of a lane."""
-
-
-@inlined
-def store_numbers(group: Any, lane: int, c: Any) -> None:
-    """Write the constants of a lane but for its soil."""
-    store(group.constants, lane, c)
+@by_types
+def load_constants(group: Any, lane: int) -> Callable[..., Any]:
+    """Return the constants of a lane."""
+    if is_uniform(group):
+        return lambda group, lane: load_numbers(group, lane)
+    return lambda group, lane: load_in_soil(group, lane)
 
 
 @inlined
@@ -302,16 +283,16 @@ def store_in_soil(group: Any, lane: int, c: Any) -> None:
         store(group.pieces[m], lane, c.soil.pieces[m])
 
 
-store_constants = by_soil(store_numbers, store_in_soil)
-"""Write the constants of a lane."""
+@by_types
+def store_constants(group: Any, lane: int, c: Any) -> Callable[..., None]:
+    """Write the constants of a lane."""
+    if is_uniform(group):
+        return lambda group, lane, c: store(group.constants, lane, c)
+    return lambda group, lane, c: store_in_soil(group, lane, c)
 
-BELOW, BODY_SIZE, PIECE_SIZE = len(Design._fields), len(Body._fields), len(GivenPiece._fields)
-"""Rows of a table of designs: above the soil, of the body, and of each piece."""
 
-
-@inlined
-def store_nothing_given(group: Any, lane: int, a: np.ndarray, row: int) -> None:
-    """Write nothing of uniform soil."""
+BELOW = len(Design._fields)
+"""Rows of a table of designs above what is given of the soil."""
 
 
 @inlined
@@ -322,24 +303,22 @@ def store_pieces_given(group: Any, lane: int, a: np.ndarray, row: int) -> None:
         store(group.given[m], lane, taken(a, BELOW + BODY_SIZE + PIECE_SIZE * m, row, GivenPiece))
 
 
-store_given = by_soil(store_nothing_given, store_pieces_given)
-"""Write what is given of the soil of a design that is to be started, the rows of a table below its `Design`."""
+@by_types
+def store_given(group: Any, lane: int, a: np.ndarray, row: int) -> Callable[..., None]:
+    """Write what is given of the soil of a design that is to be started, the rows of a table below its `Design`."""
+    if is_uniform(group):
+        return lambda group, lane, a, row: None
+    return lambda group, lane, a, row: store_pieces_given(group, lane, a, row)
 
 
-@inlined
-def uniform_in_lane(group: Any, lane: int, design: Design, readings: Readings) -> Constants:
-    """Return the constants of a design in uniform soil."""
-    return constants_of(design, readings, 0)
-
-
-@inlined
-def pieces_in_lane(group: Any, lane: int, design: Design, readings: Readings) -> Any:
-    """Return the constants of a design whose soil is in pieces."""
-    return constants_of_few(design, readings, load(group.body, lane, Body), load_all_given(group, lane))
-
-
-constants_in_lane = by_soil(uniform_in_lane, pieces_in_lane)
-"""Return the constants of a design that is being started."""
+@by_types
+def constants_in_lane(group: Any, lane: int, design: Design, readings: Readings) -> Callable[..., Any]:
+    """Return the constants of a design that is being started."""
+    if is_uniform(group):
+        return lambda group, lane, design, readings: constants_of(design, readings, 0)
+    return lambda group, lane, design, readings: constants_of_few(
+        design, readings, load(group.body, lane, Body), load_all_given((), (group, lane), numbers_of_pieces(group))
+    )
 
 
 @inlined
@@ -632,22 +611,12 @@ def simulate_lanes(
     return run_lanes(filled_up(designs), readings, control, groups, rows, record, out)
 
 
-@kernel
-def take_profile(row: int, soil: Any, layers: np.ndarray, outlines: np.ndarray) -> SoilProfile:
-    """Return the soil of one design of a `PiecewiseTable`."""
-    return SoilProfile(layers[row], outlines[row], soil)
-
-
-def profile_in(row: int, soil: Any, layers: np.ndarray | None, outlines: np.ndarray | None) -> SoilProfile | None:
+@by_types
+def profile_in(row: int, soil: Any, layers: Any, outlines: Any) -> Callable[..., SoilProfile | None]:
     """Return the soil of one design of a table; None for the uniform soil of a box."""
-    return None if layers is None else plain(take_profile)(row, soil, layers, outlines)
-
-
-@overload(profile_in)
-def _profile_in(row: Any, soil: Any, layers: Any, outlines: Any) -> Callable[..., Any]:
     if is_none(layers):
         return lambda row, soil, layers, outlines: None
-    return lambda row, soil, layers, outlines: take_profile(row, soil, layers, outlines)
+    return lambda row, soil, layers, outlines: SoilProfile(layers[row], outlines[row], soil)
 
 
 @kernel
