@@ -425,6 +425,7 @@ def by_types(choose: Callable[..., Callable[..., Any]]) -> Callable[..., Any]:
 
     @functools.wraps(choose)
     def call(*arguments: Any) -> Any:
+        """Call what is chosen."""
         return choose(*arguments)(*arguments)
 
     overload(call)(choose)

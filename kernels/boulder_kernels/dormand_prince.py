@@ -22,9 +22,10 @@ from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
 
-from ._jit import inlined
+from ._jit import inlined, kernel
 from .design import Constants, error_arm
 from .dynamics import Acceleration, State, Switches, acceleration
+from .numerics import ITERATIONS
 
 
 class Tableau(NamedTuple):
@@ -250,11 +251,14 @@ def curvature_at(q: Track, tau: float) -> float:
 
 
 @inlined
-def closer(q: Track, tau: float, tau_end: float) -> float:
-    """One step of Newton's method to the zero of a velocity, within 0 ... tau_end."""
-    curvature = curvature_at(q, tau)
-    ahead = slope_at(q, tau) / curvature if curvature != 0.0 else 0.0
-    return min(max(tau - ahead, 0.0), tau_end)
+def newton(q: Track, tau: float, low: float, high: float, a_0: float, a_x: float, a_v: float) -> float:
+    """Three steps of Newton's method for a_0 + a_x x + a_v x' = 0 on a track, within low ... high; x' is `slope_at`."""
+    for _ in range(3):
+        slope = slope_at(q, tau)
+        value = a_0 + a_x * displacement_at(q, tau) + a_v * slope
+        change = a_x * slope + a_v * curvature_at(q, tau)
+        tau = min(max(tau - (value / change if change != 0.0 else 0.0), low), high)
+    return tau
 
 
 @inlined
@@ -266,8 +270,18 @@ def turning_point(q: Track, tau_end: float) -> float:
     end = slope_at(q, tau_end)
     if not q.x1 * end < 0.0:
         return tau_end
-    tau = tau_end * q.x1 / (q.x1 - end)
-    return closer(q, closer(q, closer(q, tau, tau_end), tau_end), tau_end)
+    return newton(q, tau_end * q.x1 / (q.x1 - end), 0.0, tau_end, 0.0, 0.0, 1.0)
+
+
+@kernel
+def time_of_limit(q: Track, limit: float, tau_end: float) -> float:
+    """Fraction of a step at which the rotation reaches a limit that it has passed at tau_end [rad]."""
+    low, high = 0.0, tau_end
+    for _ in range(ITERATIONS):
+        middle = 0.5 * (low + high)
+        beyond = abs(displacement_at(q, middle)) >= limit
+        low, high = (low, middle) if beyond else (middle, high)
+    return high
 
 
 @inlined

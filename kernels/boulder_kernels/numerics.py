@@ -32,12 +32,15 @@ import numpy as np
 from llvmlite import ir
 from numba.core import cgutils
 
-from ._jit import exact_inlined, inlined, overload
+from ._jit import exact_inlined, fields_of, inlined, overload
 
 
 def record_type(kind: Any) -> np.dtype:
-    """Return the type of a record with a number for each field of a named tuple."""
-    return np.dtype((np.record, [(name, np.float64) for name in kind._fields]))
+    """Return the type of a record with a number for each field of a named tuple, or a record where it is one itself."""
+    fields = fields_of(kind).items()
+    return np.dtype(
+        (np.record, [(name, record_type(each) if hasattr(each, "_fields") else np.float64) for name, each in fields])
+    )
 
 
 def records_of(kind: Any, columns: Iterable[Any]) -> np.ndarray:

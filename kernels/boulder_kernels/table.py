@@ -56,7 +56,6 @@ from .impact import (
     nothing_watched,
     outcome_of,
     simulate_alone,
-    simulate_last_resort,
     stop_of,
     watch,
 )
@@ -437,7 +436,7 @@ def start_designs(group: Any, designs: np.ndarray, first: int, readings: Reading
     group
         The group.
     designs, first
-        The designs of `simulate_lanes`, and the row of the design in the first lane.
+        The designs of `LaneDesigns`, and the row of the design in the first lane.
     readings, control
         How they are simulated.
 
@@ -572,25 +571,27 @@ def filled_up(designs: np.ndarray) -> np.ndarray:
     return np.pad(designs, ((0, 0), (0, missing)), "edge") if missing else designs
 
 
+class LaneDesigns(NamedTuple):
+    """Designs as lanes take them."""
+
+    designs: np.ndarray
+    """Designs, SI, shape (15 + G, n): the fields of `DesignTable`, and below them what is given where the soil is in
+    pieces: the body and the pieces (`Body`, `GivenPiece`) one after another."""
+    pieces: int = 0
+    has_strength: bool = False
+    has_outline: bool = False
+    """The same as in `group_type`."""
+
+
 def simulate_lanes(
-    designs: np.ndarray,
-    pieces: int,
-    has_strength: bool,
-    has_outline: bool,
-    readings: Readings,
-    control: Control,
-    record: Record,
-    out: np.ndarray,
+    given: LaneDesigns, readings: Readings, control: Control, record: Record, out: np.ndarray
 ) -> Outcome:
     """Simulate every design of a table in lanes, by a closed form of the soil.
 
     Parameters
     ----------
-    designs
-        Designs, SI, shape (15 + G, n): first the fields of `DesignTable`, then what is given where the soil is in
-        pieces: the body and the pieces (`Body`, `GivenPiece`) one after another.
-    pieces, has_strength, has_outline
-        The same as in `group_type`.
+    given
+        The designs.
     readings
         Which formulas are read as printed.
     control
@@ -607,28 +608,36 @@ def simulate_lanes(
     """
     rows = np.full(LANES + 1, EMPTY)
     rows[NEXT] = 0
-    groups = empty_groups(pieces, has_strength=has_strength, has_outline=has_outline)
-    return run_lanes(filled_up(designs), readings, control, groups, rows, record, out)
+    groups = empty_groups(given.pieces, has_strength=given.has_strength, has_outline=given.has_outline)
+    return run_lanes(filled_up(given.designs), readings, control, groups, rows, record, out)
+
+
+class Soils(NamedTuple):
+    """The soils of designs that are no boxes in uniform soil."""
+
+    layers: np.ndarray
+    outlines: np.ndarray
+    """Of `PiecewiseTable`."""
+    soil: Any
+    """Elements or pieces that every design fills anew."""
+
+
+def soils_of(layers: np.ndarray, outlines: np.ndarray, elements: int) -> Soils:
+    """Return the soils of designs, with room for that of one: N elements, or pieces where N is 0."""
+    return Soils(layers, outlines, empty_soil(layers.shape[1], outlines.shape[1], elements))
 
 
 @by_types
-def profile_in(row: int, soil: Any, layers: Any, outlines: Any) -> Callable[..., SoilProfile | None]:
+def profile_in(row: int, soils: Any) -> Callable[..., SoilProfile | None]:
     """Return the soil of one design of a table; None for the uniform soil of a box."""
-    if is_none(layers):
-        return lambda row, soil, layers, outlines: None
-    return lambda row, soil, layers, outlines: SoilProfile(layers[row], outlines[row], soil)
+    if is_none(soils):
+        return lambda row, soils: None
+    return lambda row, soils: SoilProfile(soils.layers[row], soils.outlines[row], soils.soil)
 
 
 @kernel
 def run_rows(
-    designs: np.ndarray,
-    layers: np.ndarray | None,
-    outlines: np.ndarray | None,
-    soil: Any,
-    readings: Readings,
-    control: Control,
-    record: Record,
-    out: np.ndarray,
+    designs: np.ndarray, soils: Soils | None, readings: Readings, control: Control, record: Record, out: np.ndarray
 ) -> Outcome:
     """Simulate designs one by one, in any soil, and return the last outcome.
 
@@ -636,37 +645,15 @@ def run_rows(
     ----------
     designs
         Shape (15, n), at least one.
-    layers, outlines
-        Of `PiecewiseTable`; None for boxes in uniform soils.
-    soil
-        Elements or pieces that every design fills anew; None for boxes in uniform soils.
-    readings
-        Which formulas are read as printed.
-    control
-        How the simulation is run.
-    record
-        Filled with the time history of one design at the times it names; for several, one that keeps nothing.
-    out
-        Where the outcomes go, an array of `empty_outcomes`.
+    soils
+        Their soils; None for boxes in uniform soils.
+    readings, control, record, out
+        See `simulate_lanes`.
     """
     outcome = failed(Status.INVALID.value)
     for row in range(designs.shape[1]):
-        profile = profile_in(row, soil, layers, outlines)
         design = design_in(designs, row)
-        outcome = simulate_alone(Problem(design, profile), readings, control, record)
-        write_outcome(out, row, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
-    return outcome
-
-
-@kernel
-def run_last_resort(
-    designs: np.ndarray, readings: Readings, control: Control, record: Record, out: np.ndarray
-) -> Outcome:
-    """Simulate designs one by one by `simulate_last_resort`, which takes those that need too many steps."""
-    outcome = failed(Status.INVALID.value)
-    for row in range(designs.shape[1]):
-        design = design_in(designs, row)
-        outcome = simulate_last_resort(design, readings, control, record)
+        outcome = simulate_alone(Problem(design, profile_in(row, soils)), readings, control, record)
         write_outcome(out, row, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
     return outcome
 
@@ -692,28 +679,11 @@ def step_of_solution(control: Control) -> float:
     return finer_step(control.h) if control.refined else control.h
 
 
-class LaneDesigns(NamedTuple):
-    """Designs as lanes take them, arguments of `simulate_lanes`."""
-
-    designs: np.ndarray
-    pieces: int = 0
-    has_strength: bool = False
-    has_outline: bool = False
-
-
-def given_to_lanes(designs: np.ndarray, layers: np.ndarray | None, outlines: np.ndarray | None) -> LaneDesigns | None:
-    """Return designs as lanes take them, or None of those that they do not take.
-
-    Parameters
-    ----------
-    designs
-        Shape (15, n).
-    layers, outlines
-        Of `PiecewiseTable`; None for boxes in uniform soils.
-    """
-    if layers is None or outlines is None:
+def given_to_lanes(designs: np.ndarray, soils: Soils | None) -> LaneDesigns | None:
+    """Return designs as lanes take them, or None of those that they do not take; arguments: see `run_rows`."""
+    if soils is None:
         return LaneDesigns(designs)
-    points = outlines.shape[1]
+    layers, outlines, points = soils.layers, soils.outlines, soils.outlines.shape[1]
     count = lanes_count(pieces_count(layers.shape[1], points))
     if count == 0:
         return None
@@ -729,22 +699,15 @@ def has_strength(layers: np.ndarray) -> bool:
 
 
 def solve_rows(
-    designs: np.ndarray,
-    layers: np.ndarray | None,
-    outlines: np.ndarray | None,
-    soil: Any,
-    readings: Readings,
-    control: Control,
-    record: Record,
-    out: np.ndarray,
+    designs: np.ndarray, soils: Soils | None, readings: Readings, control: Control, record: Record, out: np.ndarray
 ) -> Outcome:
     """Solve designs once: in lanes where they can be, else one by one; see `run_rows` for arguments and result."""
-    given = given_to_lanes(designs, layers, outlines) if control.side_by_side and control.elements == 0 else None
-    if control.last_resort and control.stop_at_limit and layers is None:
-        return run_last_resort(designs, readings, control, record, out)
-    if given is not None and (control.stop_at_limit or designs.shape[1] == 1):
-        return simulate_lanes(*given, readings, control, record, out)
-    return run_rows(designs, layers, outlines, soil, readings, control, record, out)
+    resort = control.last_resort and control.stop_at_limit and soils is None
+    if control.side_by_side and control.elements == 0 and not resort:
+        given = given_to_lanes(designs, soils)
+        if given is not None and (control.stop_at_limit or designs.shape[1] == 1):
+            return simulate_lanes(given, readings, control, record, out)
+    return run_rows(designs, soils, readings, control, record, out)
 
 
 def solve(table: DesignTable, readings: Readings, control: Control) -> tuple[np.ndarray, np.ndarray]:
@@ -757,16 +720,11 @@ def solve(table: DesignTable, readings: Readings, control: Control) -> tuple[np.
     second : ndarray, shape (n,)
         Which second solution each of them needs, see `boulder_kernels.outcomes.StepErrors`.
     """
-    n = len(table.L)
-    layers: np.ndarray | None = getattr(table, "layers", None)
-    outlines: np.ndarray | None = getattr(table, "outlines", None)
-    out = empty_outcomes(n)
-    if n:
-        soil = None
-        if layers is not None and outlines is not None:
-            soil = empty_soil(layers.shape[1], outlines.shape[1], control.elements)
-        designs = np.stack(table[: len(DesignTable._fields)])
-        solve_rows(designs, layers, outlines, soil, readings, control, no_record(), out)
+    out, soils = empty_outcomes(len(table.L)), None
+    if isinstance(table, PiecewiseTable):
+        soils = soils_of(table.layers, table.outlines, control.elements)
+    if len(table.L):
+        solve_rows(np.stack(table[:BELOW]), soils, readings, control, no_record(), out)
     second = out[SECOND].copy()
     out[STEP] = np.where(np.isnan(out[T_END]), np.nan, step_of_solution(control))
     return out, second
@@ -779,23 +737,19 @@ def simulate(problem: Problem, readings: Readings, control: Control, record: Rec
     ----------
     problem
         Design and soil.
-    readings
-        Which formulas are read as printed.
-    control
-        Step, horizon, limit, representation of the soil; nothing is estimated of errors.
-    record
-        Filled with the time history at the times it names.
+    readings, control, record
+        See `boulder_kernels.impact.simulate_alone`; nothing is estimated of errors.
 
     Returns
     -------
     Outcome
         Maxima from the dense output; NaN where the status says that there is no result, see `Status`.
     """
-    designs = np.array(problem.design, dtype=float)[:, None]
-    if problem.profile is None:
-        return solve_rows(designs, None, None, None, readings, control, record, empty_outcomes(1))
-    layers, outline, soil = problem.profile
-    return solve_rows(designs, layers[None], outline[None], soil, readings, control, record, empty_outcomes(1))
+    designs, soils = np.array(problem.design, dtype=float)[:, None], None
+    if problem.profile is not None:
+        layers, outline, soil = problem.profile
+        soils = Soils(layers[None], outline[None], soil)
+    return solve_rows(designs, soils, readings, control, record, empty_outcomes(1))
 
 
 def simulate_design(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
@@ -855,6 +809,5 @@ def simulate_table(table: DesignTable, readings: Readings, control: Control) -> 
             continue
         some = some_rows(table, rows)
         found, _ = solve(some, readings, plain(control_for)(solution, control))
-        designs = np.stack(some[: len(DesignTable._fields)])
-        take_seconds(out, rows, found, needed, designs, plain(safety_of)(readings))
+        take_seconds(out, rows, found, needed, np.stack(some[:BELOW]), plain(safety_of)(readings))
     return outcome_table(out)

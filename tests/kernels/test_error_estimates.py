@@ -35,8 +35,8 @@ from boulder_kernels.outcomes import (
     THETA_MAX,
     YIELD_LOCATED,
     YIELD_PASSED,
+    all_maxima,
     error_time,
-    no_maxima,
     outcome_table,
     step_errors,
 )
@@ -71,7 +71,7 @@ ARM = 1.6
 
 
 def errors(ended: EndOfMotion, **changed: float) -> tuple[float, float, int]:
-    m = no_maxima()._replace(theta=ended.theta, x_b=0.2)
+    m = all_maxima(0.0)._replace(theta=ended.theta, x_b=0.2)
     o = bk.Outcome(ended.status, m, np.nan, ended.t_end, 100, ended.moved, ended.omega_b, ended.changes)
     return step_errors(o, DESIGN._replace(**changed), LIMIT, 2.0)
 

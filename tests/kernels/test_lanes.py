@@ -10,7 +10,7 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels import Design, OutcomeTable, Status
-from boulder_kernels.impact import simulate_uniform
+from boulder_kernels.impact import Problem, simulate_alone
 from boulder_kernels.outcomes import STEP, T_END, empty_outcomes, outcome_table, step_errors, write_outcome
 from boulder_kernels.table import LANES
 
@@ -53,7 +53,7 @@ def one_by_one(designs: list[Design], readings: bk.Readings, how: bk.Control) ->
     """Impacts that are simulated alone, in the columns of a table."""
     out = empty_outcomes(len(designs))
     for row, design in enumerate(designs):
-        found = simulate_uniform(design, readings, how, bk.no_record())
+        found = simulate_alone(Problem(design, None), readings, how, bk.no_record())
         write_outcome(out, row, found, step_errors(found, design, how.theta_limit, how.horizon))
     return with_step(out, how.h)
 
