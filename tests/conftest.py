@@ -47,6 +47,7 @@ QUICK = (
     "kernels/test_check_values.py",
     "kernels/test_constants.py",
     "kernels/test_dense_output.py",
+    "kernels/test_lanes.py",
     "kernels/test_numerics.py",
     "kernels/test_rigid_wall.py",
     "kernels/test_soil.py",
