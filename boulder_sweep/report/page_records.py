@@ -113,7 +113,7 @@ class HistoryCall(NamedTuple):
     """Inputs, shape (len(DESIGN),); K_epsilon is written over."""
     soil: SoilCall
     settings: float
-    """Settings, shape (len(SETTINGS),)."""
+    """Settings of the simulation, shape (len(SETTINGS),)."""
     n: float
     times: float
     """Number and times of the samples, ascending [s], shape (n,)."""

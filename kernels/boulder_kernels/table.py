@@ -617,13 +617,13 @@ class Soils(NamedTuple):
 
     layers: np.ndarray
     outlines: np.ndarray
-    """Of `PiecewiseTable`."""
+    """Fields of a `PiecewiseTable`."""
     soil: Any
     """Elements or pieces that every design fills anew."""
 
 
 def soils_of(layers: np.ndarray, outlines: np.ndarray, elements: int) -> Soils:
-    """Return the soils of designs, with room for that of one: N elements, or pieces where N is 0."""
+    """Return the soils of designs, with room for the soil of one: N elements, or pieces where N is 0."""
     return Soils(layers, outlines, empty_soil(layers.shape[1], outlines.shape[1], elements))
 
 

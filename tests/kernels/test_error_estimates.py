@@ -6,14 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from scipy.integrate import RK45
 
 import boulder_kernels as bk
 from boulder_kernels import Status
 from boulder_kernels._jit import plain
 from boulder_kernels.control import control_for
 from boulder_kernels.design import error_arm
-from boulder_kernels.dormand_prince import ERROR
 from boulder_kernels.outcomes import (
     AT_LIMIT,
     AT_LIMIT_AFTER_CHANGES,
@@ -47,11 +45,6 @@ from .samples import control, design_of, random_designs, table_of
 
 LIMIT = np.radians(20.0)
 CORRECTED = bk.corrected()
-
-
-def test_the_weights_are_those_of_scipy() -> None:
-    """SciPy has the fourth-order weights less the fifth-order weights."""
-    assert np.allclose(ERROR, -RK45.E, rtol=1e-15, atol=0.0)
 
 
 @dataclass(frozen=True)

@@ -159,12 +159,6 @@ def test_a_table_of_nothing_but_spoilt_rows() -> None:
     assert all(np.all(np.isnan(column)) for column in found[1:])
 
 
-def test_twice_the_same() -> None:
-    table = table_of(random_designs(30, seed=128))
-    known = bk.simulate_table(table, bk.corrected(), HOW)
-    assert_same(bk.simulate_table(table, bk.corrected(), HOW), known)
-
-
 def split(table: PiecewiseTable, m: int) -> PiecewiseTable:
     """Cut the layer m of every design in two of the same soil."""
     twice = np.insert(table.layers, m, table.layers[:, m], axis=1)
