@@ -88,7 +88,7 @@ def measure() -> Table:
 
     def in_lanes(given: LaneDesigns) -> Callable[[], object]:
         out = empty_outcomes(given.designs.shape[1])
-        return partial(simulate_lanes, *given, readings, control, bk.no_record(), out)
+        return partial(simulate_lanes, given, readings, control, bk.no_record(), out)
 
     work: dict[str, Callable[[], object]] = {
         "box": in_lanes(LaneDesigns(stacked)),

@@ -18,7 +18,7 @@ import numpy as np
 from boulder_kernels.numerics import records_of
 from boulder_kernels.outcomes import empty_outcomes
 from boulder_kernels.rules import FLAGS as RAISED
-from boulder_kernels.rules import ISLAND_SLIDE, UNSTUDIED, FlagInputs, TestedRange, write_flags
+from boulder_kernels.rules import ISLAND_SLIDE, UNSTUDIED, FlagInputs, FlagRange, TestedRange, write_flags
 from boulder_sweep.investigation import FAMILY_FACTOR, family_bounds
 from boulder_sweep.judge.judged import CHANGES_SIDE
 from boulder_sweep.settings.fields import BY_NAME
@@ -189,7 +189,8 @@ def tested_of(calibrated_crush: float, rotation: float, *, odd_layers: bool) -> 
     angle = (NOWHERE, NOWHERE) if odd_layers else _ANGLE
     vehicle = (_rounded(*VEHICLE["m_v"]), _rounded(*RATE), _rounded(*DAMPING), _rounded(*VEHICLE["v_0"]))
     ranges = (*_SIZES, _EMBEDMENT, _ROCK, *vehicle, angle, _SOIL, _RATE_FACTOR)
-    return TestedRange(calibrated_crush, rotation, TESTED_OVERLAP_M, *(end for low_high in ranges for end in low_high))
+    least, most = (FlagRange(*ends) for ends in zip(*ranges, strict=True))
+    return TestedRange(calibrated_crush, rotation, TESTED_OVERLAP_M, least, most)
 
 
 def has_odd_layers(ground: Ground) -> bool:

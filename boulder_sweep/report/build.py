@@ -92,13 +92,10 @@ def intermediate_code() -> str:
     if {name: os.environ.get(name) for name in PORTABLE} != PORTABLE:
         raise RuntimeError("Numba must be configured for a generic processor before it is imported")
     modules = []
-    kinds = {"p": numba.types.CPointer(numba.types.float64), "i": numba.types.int32}
-    for letter, record in entry_points.RECORDS.items():
-        kinds[letter] = numba.types.CPointer(numba.from_dtype(record))
-    for name, letters in entry_points.EXPORTS.items():
-        function, arguments = getattr(entry_points, name), tuple(kinds[letter] for letter in letters)
+    for name, record in entry_points.EXPORTS.items():
+        function, arguments = getattr(entry_points, name), (numba.types.CPointer(numba.from_dtype(record)),)
         function.compile(numba.types.void(*arguments))
-        compiled = function.overloads[tuple(arguments)]
+        compiled = function.overloads[arguments]
         code = compiled.library.get_llvm_str()
         code = re.sub(r"^target triple = .*$", f'target triple = "{TRIPLE}"', code, flags=re.MULTILINE)
         code = re.sub(r"^target datalayout = .*$", f'target datalayout = "{LAYOUT}"', code, flags=re.MULTILINE)

@@ -446,7 +446,7 @@ def _rules(rotation: float, settings: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "rotation": rotation,
         "rating": rating,
-        "limits": [*limits, *tested],
+        "limits": [*limits, *tested[:3], *tested.least, *tested.most],
         "verdicts": RULES,
         "not_finite": NOT_FINITE,
         "ratings": list(PENETRATION_LIMITS_M.items()),

@@ -5,13 +5,18 @@ WebAssembly has no named tuples, so designs, soils and settings are passed as pl
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from boulder_kernels import Control, Design, DesignTable, OutcomeTable, Readings
 from boulder_kernels._jit import inlined, taken
+from boulder_kernels.design import FAR
+from boulder_kernels.dynamics import State
 from boulder_kernels.ground import Ground
 from boulder_kernels.numerics import record_type
-from boulder_kernels.pieces import Piece, SoilElements, SoilSums
+from boulder_kernels.outcomes import ExchangedEnergies
+from boulder_kernels.pieces import PRESSURE_SLOPE, Piece, SoilElements, SoilSums
 from boulder_kernels.rules import Course, FlagInputs, Sizes, TestedRange, VerdictLimits
 
 DESIGN = Design._fields
@@ -47,6 +52,82 @@ GROUND = (*Ground._fields[:-1], "layered", "slices")
 GROUND_COUNT = len(GROUND)
 BELOW = 5
 """Numbers of a deeper layer."""
+
+
+TOUCHING, GRAVITY = HISTORY.index("touching"), HISTORY.index("gravity")
+LAYER, OUTLINE, STATE, EXCHANGED = PRESSURE_SLOPE + 1, FAR + 1, len(State._fields), len(ExchangedEnergies._fields)
+"""Numbers of a layer, of a point of an outline, of a state, and of the exchanged energies of a sample."""
+
+
+class SoilCall(NamedTuple):
+    """The soil as it lies, and room for what follows from it: numbers, and addresses of arrays of doubles."""
+
+    ground: float
+    """Numbers in the order of GROUND."""
+    below: float
+    deeper: float
+    """Deeper layers, shape (deeper, BELOW), and their number."""
+    profile: float
+    points: float
+    """Profile of the boulders, shape (points, 4), and its points; none for boxes."""
+    layers: float
+    m: float
+    """Room for the layers of each design, shape (n, m, 6), see `boulder_kernels.pieces`, and their number; none for a
+    uniform soil beside boxes."""
+    outlines: float
+    """Room for the outlines, shape (n, points, 4), see `boulder_kernels.design`."""
+    soil: float
+    """Room for the soil of one design: PIECE_ROOM numbers for each of its pieces and SUMS_ROOM, or for N soil
+    elements ELEMENT_ROOM N."""
+
+
+class RowsCall(NamedTuple):
+    """What `rows` takes: numbers, and addresses of arrays of doubles."""
+
+    designs: float
+    n: float
+    """Inputs, shape (len(DESIGN), n); K_epsilon is written over."""
+    soil: SoilCall
+    controls: float
+    solutions: float
+    """Settings, shape (solutions, len(SETTINGS)): the first, and finer ones in the order of
+    `boulder_sweep.judge.accuracy.finer_controls`."""
+    sizes: float
+    inputs: float
+    """Inputs of the rules, n records of `Sizes`, and of the flags, n records of `FlagInputs`."""
+    limits: float
+    """A record of `LIMITS`."""
+    outcomes: float
+    room: float
+    """Where the results go, shape (len(OUTCOME), n), and room for three times as many."""
+    courses: float
+    """Where the rules write, n records of `Course`, and room for as many."""
+    flags: float
+    """Where the flags go, shape (n,)."""
+
+
+class HistoryCall(NamedTuple):
+    """What `history` takes: numbers, and addresses of arrays of doubles."""
+
+    design: float
+    """Inputs, shape (len(DESIGN),); K_epsilon is written over."""
+    soil: SoilCall
+    settings: float
+    """Settings of the simulation, shape (len(SETTINGS),)."""
+    n: float
+    times: float
+    """Number and times of the samples, ascending [s], shape (n,)."""
+    states: float
+    modes: float
+    exchanged: float
+    """Room for the record, shapes (n, 6), (2, n) and (n, 4)."""
+    history: float
+    """Where the results go, shape (len(HISTORY), n); NaN where the simulation does not get."""
+    centre: float
+    """Where c_x and c_y go, the common centre of mass of boulder and soil (Eqs 3, 4)."""
+
+
+ROWS_CALL, HISTORY_CALL = record_type(RowsCall), record_type(HistoryCall)
 
 
 @inlined

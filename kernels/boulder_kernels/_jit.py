@@ -280,24 +280,6 @@ def _is_compiled(module: str, name: str, kinds: tuple[Any, ...], folder: Path) -
         return False
 
 
-__all__ = [
-    "Kernel",
-    "align_stack",
-    "exact_inlined",
-    "exact_kernel",
-    "fields_of",
-    "inlined",
-    "is_none",
-    "kernel",
-    "load",
-    "overload",
-    "plain",
-    "source_hash",
-    "store",
-    "taken",
-    "through",
-]
-
 SETTINGS: Any = numba.config
 """Numba's settings, which it fills in at run time."""
 IS_PLAIN = bool(SETTINGS.DISABLE_JIT)
@@ -435,6 +417,27 @@ def overload(function: Callable[..., Any]) -> Callable[[Callable[..., Any]], Cal
     return numba.extending.overload(function, inline="always", strict=False)
 
 
+def by_types(choose: Callable[..., Callable[..., Any]]) -> Callable[..., Any]:
+    """Decorate what returns the implementation of a function for its arguments: values, or in kernels their types.
+
+    Kernels inline what it returns, a function of Python with arguments of the same names.
+    """
+
+    @functools.wraps(choose)
+    def call(*arguments: Any) -> Any:
+        """Call what is chosen."""
+        return choose(*arguments)(*arguments)
+
+    overload(call)(choose)
+    return call
+
+
+def type_of(value: Any) -> type:
+    """Return the type of a named tuple, which may be a value or, inside kernels, its Numba type."""
+    kind: type = getattr(value, "instance_class", type(value))
+    return kind
+
+
 def is_none(value: Any) -> bool:
     """Return whether a value, or what a Numba type stands for, is None."""
     return value is None or isinstance(value, numba.types.NoneType)
@@ -452,19 +455,13 @@ def through(add: Callable[..., Any]) -> Callable[..., Any]:
         Takes what has been met before an item, a state, and the item.
     """
 
-    def pass_on(met: Any, state: Any, items: tuple[Any, ...]) -> Any:
-        """Go through the items."""
-        for item in items:
-            met = add(met, state, item)
-        return met
-
-    def choose(met: Any, state: Any, items: Any) -> Callable[..., Any]:
-        """Return the way through as many items as the type has."""
+    @by_types
+    def pass_on(met: Any, state: Any, items: Any) -> Callable[..., Any]:
+        """Return the way through as many items as there are."""
         if len(items) == 1:
             return lambda met, state, items: add(met, state, items[0])
         return lambda met, state, items: pass_on(add(met, state, items[0]), state, items[1:])
 
-    overload(pass_on)(choose)
     return pass_on
 
 

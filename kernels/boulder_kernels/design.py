@@ -297,12 +297,14 @@ def compression_wedge_length(d: float, phi: float) -> float:
 
 
 @exact_inlined
-def spring_per_depth(design: Design) -> float:
+def spring_per_depth(design: Design, phi: float, beta: float) -> float:
     """Spring of a soil element of unit height per metre of its depth [N/m^3] (Eqs 24, 25).
+
+    Friction angle [rad] and constant of subgrade reaction [MN/m^3] are of the soil at that depth.
 
     A slice of unit height at depth alpha has the stiffness of a rod (Eq 23), 1e6 beta W alpha / L_soil,c.
     """
-    return 1e6 * design.beta * design.W / compression_wedge_length(design.d, design.phi)
+    return 1e6 * beta * design.W / compression_wedge_length(design.d, phi)
 
 
 @exact_inlined
@@ -317,7 +319,7 @@ def yield_displacement(design: Design) -> float:
 
     Spring and ultimate resistance both grow in proportion to depth, so it is the same for all elements.
     """
-    return ultimate_per_depth(design) / spring_per_depth(design)
+    return ultimate_per_depth(design) / spring_per_depth(design, design.phi, design.beta)
 
 
 @exact_inlined
@@ -419,7 +421,7 @@ def constants_of(design: Design, readings: Readings, elements: int) -> Constants
         readings,
         elements,
         soil_mass(design, elements),
-        spring_per_depth(design) * d * d,
+        spring_per_depth(design, design.phi, design.beta) * d * d,
         design.rho_s * design.W * d,
         yield_displacement(design),
     )

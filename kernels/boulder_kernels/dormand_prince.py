@@ -22,9 +22,10 @@ from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
 
-from ._jit import inlined
+from ._jit import inlined, kernel
 from .design import Constants, error_arm
 from .dynamics import Acceleration, State, Switches, acceleration
+from .numerics import ITERATIONS
 
 
 class Tableau(NamedTuple):
@@ -138,8 +139,8 @@ def stages(i: int) -> Callable[..., Any]:
         x_b, v_b = at(y.x_b, y.v_b, h, m.a_b)
         theta_b, omega_b = at(y.theta_b, y.omega_b, h, m.alpha_b)
         x_v, v_v = at(y.x_v, y.v_v, h, m.a_v)
-        k = acceleration(x_b, v_b, theta_b, omega_b, x_v, v_v, s, c)
         y_i = State(x_b, v_b, theta_b, omega_b, x_v, v_v)
+        k = acceleration(y_i, s, c)
         return Stages(y_i, k, (*m.a_b, k.a_b), (*m.alpha_b, k.alpha_b), (*m.a_v, k.a_v))
 
     return up_to
@@ -250,11 +251,14 @@ def curvature_at(q: Track, tau: float) -> float:
 
 
 @inlined
-def closer(q: Track, tau: float, tau_end: float) -> float:
-    """One step of Newton's method to the zero of a velocity, within 0 ... tau_end."""
-    curvature = curvature_at(q, tau)
-    ahead = slope_at(q, tau) / curvature if curvature != 0.0 else 0.0
-    return min(max(tau - ahead, 0.0), tau_end)
+def newton(q: Track, tau: float, low: float, high: float, a_0: float, a_x: float, a_v: float) -> float:
+    """Three steps of Newton's method for a_0 + a_x x + a_v x' = 0 on a track, within low ... high; x' is `slope_at`."""
+    for _ in range(3):
+        slope = slope_at(q, tau)
+        value = a_0 + a_x * displacement_at(q, tau) + a_v * slope
+        change = a_x * slope + a_v * curvature_at(q, tau)
+        tau = min(max(tau - (value / change if change != 0.0 else 0.0), low), high)
+    return tau
 
 
 @inlined
@@ -266,8 +270,18 @@ def turning_point(q: Track, tau_end: float) -> float:
     end = slope_at(q, tau_end)
     if not q.x1 * end < 0.0:
         return tau_end
-    tau = tau_end * q.x1 / (q.x1 - end)
-    return closer(q, closer(q, closer(q, tau, tau_end), tau_end), tau_end)
+    return newton(q, tau_end * q.x1 / (q.x1 - end), 0.0, tau_end, 0.0, 0.0, 1.0)
+
+
+@kernel
+def time_of_limit(q: Track, limit: float, tau_end: float) -> float:
+    """Fraction of a step at which the rotation reaches a limit that it has passed at tau_end [rad]."""
+    low, high = 0.0, tau_end
+    for _ in range(ITERATIONS):
+        middle = 0.5 * (low + high)
+        beyond = abs(displacement_at(q, middle)) >= limit
+        low, high = (low, middle) if beyond else (middle, high)
+    return high
 
 
 @inlined

@@ -39,7 +39,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import exact_inlined, inlined, is_none, kernel, overload, plain
+from ._jit import by_types, inlined, is_none, kernel, type_of
 from .design import Constants, Design, Readings, body_with, constants_of
 from .numerics import sine_versine
 from .pieces import (
@@ -96,12 +96,6 @@ LAWS: dict[type, SoilLaw] = {
 """The law of each record of a soil."""
 
 
-def type_of(value: Any) -> type:
-    """Return the type of a named tuple, which may be a value or, inside kernels, its Numba type."""
-    kind: type = getattr(value, "instance_class", type(value))
-    return kind
-
-
 def soil_of(c: Any) -> Any:
     """Return the record of the soil of `SoilConstants`, their last field, or its Numba type; anything else itself."""
     return c[-1] if type_of(c) is SoilConstants else c
@@ -112,18 +106,13 @@ def law_of(c: Any) -> SoilLaw:
     return LAWS.get(type_of(soil_of(c)), UNIFORM)
 
 
-def soil_reaction(k: Kinematics, c: Any) -> Reaction:
+@by_types
+def soil_reaction(k: Kinematics, c: Any) -> Callable[..., Reaction]:
     """Force and moment of soil and leaning weight at lines ``k`` of displacement, velocity and lever (Eqs 19, 20, 144).
 
     A boulder whose centre does not lie over the middle of its foot has the moment -D cos(theta) of its weight with it:
     the restoring couple of a box has equal arms either way, and D is half of what differs.
     """
-    found = law_of(c).reaction(k, soil_of(c))
-    return leaning(found, k, c.lean) if type(c) is SoilConstants else found
-
-
-@overload(soil_reaction)
-def _soil_reaction(k: Any, c: Any) -> Callable[..., Reaction]:
     reaction = law_of(c).reaction
     if type_of(c) is SoilConstants:
         return lambda k, c: leaning(reaction(k, c.soil), k, c.lean)
@@ -136,41 +125,20 @@ def leaning(reaction: Reaction, k: Kinematics, lean: float) -> Reaction:
     return Reaction(reaction.F, reaction.M - times(lean, k.lever_d))
 
 
-def soil_potential(A: float, slope_x: float, c: Any) -> Potential:
+@by_types
+def soil_potential(A: float, slope_x: float, c: Any) -> Callable[..., Potential]:
     """Elastic energy of the soil by the same representation as the forces, a convex function of both lengths [m]."""
-    return law_of(c).potential(A, slope_x, soil_of(c))
-
-
-@overload(soil_potential)
-def _soil_potential(A: Any, slope_x: Any, c: Any) -> Callable[..., Potential]:
     potential = law_of(c).potential
     if type_of(c) is SoilConstants:
         return lambda A, slope_x, c: potential(A, slope_x, c.soil)
     return lambda A, slope_x, c: potential(A, slope_x, c)
 
 
-def drag_power(k: Kinematics, c: Any) -> float:
+@by_types
+def drag_power(k: Kinematics, c: Any) -> Callable[..., float]:
     """Power that the drag takes out of the motion [W], by the same representation as the forces (Eqs 34-36)."""
-    return law_of(c).drag_power(k, soil_of(c))
-
-
-@overload(drag_power)
-def _drag_power(k: Any, c: Any) -> Callable[..., float]:
     power = law_of(c).drag_power
     return (lambda k, c: power(k, c.soil)) if type_of(c) is SoilConstants else (lambda k, c: power(k, c))
-
-
-def fill_soil(design: Design, profile: SoilProfile) -> LumpedSoil:
-    """Work out the record of a profile, and return what follows from it."""
-    fill: Any = LAWS[type(profile.soil)].fill
-    lumped: LumpedSoil = fill(design, *profile)
-    return lumped
-
-
-@overload(fill_soil)
-def _fill_soil(design: Any, profile: Any) -> Callable[..., LumpedSoil]:
-    fill: Any = law_of(profile[-1]).fill
-    return lambda design, profile: fill(design, profile.layers, profile.outline, profile.soil)
 
 
 @kernel
@@ -180,14 +148,8 @@ def soil_energy(k: Kinematics, c: Constants) -> float:
     return V
 
 
-@exact_inlined
-def constants_in_profile(design: Design, readings: Readings, profile: SoilProfile) -> Any:
-    """Constants of the motion of one design in a profile; see `constants_in`."""
-    lumped = fill_soil(design, profile)
-    return constants_in_soil(design, readings, body_with(design, profile.outline), lumped, profile.soil)
-
-
-def constants_in(design: Design, readings: Readings, elements: int, profile: SoilProfile | None) -> Any:
+@by_types
+def constants_in(design: Design, readings: Readings, elements: int, profile: Any) -> Callable[..., Any]:
     """Constants of the motion of one design in its soil.
 
     Parameters
@@ -206,16 +168,16 @@ def constants_in(design: Design, readings: Readings, elements: int, profile: Soi
     Constants or SoilConstants
         Non-finite or non-positive where the design is impossible, see `boulder_kernels.design.is_computable`.
     """
-    if profile is None:
-        return constants_of(design, readings, elements)
-    return plain(constants_in_profile)(design, readings, profile)  # what it calls is compiled
-
-
-@overload(constants_in)
-def _constants_in(design: Any, readings: Any, elements: Any, profile: Any) -> Callable[..., Any]:
     if is_none(profile):
         return lambda design, readings, elements, profile: constants_of(design, readings, elements)
-    return lambda design, readings, elements, profile: constants_in_profile(design, readings, profile)
+    fill: Any = law_of(profile[-1]).fill
+    return lambda design, readings, elements, profile: constants_in_soil(
+        design,
+        readings,
+        body_with(design, profile.outline),
+        fill(design, profile.layers, profile.outline, profile.soil),
+        profile.soil,
+    )
 
 
 def empty_soil(layers: int, points: int, elements: int) -> Any:
@@ -387,23 +349,21 @@ class Acceleration(NamedTuple):
 
 
 @inlined
-def acceleration(
-    x_b: float, v_b: float, theta_b: float, omega_b: float, x_v: float, v_v: float, s: Switches, c: Constants
-) -> Acceleration:
+def acceleration(y: State, s: Switches, c: Constants) -> Acceleration:
     """Right-hand side of Eq 52 in the present modes.
 
     Parameters
     ----------
-    x_b, v_b, theta_b, omega_b, x_v, v_v
-        The state, as in `State`.
+    y
+        The state.
     s
         Factors of the present modes.
     c
         Constants of the design.
     """
-    sin, versin = sine_versine(theta_b)
-    soil = soil_reaction(soil_kinematics(x_b, v_b, omega_b, sin, versin, c), c)
-    u = spring_compression(x_v, v_v, contact_displacement(x_b, sin, versin, c), c)
+    sin, versin = sine_versine(y.theta_b)
+    soil = soil_reaction(soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c), c)
+    u = spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c)
     F_v = s.k_contact * u  # Eqs 18, 41, 46
     M = soil.M + F_v * contact_lever(sin, versin, c)
     return Acceleration(
@@ -414,29 +374,15 @@ def acceleration(
     )
 
 
-@inlined
-def rate_of(y: State, switches: Switches, c: Constants) -> Acceleration:
-    """Acceleration at a state."""
-    return acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, switches, c)
-
-
-def lift_of(sin: float, versin: float, c: Constants) -> float:
+@by_types
+def lift_of(sin: float, versin: float, c: Any) -> Callable[..., float]:
     """Return the energy of the weight, lifted by a rotation with this sine and versine [J] (Eqs 37-39, 144)."""
-    return float(c.C_cos * abs(sin) + c.C_sin * versin + getattr(c, "lean", 0.0) * c.d * sin)
-
-
-@overload(lift_of)
-def _lift_of(sin: Any, versin: Any, c: Any) -> Callable[..., float]:
     if type_of(c) is SoilConstants:
         return lambda sin, versin, c: c.C_cos * abs(sin) + c.C_sin * versin + c.lean * c.d * sin
     return lambda sin, versin, c: c.C_cos * abs(sin) + c.C_sin * versin
 
 
-def least_couple(c: Constants) -> float:
+@by_types
+def least_couple(c: Any) -> Callable[..., float]:
     """Return the lesser of the moments of the weight about the ends of the foot [N m]; they differ by 2 D (Eq 144)."""
-    return float(c.C_cos - abs(getattr(c, "lean", 0.0)) * c.d)
-
-
-@overload(least_couple)
-def _least_couple(c: Any) -> Callable[..., float]:
     return (lambda c: c.C_cos - abs(c.lean) * c.d) if type_of(c) is SoilConstants else (lambda c: c.C_cos)

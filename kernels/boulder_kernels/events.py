@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from ._jit import inlined, kernel
 from .design import Constants, Readings
-from .dormand_prince import DenseOutput, Track, curvature_at, displacement_at, slope_at, state_at, turning_point
+from .dormand_prince import DenseOutput, curvature_at, displacement_at, newton, slope_at, state_at, turning_point
 from .dynamics import (
     FREE,
     HELD,
@@ -28,9 +28,9 @@ from .dynamics import (
     Modes,
     State,
     Switches,
+    acceleration,
     contact_displacement,
     holding_moment,
-    rate_of,
     signed_arm,
     spring_compression,
 )
@@ -187,44 +187,33 @@ def contact_gap(u: float, g: GapFactors, c: Constants) -> float:
 
 
 @inlined
-def gaps_of(
-    A: float,
-    slope_x: float,
-    theta_b: float,
-    omega_b: float,
-    u: float,
-    M: float,
-    arm: float,
-    g: GapFactors,
-    c: Constants,
-) -> Gaps:
+def gaps_of(y: State, M: float, u: float, sin: float, versin: float, g: GapFactors, c: Constants) -> Gaps:
     """Gaps of all events.
 
     Parameters
     ----------
-    A, slope_x
-        Displacement of the soil at the soil line and its decrease down to the base [m].
-    theta_b, omega_b
-        Rotation [rad] and angular velocity [rad/s].
-    u
-        Compression of the vehicle's spring [m].
+    y
+        The state.
     M
         Net moment of soil and truck [N m].
-    arm
-        Signed arm of the weight [N m], from `signed_arm`.
+    u
+        Compression of the vehicle's spring [m].
+    sin, versin
+        sin(theta_b) and 1 - cos(theta_b).
     g, c
         Factors of the present modes, and constants of the design.
     """
+    k, arm = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c), signed_arm(sin, versin, c)
     couple = g.couple_M * M + g.couple_abs_M * abs(M) + g.couple_limit * abs(arm)
     return Gaps(
         contact_gap(u, g, c),
-        g.rotation_0 + g.rotation_abs_M * abs(M) + g.rotation_theta * theta_b + g.rotation_omega * omega_b,
+        g.rotation_0 + g.rotation_abs_M * abs(M) + g.rotation_theta * y.theta_b + g.rotation_omega * y.omega_b,
         couple if g.couple_limit != 0.0 else NEVER,
-        g.corner_0 + g.corner_theta * theta_b,
+        g.corner_0 + g.corner_theta * y.theta_b,
         g.arm * arm if g.arm != 0.0 else NEVER,
-        yield_gap(A, g.top, c),
-        yield_gap(A - slope_x, g.base, c),
-        g.limit - abs(theta_b),
+        yield_gap(k.A, g.top, c),
+        yield_gap(k.A - k.slope_x, g.base, c),
+        g.limit - abs(y.theta_b),
     )
 
 
@@ -233,8 +222,7 @@ def gaps_at(y: State, M: float, g: GapFactors, c: Constants) -> Gaps:
     """Gaps of all events at a state with net moment M [N m]."""
     sin, versin = sine_versine(y.theta_b)
     u = spring_compression(y.x_v, y.v_v, contact_displacement(y.x_b, sin, versin, c), c)
-    k = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c)
-    return gaps_of(k.A, k.slope_x, y.theta_b, y.omega_b, u, M, signed_arm(sin, versin, c), g, c)
+    return gaps_of(y, M, u, sin, versin, g, c)
 
 
 SEATING_ANGLE = 1e-9
@@ -403,8 +391,6 @@ SHORTEN = -2
 EDGE_TOLERANCE = 1e-5
 """Precision of the search as a fraction of the step as printed, where several events lie close together and a motion
 may graze one of them."""
-NEWTON_TOLERANCE = 1e-6
-"""Last correction of a root by Newton's method, as a fraction of the step: its square is what is left."""
 JUST_AFTER = 1e-3
 """Fraction of the step, and then its square, at which a search begins whose gap is not positive at the start."""
 AT_ONCE = 1e-5
@@ -431,14 +417,10 @@ def lesser(least: float, event: int, gap: float, scale: float, other: int) -> tu
 @inlined
 def least_gap(gaps: Gaps, weights: Gaps) -> tuple[float, int]:
     """Least of the gaps that end below zero, scaled, and its event; NEVER and NONE where there is none."""
-    least, event = lesser(NEVER, NONE, gaps.contact, weights.contact, CONTACT)
-    least, event = lesser(least, event, gaps.rotation, weights.rotation, ROTATION)
-    least, event = lesser(least, event, gaps.couple, weights.couple, COUPLE)
-    least, event = lesser(least, event, gaps.corner, weights.corner, CORNER)
-    least, event = lesser(least, event, gaps.arm, weights.arm, ARM)
-    least, event = lesser(least, event, gaps.top, weights.top, YIELD_TOP)
-    least, event = lesser(least, event, gaps.base, weights.base, YIELD_BASE)
-    return lesser(least, event, gaps.limit, weights.limit, LIMIT)
+    least, event = NEVER, NONE
+    for other in range(len(gaps)):
+        least, event = lesser(least, event, gaps[other], weights[other], other)
+    return least, event
 
 
 @inlined
@@ -449,7 +431,7 @@ def least_within(
     forces = (weights.rotation > 0.0 and needs_moment(g)) or weights.couple > 0.0
     if forces or weights.arm > 0.0 or weights.top > 0.0 or weights.base > 0.0:
         y = state_at(dense, tau)
-        return least_gap(gaps_at(y, rate_of(y, switches, c).M if forces else 0.0, g, c), weights)
+        return least_gap(gaps_at(y, acceleration(y, switches, c).M if forces else 0.0, g, c), weights)
     least, event = NEVER, NONE
     theta_b = displacement_at(dense.rotation, tau)
     if weights.contact > 0.0:
@@ -504,20 +486,6 @@ def weights_of(end: Gaps, dense: DenseOutput, g: GapFactors, c: Constants) -> Ga
 
 
 @inlined
-def newton(
-    tau: float, low: float, high: float, a_0: float, a_theta: float, a_omega: float, dense: DenseOutput
-) -> float:
-    """Three steps of Newton's method for a_0 + a_theta theta + a_omega omega = 0, within low ... high."""
-    per_second = 1.0 / dense.h
-    for _ in range(3):
-        slope = slope_at(dense.rotation, tau)
-        value = a_0 + a_theta * displacement_at(dense.rotation, tau) + a_omega * per_second * slope
-        change = a_theta * slope + a_omega * per_second * curvature_at(dense.rotation, tau)
-        tau = min(max(tau - (value / change if change != 0.0 else 0.0), low), high)
-    return tau
-
-
-@inlined
 def refined(event: int, tau: float, b: Bracket, g: GapFactors, dense: DenseOutput) -> float:
     """Fraction of a step at which the forces jump, or the limit is reached, by Newton's method on the rotation.
 
@@ -531,12 +499,13 @@ def refined(event: int, tau: float, b: Bracket, g: GapFactors, dense: DenseOutpu
     if b.f_low <= 0.0:
         return tau  # a search that has closed on its start stays there
     if event == CORNER:
-        return newton(tau, b.low, b.high, g.corner_0, g.corner_theta, 0.0, dense)
+        return newton(dense.rotation, tau, b.low, b.high, g.corner_0, g.corner_theta, 0.0)
     if event == LIMIT:
         side = 1.0 if displacement_at(dense.rotation, tau) > 0.0 else -1.0
-        return newton(tau, b.low, b.high, g.limit, -side, 0.0, dense)
+        return newton(dense.rotation, tau, b.low, b.high, g.limit, -side, 0.0)
     if event == ROTATION and not needs_moment(g):
-        return newton(tau, b.low, b.high, g.rotation_0, g.rotation_theta, g.rotation_omega, dense)
+        per_tau = g.rotation_omega * (1.0 / dense.h)
+        return newton(dense.rotation, tau, b.low, b.high, g.rotation_0, g.rotation_theta, per_tau)
     return tau
 
 
@@ -632,37 +601,4 @@ def limit_before(top: float, dense: DenseOutput, g: GapFactors) -> float:
     side = 1.0 if theta > 0.0 else -1.0
     beyond, bend = abs(theta) - g.limit, abs(curvature_at(dense.rotation, top))
     tau = max(top - math.sqrt(max(2.0 * beyond / bend if bend > 0.0 else 0.0, 0.0)), 0.0)
-    return newton(tau, 0.0, top, g.limit, -side, 0.0, dense)
-
-
-@kernel
-def locate_limit(gap_start: float, gap_end: float, rotation: Track, limit: float, tau_end: float) -> float:
-    """Fraction of a step at which the rotation reaches a limit that does not end the simulation.
-
-    Parameters
-    ----------
-    gap_start, gap_end
-        Gaps at the start of the step, positive, and at tau_end, not positive [rad].
-    rotation
-        The rotation within the step.
-    limit
-        Limit of rotation [rad].
-    tau_end
-        Fraction of the step before which it is reached.
-    """
-    low, high = 0.0, tau_end
-    tau = tau_end * gap_start / (gap_start - gap_end)
-    for _ in range(ITERATIONS):
-        theta = displacement_at(rotation, tau)
-        gap = limit - abs(theta)
-        if gap > 0.0:
-            low = tau
-        else:
-            high = tau
-        before = tau
-        tau = before + gap / (slope_at(rotation, before) if theta > 0.0 else -slope_at(rotation, before))
-        if not low <= tau <= high:
-            tau = 0.5 * (low + high)
-        if abs(tau - before) <= NEWTON_TOLERANCE:
-            break
-    return tau
+    return newton(dense.rotation, tau, 0.0, top, g.limit, -side, 0.0)

@@ -19,11 +19,12 @@ number of steps lasts. Three things make such designs affordable.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import inlined, kernel
+from ._jit import by_types, inlined, is_none, kernel
 from .control import (
     ACCEPTED,
     MOST_STEPS,
@@ -39,16 +40,15 @@ from .control import (
     stable_step,
 )
 from .design import Constants, Design, Readings, constants_of, is_computable
-from .dormand_prince import dense_output, state_at, step
+from .dormand_prince import dense_output, state_at, step, time_of_limit
 from .dynamics import (
     TURNING_FORWARD,
     Acceleration,
     Modes,
     State,
     Switches,
+    acceleration,
     constants_in,
-    rate_of,
-    signed_arm,
     switches_of,
 )
 from .events import (
@@ -68,7 +68,6 @@ from .events import (
     gaps_of,
     initial_modes,
     length_after,
-    locate_limit,
     needs_moment,
 )
 from .numerics import sine_versine
@@ -80,19 +79,17 @@ from .outcomes import (
     Record,
     Status,
     add_exchanged,
+    all_maxima,
     compression_at,
     compression_of,
     error_time,
     grown,
     highest,
-    no_maxima,
     nothing_exchanged,
-    undefined_maxima,
     updated_maxima,
     write_samples,
 )
 from .settling import NO_PROOF, barrier_energy, boulder_energy, inside_maxima, proof_is_possible, stays_below
-from .soil import soil_kinematics
 
 FULL_TURN = math.pi
 """Rotation at which a simulation that does not stop at the limit ends [rad]: the boulder is upside down."""
@@ -160,21 +157,6 @@ class StepResult(NamedTuple):
     impact: Impact
 
 
-class Ending(NamedTuple):
-    """What ends the simulation of a design, and what would prove that it may end."""
-
-    theta_limit: float
-    """Limit of rotation [rad]."""
-    extension: float
-    """A simulation that ends without a proof goes on for so long at a time [s]."""
-    longest: float
-    """Longest simulated time [s]."""
-    stopping: bool
-    """Whether it may end before the horizon, at the limit or settled."""
-    provable: bool
-    """Whether the energy argument of `boulder_kernels.settling` holds."""
-
-
 @inlined
 def stop_of(control: Control) -> float:
     """Rotation at which a simulation ends [rad]."""
@@ -184,7 +166,7 @@ def stop_of(control: Control) -> float:
 @kernel
 def failed(status: int) -> Outcome:
     """Outcome of a design that was not simulated, or not to its end."""
-    return Outcome(status, undefined_maxima(), np.nan, np.nan, 0, np.nan, np.nan, 0.0)
+    return Outcome(status, all_maxima(np.nan), np.nan, np.nan, 0, np.nan, np.nan, 0.0)
 
 
 @inlined
@@ -202,17 +184,17 @@ def is_growing(y: State, m: Maxima) -> bool:
 
 
 @kernel
-def horizon_status(y: State, m: Maxima, ending: Ending, c: Constants) -> int:
-    """Status of a design that reached a horizon, if it ends there.
+def horizon_status(y: State, m: Maxima, theta_limit: float, provable: bool, c: Constants) -> int:
+    """Status of a design that reached a horizon, if it ends there; see `decide`.
 
     What the model is valid for is proved, too, unless it is passed already: then only the limit counts.
     """
-    below = ending.theta_limit if m.theta >= VALID_ROTATION else min(ending.theta_limit, VALID_ROTATION)
-    if ending.provable and m.theta < below and stays_below(below, y, c):
+    below = theta_limit if m.theta >= VALID_ROTATION else min(theta_limit, VALID_ROTATION)
+    if provable and m.theta < below and stays_below(below, y, c):
         return Status.BELOW_LIMIT.value
     if is_growing(y, m):
         return Status.OUTWARD.value
-    return Status.HORIZON.value if ending.provable else Status.UNPROVABLE.value
+    return Status.HORIZON.value if provable else Status.UNPROVABLE.value
 
 
 @inlined
@@ -231,9 +213,7 @@ def passes(i: Impact, y_end: State, k_end: Acceleration, beyond: float, c: Const
     y = i.y
     sin, versin = sine_versine(y_end.theta_b)
     end = compression_of(y_end, sin, versin, i.switches, c)
-    k = soil_kinematics(y_end.x_b, y_end.v_b, y_end.omega_b, sin, versin, c)
-    arm = signed_arm(sin, versin, c)
-    gaps = gaps_of(k.A, k.slope_x, y_end.theta_b, y_end.omega_b, end.u, k_end.M, arm, i.factors, c)
+    gaps = gaps_of(y_end, k_end.M, end.u, sin, versin, i.factors, c)
     plain = (
         (gaps.contact >= 0.0)
         & (gaps.rotation >= -beyond)
@@ -314,44 +294,42 @@ def begin_to_turn(
     m = passed_maxima(i.maxima, 0.0, clock.h, i.y, y_end, i.front, front, i.switches)
     h = min(clock.h_full, clock.horizon - clock.h)
     after = Clock(clock.h, h, clock.h_full, 1.0, clock.barrier, clock.horizon, error, 0.0)
-    return turns, Impact(i.pace, y_end, rate_of(y_end, switches, c), front, m, after, modes, switches, g)
+    return turns, Impact(i.pace, y_end, acceleration(y_end, switches, c), front, m, after, modes, switches, g)
 
 
 @inlined
 def decide(
-    y_start: State, y: State, m: Maxima, t: float, clock: Clock, ending: Ending, c: Constants
+    i: Impact, y: State, m: Maxima, t: float, c: Constants, readings: Readings, control: Control
 ) -> tuple[int, float, float]:
     """Decide whether a simulation ends with a step that does not reach the limit.
 
     Parameters
     ----------
-    y_start, y
-        States at its start and where it is cut.
-    m, t
-        Maxima and time [s] there.
-    clock
-        How far it had come before.
-    ending
-        What ends it.
+    i
+        The impact at its start.
+    y, m, t
+        State, maxima and time [s] where it is cut.
+    c, readings, control
+        See `follow`.
 
     Returns
     -------
     status, barrier, horizon
         How it ended or RUNNING, and what `Clock` says of the others.
     """
-    barrier, horizon = clock.barrier, clock.horizon
-    if ending.stopping and ending.provable and y.v_v <= 0.0:
+    barrier, horizon, provable = i.clock.barrier, i.clock.horizon, proof_is_possible(readings)
+    if control.stop_at_limit and provable and y.v_v <= 0.0:
         # At one of its maxima a motion has yet to turn back, and the barrier will be another then.
         inside = inside_maxima(y, m)
-        if inside and turned_back(y_start, y):
+        if inside and turned_back(i.y, y):
             barrier = barrier_energy(m, c)
         if inside and boulder_energy(y, c) < barrier:
             return Status.SETTLED.value, barrier, horizon
     if t < horizon:
         return RUNNING, barrier, horizon
-    status = horizon_status(y, m, ending, c)
-    if t < ending.longest and (status != Status.BELOW_LIMIT.value or is_growing(y, m)):
-        return RUNNING, barrier, min(horizon + ending.extension, ending.longest)
+    status, longest = horizon_status(y, m, control.theta_limit, provable, c), longest_time(control, i.pace.h_apart)
+    if t < longest and (status != Status.BELOW_LIMIT.value or is_growing(y, m)):
+        return RUNNING, barrier, min(horizon + control.horizon, longest)
     return status, barrier, horizon
 
 
@@ -387,22 +365,21 @@ def follow(
     y = y_end if tau >= 1.0 else state_at(dense, tau)
     m, front = updated_maxima(i.maxima, clock.t, tau, i.front, y, dense, switches, c)
     t = clock.horizon if h >= clock.horizon - clock.t and tau >= 1.0 else clock.t + tau * h
-    ending = ending_of(control, readings, i.pace.h_apart)
     if event == LIMIT:
         status, barrier, horizon = Status.LIMIT.value, clock.barrier, clock.horizon
         m = at_limit(m, t, g.limit)
     else:
-        status, barrier, horizon = decide(i.y, y, m, t, clock, ending, c)
+        status, barrier, horizon = decide(i, y, m, t, c, readings, control)
     k, h_full, changes = k_end, clock.h_full, clock.rotation_changes
     h = min(h_full, horizon - t)
     if event > NONE and status == RUNNING:
         changes += changes_counted(event, clock.t, modes)
         M = k_end.M
         if (event == ROTATION or event == COUPLE) and tau < 1.0:
-            M = rate_of(y, switches, c).M
+            M = acceleration(y, switches, c).M
         y, modes = change_mode(event, y, M, modes, c)
         switches, g = enter_modes(modes, readings, g.limit, control.locate_yield, control.event_tolerance, c)
-        k, front = rate_of(y, switches, c), compression_at(y, switches, c)
+        k, front = acceleration(y, switches, c), compression_at(y, switches, c)
         h_full = i.pace.h_touching if modes.touching else i.pace.h_apart
         h = length_after(event, min(h_full, horizon - t), y.omega_b, k.alpha_b)
     after = Clock(t, h, h_full, attempts, barrier, horizon, clock.error + error, changes)
@@ -424,19 +401,13 @@ def enter_modes(
 
 
 @kernel
-def initial_state(c: Constants) -> State:
-    """State at the first touch."""
-    return State(0.0, 0.0, 0.0, 0.0, 0.0, c.v_0)
-
-
-@kernel
-def ending_of(control: Control, readings: Readings, h_full: float) -> Ending:
-    """What ends the simulation of a design by steps of a given length [s]; no design takes more than MOST_STEPS."""
+def longest_time(control: Control, h_full: float) -> float:
+    """Longest time for which a design is simulated by steps of a length [s]; none takes more than MOST_STEPS."""
     most = (STEP_RATIO if control.refined else 1.0) * MOST_STEPS * h_full
     longest = control.horizon
     if control.stop_at_limit:
         longest = max(longest, min(control.longest_horizon, most))
-    return Ending(control.theta_limit, control.horizon, longest, control.stop_at_limit, proof_is_possible(readings))
+    return longest
 
 
 @inlined
@@ -452,14 +423,14 @@ def first_touch(h_touching: float, h_apart: float, c: Constants, readings: Readi
     readings, control
         How it is simulated.
     """
-    y, modes = initial_state(c), initial_modes(readings, c)
+    y, modes = State(0.0, 0.0, 0.0, 0.0, 0.0, c.v_0), initial_modes(readings, c)
     switches, g = enter_modes(modes, readings, stop_of(control), control.locate_yield, control.event_tolerance, c)
-    budget = attempt_budget(h_apart, ending_of(control, readings, h_apart).longest)
+    budget = attempt_budget(h_apart, longest_time(control, h_apart))
     pace = Pace(h_touching, h_apart, float(MOST_STEPS) if control.last_resort else budget)
     h = min(first_length(h_touching, g, c), control.horizon)
     clock = Clock(0.0, h, h_touching, 0.0, NO_PROOF, control.horizon, 0.0, 0.0)
-    k, front = rate_of(y, switches, c), compression_at(y, switches, c)
-    return Impact(pace, y, k, front, no_maxima(), clock, modes, switches, g)
+    k, front = acceleration(y, switches, c), compression_at(y, switches, c)
+    return Impact(pace, y, k, front, all_maxima(0.0), clock, modes, switches, g)
 
 
 class ImpactNotes(NamedTuple):
@@ -495,9 +466,7 @@ def watch(
     dense = dense_output(i.y, i.k, y_end, k_end, h)
     t_limit, written, exchanged = w.t_limit, w.written, w.exchanged
     if np.isnan(t_limit) and after.maxima.theta >= control.theta_limit:
-        gap_start, gap = control.theta_limit - abs(i.y.theta_b), control.theta_limit - after.maxima.theta
-        tau = (after.maxima.t_theta - t) / h
-        t_limit = t + h * locate_limit(gap_start, gap, dense.rotation, control.theta_limit, tau)
+        t_limit = t + h * time_of_limit(dense.rotation, control.theta_limit, (after.maxima.t_theta - t) / h)
     if record.times.size > 0:
         written = write_samples(record, written, t, t_end, dense, i.modes, i.switches, c, exchanged)
         exchanged = add_exchanged(exchanged, dense, (t_end - t) / h, i.modes, i.switches, c)
@@ -527,12 +496,6 @@ class Problem(NamedTuple):
 
 
 @kernel
-def simulate_uniform(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
-    """Simulate one impact in a uniform soil; see `simulate_alone`."""
-    return simulate_alone(Problem(design, None), readings, control, record)
-
-
-@kernel
 def simulate_alone(problem: Problem, readings: Readings, control: Control, record: Record) -> Outcome:
     """Simulate one impact with a fixed time step, each step cut where a mode changes.
 
@@ -559,14 +522,14 @@ def simulate_alone(problem: Problem, readings: Readings, control: Control, recor
     adds to the solution, so the order of the method is kept. A motion that became non-finite is retried with a
     shorter step.
     """
-    if misses(problem.design):
+    if problem.design.H - problem.design.d <= problem.design.e_bumper:
         return failed(Status.NO_CONTACT.value)
     c = constants_in(problem.design, readings, control.elements, problem.profile)
     if not is_computable(c):
         return failed(Status.INVALID.value)
     h, status = first_step(control, stop_of(control), c)
     if status != ACCEPTED:
-        return failed(status)
+        return simulate_refused(problem, status, readings, control, record)
     outcome = simulate_by_steps(h, h, c, readings, control, record)
     while outcome.status == Status.UNSTABLE.value and control.horizon <= MOST_STEPS * h:
         h *= RETRY
@@ -574,10 +537,16 @@ def simulate_alone(problem: Problem, readings: Readings, control: Control, recor
     return outcome
 
 
-@inlined
-def misses(design: Design) -> bool:
-    """Whether the truck passes over the boulder."""
-    return design.H - design.d <= design.e_bumper
+@by_types
+def simulate_refused(
+    problem: Problem, status: int, readings: Readings, control: Control, record: Record
+) -> Callable[..., Outcome]:
+    """Simulate one impact that is refused with some status; only in uniform soil there is a last resort."""
+    if is_none(problem[-1]):
+        return lambda problem, status, readings, control, record: simulate_last_resort(
+            problem.design, status, readings, control, record
+        )
+    return lambda problem, status, readings, control, record: failed(status)
 
 
 @kernel
@@ -640,22 +609,19 @@ def longest_step(theta_limit: float, c: Constants) -> float:
 
 
 @kernel
-def simulate_last_resort(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
+def simulate_last_resort(design: Design, status: int, readings: Readings, control: Control, record: Record) -> Outcome:
     """Simulate one impact; what cannot be decided within the steps allowed keeps the status it is refused with.
 
     Parameters
     ----------
-    design
-        The design, in uniform soil.
+    design, status
+        The design, in uniform soil, and that status.
     readings, control, record
         The same as in `simulate_alone`; the record keeps nothing.
     """
+    if not (control.last_resort and control.stop_at_limit):
+        return failed(status)
     c = constants_of(design, readings, control.elements)
-    if misses(design) or not is_computable(c):
-        return simulate_uniform(design, readings, control, record)
-    _, status = first_step(control, control.theta_limit, c)
-    if status == ACCEPTED:
-        return simulate_uniform(design, readings, control, record)
     factor = spring_to_follow(rates_of(control.theta_limit, c), control)
     c = constants_of(with_spring(design, factor), readings, control.elements)
     apart = constants_of(with_spring(design, NO_SPRING), readings, control.elements)

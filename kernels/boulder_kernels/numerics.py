@@ -32,12 +32,15 @@ import numpy as np
 from llvmlite import ir
 from numba.core import cgutils
 
-from ._jit import exact_inlined, inlined, overload
+from ._jit import exact_inlined, fields_of, inlined, overload
 
 
 def record_type(kind: Any) -> np.dtype:
-    """Return the type of a record with a number for each field of a named tuple."""
-    return np.dtype((np.record, [(name, np.float64) for name in kind._fields]))
+    """Return the type of a record with a number for each field of a named tuple, or a record where it is one itself."""
+    fields = fields_of(kind).items()
+    return np.dtype(
+        (np.record, [(name, record_type(each) if hasattr(each, "_fields") else np.float64) for name, each in fields])
+    )
 
 
 def records_of(kind: Any, columns: Iterable[Any]) -> np.ndarray:
@@ -185,6 +188,13 @@ def field(values: np.ndarray, offset: int, index: int) -> float:
 def put(values: np.ndarray, offset: int, index: int, value: float) -> None:
     """Write the number at an offset and an index from it, see `field`."""
     values[np.uintp(offset + index)] = value
+
+
+@inlined
+def write_numbers(to: np.ndarray, numbers: tuple[float, ...]) -> None:
+    """Write the numbers of a tuple into the first places of an array, shape (m,)."""
+    for i in range(len(numbers)):
+        to[i] = numbers[i]
 
 
 @numba.extending.intrinsic

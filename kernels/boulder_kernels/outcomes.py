@@ -45,7 +45,7 @@ from .dynamics import (
     spring_compression,
     switches_of,
 )
-from .numerics import sine_versine
+from .numerics import sine_versine, write_numbers
 from .soil import soil_kinematics
 
 
@@ -237,15 +237,9 @@ def write_outcome(out: np.ndarray, row: int, o: Outcome, errors: StepErrors) -> 
 
 
 @kernel
-def no_maxima() -> Maxima:
-    """Maxima before the first step."""
-    return Maxima(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-@kernel
-def undefined_maxima() -> Maxima:
-    """Maxima of a design that was not simulated."""
-    return Maxima(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan)
+def all_maxima(x: float) -> Maxima:
+    """Maxima that all are one number: zero before the first step, or NaN where nothing was simulated."""
+    return Maxima(x, x, x, x, x, x, x, x, x, x)
 
 
 class Compression(NamedTuple):
@@ -669,7 +663,7 @@ def exchange_rates(y: State, modes: Modes, s: Switches, c: Constants) -> Exchang
     F_truck = s.k_truck * u / c.k_m * c.k_v
     # tau_v = m_v/c_v and k_v/k_m = m_v, so 1/c_v = tau_v k_m / k_v.
     damper = F_truck * F_truck * c.tau_v * c.k_m / c.k_v
-    M = acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, s, c).M
+    M = acceleration(y, s, c).M
     M_R = (s.net - 1.0) * M + couple_moment(sin, versin, s, c)
     pull = 0.0
     if not modes.touching:
@@ -741,19 +735,10 @@ def write_samples(
     while written < record.times.size and record.times[written] <= t_end:
         tau = (record.times[written] - t) / dense.h
         y = state_at(dense, tau)
-        states = record.states[written]
-        states[0], states[1], states[2] = y.x_b, y.v_b, y.theta_b
-        states[3], states[4], states[5] = y.omega_b, y.x_v, y.v_v
+        write_numbers(record.states[written], y)
         record.turning[written] = modes.turning
         record.touching[written] = modes.touching
-        so_far = add_exchanged(exchanged, dense, tau, modes, switches, c)
-        sums = record.exchanged[written]
-        sums[0], sums[1], sums[2], sums[3] = (
-            so_far.drag,
-            so_far.damper,
-            so_far.restoring,
-            so_far.pull,
-        )
+        write_numbers(record.exchanged[written], add_exchanged(exchanged, dense, tau, modes, switches, c))
         written += 1
     return written
 
@@ -788,7 +773,7 @@ def sample_of(record: Record, sample: int, c: Any, m_v: float, readings: Reading
     y = state_of(record, sample)
     touching = record.touching[sample] > 0
     modes = modes_of(y, int(record.turning[sample]), touching, c)
-    rate = acceleration(y.x_b, y.v_b, y.theta_b, y.omega_b, y.x_v, y.v_v, switches_of(modes, readings, c), c)
+    rate = acceleration(y, switches_of(modes, readings, c), c)
     # Printed separation: the spring goes on pulling the truck after release, so it holds energy all along.
     holds = touching or not readings.separation_released
     return Sample(rate, stored_energies(y, m_v, holds, readings.restoring_gravity, c))
@@ -822,7 +807,5 @@ def evaluate_samples(
     """
     for i in range(record.times.size):
         s = sample_of(record, i, c, m_v, readings)
-        rates[0, i], rates[1, i], rates[2, i], rates[3, i] = s.rate.a_b, s.rate.alpha_b, s.rate.a_v, s.rate.M
-        e = s.stored
-        stored[0, i], stored[1, i], stored[2, i] = e.truck_kinetic, e.boulder_kinetic, e.boulder_rotational
-        stored[3, i], stored[4, i], stored[5, i] = e.soil_elastic, e.crush_elastic, e.gravity
+        write_numbers(rates[:, i], s.rate)
+        write_numbers(stored[:, i], s.stored)

@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import exact_inlined, exact_kernel, inlined, kernel, overload, through
+from ._jit import by_types, exact_inlined, exact_kernel, inlined, kernel, taken, through, type_of
 from .design import (
     HEIGHT,
     WIDTH,
@@ -49,7 +49,7 @@ from .design import (
     wedge_slope,
 )
 from .numerics import WIDTH as SUMS
-from .numerics import add, field, partial_sums, total
+from .numerics import add, field, partial_sums, total, write_numbers
 from .soil import TINY, Kinematics, Potential, Reaction
 
 TO, DENSITY, FRICTION, SUBGRADE, PRESSURE, PRESSURE_SLOPE = range(6)
@@ -254,34 +254,11 @@ def pieces_count(layers: int, points: int) -> int:
 
 
 @exact_inlined
-def in_soil(design: Design, given: GivenPiece) -> Design:
-    """Return a design in the soil of one piece; K_epsilon stays."""
-    p = design
-    return Design(
-        p.L,
-        p.W,
-        p.H,
-        p.rho_b,
-        p.d,
-        p.e,
-        given.density,
-        given.friction,
-        given.subgrade,
-        p.K_epsilon,
-        p.m_v,
-        p.v_0,
-        p.k_v,
-        p.c_v,
-        p.e_bumper,
-    )
-
-
-@exact_inlined
 def worked_out(design: Design, low: float, given: GivenPiece) -> Piece:
     """Return a piece of the soil of a design that begins at a ratio of the depth (Eqs 105, 145)."""
     p = given
     ultimate = design.K_epsilon * design.W * design.d
-    K = spring_per_depth(in_soil(design, p)) * design.d * design.d
+    K = spring_per_depth(design, p.friction, p.subgrade) * design.d * design.d
     R = p.density * design.W * design.d
     return Piece(low, p.to, K, 1.0 / K, p.p_0 * ultimate, p.p_1 * design.d * ultimate, R, p.w_0, p.w_1)
 
@@ -370,10 +347,9 @@ def fill_pieces(design: Design, layers: np.ndarray, outline: np.ndarray, soil: M
         given, at = next_piece(design, layers, outline, low, at)
         p = worked_out(design, low, given)
         so_far = lumped_with(so_far, p, given, design)
-        to[n, 0], to[n, 1], to[n, 2], to[n, 3], to[n, 4], to[n, 5], to[n, 6], to[n, 7], to[n, 8] = p
+        write_numbers(to[n], p)
         low = p.to
-    to = soil.sums
-    to[0], to[1], to[2], to[3], to[4], to[5], to[6], to[7], to[8] = so_far.sums
+    write_numbers(soil.sums, so_far.sums)
     return so_far
 
 
@@ -391,11 +367,10 @@ def fill_elements(design: Design, layers: np.ndarray, outline: np.ndarray, soil:
             given, at = next_piece(design, layers, outline, given.to, at)
             left -= 1
         alpha, width = ratio * d, (given.w_0 + given.w_1 * ratio) * design.W
-        local = in_soil(design, given)
         share = (given.w_0 + given.w_1 * ratio) * h_e
         pressure = (given.p_0 + given.p_1 * alpha) * design.K_epsilon
         soil.ratio[n] = ratio
-        soil.stiffness[n] = spring_per_depth(local) * alpha * share
+        soil.stiffness[n] = spring_per_depth(design, given.friction, given.subgrade) * alpha * share
         soil.ultimate[n] = pressure * design.W * share
         soil.drag[n] = given.density * design.W * share
         m_n, height = given.density * width * h_e * wedge_slope(given.friction) * (d - alpha), d - alpha
@@ -427,33 +402,7 @@ def constants_in_soil(design: Design, readings: Readings, body: Body, lumped: Lu
 @exact_inlined
 def with_soil(c: Constants, lean: float, soil: Any) -> Any:
     """Return constants together with the other fields of `SoilConstants`."""
-    return SoilConstants(
-        c.m_eff,
-        c.J_eff,
-        c.inverse_m_eff,
-        c.inverse_J_eff,
-        c.c_x,
-        c.c_y,
-        c.l_n,
-        c.z_0,
-        c.d,
-        c.elements,
-        c.K_soil,
-        c.R_soil,
-        c.x_yield,
-        c.h,
-        c.g_x,
-        c.k_v,
-        c.k_m,
-        c.tau_v,
-        c.v_0,
-        c.C_cos,
-        c.C_sin,
-        c.d_N,
-        c.theta_corner,
-        lean,
-        soil,
-    )
+    return SoilConstants(*c[0:], lean, soil)
 
 
 @exact_inlined
@@ -474,6 +423,8 @@ def constants_of_few(design: Design, readings: Readings, body: Body, given: tupl
     return constants_in_soil(design, readings, body, so_far, FewPieces(so_far.sums, pieces))
 
 
+BODY_SIZE, PIECE_SIZE = len(Body._fields), len(GivenPiece._fields)
+"""How many numbers are given of a body, and of each piece."""
 COUNTS = (1, 2, 4, 8)
 """Numbers of pieces for which lanes are compiled; another number is filled up by pieces without height."""
 
@@ -494,27 +445,21 @@ def write_given(designs: np.ndarray, layers: np.ndarray, outlines: np.ndarray, o
     layers, outlines
         Layers, shape (n, M, 6), and outlines, shape (n, P, 4).
     out
-        Shape (7 + 8 C, n), of C pieces.
+        Shape (BODY_SIZE + C PIECE_SIZE, n), of C pieces.
     """
-    body_size, size = 7, 8
     for row in range(out.shape[1]):
         design, outline = design_in(designs, row), outlines[row]
-        to = out[:, row]
-        to[0], to[1], to[2], to[3], to[4], to[5], to[6] = body_with(design, outline)
+        write_numbers(out[:, row], body_with(design, outline))
         low, at = 0.0, cursor_at_soil_line(design, outline)
-        for n in range((len(out) - body_size) // size):
+        for first in range(BODY_SIZE, len(out), PIECE_SIZE):
             p, at = next_piece(design, layers[row], outline, low, at)
-            to = out[body_size + n * size :, row]
-            to[0], to[1], to[2], to[3], to[4], to[5], to[6], to[7] = p
+            write_numbers(out[first:, row], p)
             low = p.to
 
 
 def given_pieces(designs: np.ndarray, layers: np.ndarray, outlines: np.ndarray, count: int) -> np.ndarray:
-    """Return designs as rows of a table for lanes, and below them what is given, shape (22 + 8 count, n).
-
-    Arguments: see `write_given`.
-    """
-    out = np.empty((len(Body._fields) + len(GivenPiece._fields) * count, designs.shape[1]))
+    """Return designs as rows of a table for lanes, and below them what is given, see `write_given`."""
+    out = np.empty((BODY_SIZE + PIECE_SIZE * count, designs.shape[1]))
     write_given(np.ascontiguousarray(designs), layers, outlines, out)
     return np.concatenate([designs, out])
 
@@ -693,42 +638,26 @@ def start_walk(s: SoilSums) -> Walk:
     return Walk(-s.U_0, -s.U_1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def walk_through(line: Line, soil: Any) -> Walk:
+@by_types
+def walk_through(line: Line, soil: Any) -> Callable[..., Walk]:
     """Return what is met on the way down through all pieces, `ManyPieces` or `FewPieces`."""
-    if isinstance(soil, FewPieces):
-        walk: Walk = pass_few(start_walk(soil.sums), line, soil.pieces)
-        return walk
-    return _walk_by_arrays(line, soil)
-
-
-@overload(walk_through)
-def _walk_through(line: Any, soil: Any) -> Callable[..., Walk]:
-    if soil.instance_class is FewPieces:
+    if type_of(soil) is FewPieces:
         return lambda line, soil: pass_few(start_walk(soil.sums), line, soil.pieces)
-    return _walk_by_arrays
+    return walk_by_arrays
 
 
-def _walk_by_arrays(line: Line, soil: ManyPieces) -> Walk:
-    w, p = start_walk(sums_of(soil)), soil.pieces
-    for m in range(len(p)):
-        piece = Piece(p[m, 0], p[m, 1], p[m, 2], p[m, 3], p[m, 4], p[m, 5], p[m, 6], p[m, 7], p[m, 8])
-        w = pass_piece(w, line, piece)
+def walk_by_arrays(line: Line, soil: ManyPieces) -> Walk:
+    """Return what is met on the way down through `ManyPieces`."""
+    w = start_walk(sums_of(soil))
+    for m in range(len(soil.pieces)):
+        w = pass_piece(w, line, taken(soil.pieces[m], 0, 0, Piece))
     return w
 
 
-def sums_of(soil: Any) -> SoilSums:
+@by_types
+def sums_of(soil: Any) -> Callable[..., SoilSums]:
     """Return the sums of pieces."""
-    return soil.sums if isinstance(soil, FewPieces) else SoilSums(*soil.sums)
-
-
-@overload(sums_of)
-def _sums_of(soil: Any) -> Callable[..., SoilSums]:
-    return (lambda soil: soil.sums) if soil.instance_class is FewPieces else _sums_from_array
-
-
-def _sums_from_array(soil: ManyPieces) -> SoilSums:
-    s = soil.sums
-    return SoilSums(s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8])
+    return (lambda soil: soil.sums) if type_of(soil) is FewPieces else (lambda soil: taken(soil.sums, 0, 0, SoilSums))
 
 
 @inlined

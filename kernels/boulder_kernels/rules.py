@@ -23,7 +23,7 @@ import numpy as np
 
 from ._jit import exact_inlined, exact_kernel
 from .control import VALID_ROTATION, Control, control_in
-from .outcomes import LEAST_LATE_M, THETA_ERROR, X_ERROR, OutcomeTable, Status, copy_outcome, outcome_in
+from .outcomes import LEAST_LATE_M, SIMULATED, THETA_ERROR, X_ERROR, OutcomeTable, Status, copy_outcome, outcome_in
 
 RULES = (
     ("error", ""),  # which has a reason of its own
@@ -117,17 +117,13 @@ ISLAND_RATIO, ISLAND_SLIDE = 0.35, 0.5
 these steps. Such a boulder is not a pass."""
 
 
+ENDS = tuple(status.value for status in SIMULATED)
+
+
 @exact_inlined
 def is_simulated(status: int) -> bool:
     """Whether a simulation ended with maxima to report, `boulder_kernels.outcomes.SIMULATED`."""
-    return (
-        status == Status.LIMIT.value
-        or status == Status.SETTLED.value
-        or status == Status.BELOW_LIMIT.value
-        or status == Status.UNPROVABLE.value
-        or status == Status.HORIZON.value
-        or status == Status.OUTWARD.value
-    )
+    return status in ENDS
 
 
 @exact_kernel
@@ -223,6 +219,33 @@ UNSTUDIED = ("size", "embedment", "rock_density", "soil_pair", "vehicle", "soil"
 """Flags of designs outside the ranges from which the study of second opinions draws."""
 
 
+class FlagRange(NamedTuple):
+    """Least or largest values without a flag."""
+
+    L: float
+    W: float
+    H: float
+    """Sides of a boulder [m]."""
+    ratio: float
+    """Depth over height [-]."""
+    rock: float
+    """Density of rock [kg/m^3]."""
+    m_v: float
+    """Mass of the vehicle [kg]."""
+    rate: float
+    """Angular frequency sqrt(k_v/m_v) of the vehicle [1/s]."""
+    damping: float
+    """Damper of the vehicle over sqrt(k_v m_v) [-]."""
+    v_0: float
+    """Speed of the vehicle [m/s]."""
+    phi_deg: float
+    """Friction angle of the soil [deg]."""
+    rho_s: float
+    """Density of the soil [kg/m^3]."""
+    K_epsilon: float
+    """Strain rate factor [-]."""
+
+
 class TestedRange(NamedTuple):
     """What the model was tested on, and what is usual."""
 
@@ -232,40 +255,8 @@ class TestedRange(NamedTuple):
     """Largest rotation without a flag [rad]."""
     overlap: float
     """Least overlap of boulder and bumper [m]."""
-    least_L: float
-    most_L: float
-    least_W: float
-    most_W: float
-    least_H: float
-    most_H: float
-    """Sides of a boulder [m]."""
-    least_ratio: float
-    most_ratio: float
-    """Depth over height [-]."""
-    least_rock: float
-    most_rock: float
-    """Density of rock [kg/m^3]."""
-    least_m_v: float
-    most_m_v: float
-    """Mass of the vehicle [kg]."""
-    least_rate: float
-    most_rate: float
-    """Angular frequency sqrt(k_v/m_v) of the vehicle [1/s]."""
-    least_damping: float
-    most_damping: float
-    """Damper of the vehicle over sqrt(k_v m_v) [-]."""
-    least_v_0: float
-    most_v_0: float
-    """Speed of the vehicle [m/s]."""
-    least_phi_deg: float
-    most_phi_deg: float
-    """Friction angle of the soil [deg]."""
-    least_rho_s: float
-    most_rho_s: float
-    """Density of the soil [kg/m^3]."""
-    least_K_epsilon: float
-    most_K_epsilon: float
-    """Strain rate factor [-]."""
+    least: FlagRange
+    most: FlagRange
 
 
 class FlagInputs(NamedTuple):
@@ -311,18 +302,19 @@ def flags_of(o: OutcomeTable, overlap: float, r: FlagInputs, t: TestedRange) -> 
     r, t
         Its inputs, and what the model was tested on.
     """
+    least, most = t.least, t.most
+    rate, damping = np.sqrt(r.k_v / r.m_v), r.c_v / np.sqrt(r.k_v * r.m_v)
     flags = 0
     if o.crush_max > t.crush:
         flags |= 1
     if o.theta_max > t.rotation:
         flags |= 2
-    if is_outside(r.L, t.least_L, t.most_L) or is_outside(r.W, t.least_W, t.most_W):
+    sides = is_outside(r.L, least.L, most.L) or is_outside(r.W, least.W, most.W)
+    if sides or is_outside(r.H, least.H, most.H):
         flags |= 4
-    if is_outside(r.H, t.least_H, t.most_H):
-        flags |= 4
-    if is_outside(r.d / r.H, t.least_ratio, t.most_ratio):
+    if is_outside(r.d / r.H, least.ratio, most.ratio):
         flags |= 8
-    if is_outside(r.rock, t.least_rock, t.most_rock):
+    if is_outside(r.rock, least.rock, most.rock):
         flags |= 16
     if is_outside(r.beta, r.least_beta, r.most_beta):
         flags |= 32
@@ -330,15 +322,11 @@ def flags_of(o: OutcomeTable, overlap: float, r: FlagInputs, t: TestedRange) -> 
         flags |= 64
     if o.x_b_max > ISLAND_SLIDE:
         flags |= 128
-    if is_outside(r.m_v, t.least_m_v, t.most_m_v) or is_outside(r.v_0, t.least_v_0, t.most_v_0):
+    vehicle = is_outside(r.m_v, least.m_v, most.m_v) or is_outside(r.v_0, least.v_0, most.v_0)
+    if vehicle or is_outside(rate, least.rate, most.rate) or is_outside(damping, least.damping, most.damping):
         flags |= 256
-    if is_outside(np.sqrt(r.k_v / r.m_v), t.least_rate, t.most_rate):
-        flags |= 256
-    if is_outside(r.c_v / np.sqrt(r.k_v * r.m_v), t.least_damping, t.most_damping):
-        flags |= 256
-    if is_outside(r.phi_deg, t.least_phi_deg, t.most_phi_deg) or is_outside(r.rho_s, t.least_rho_s, t.most_rho_s):
-        flags |= 512
-    if is_outside(r.K_epsilon, t.least_K_epsilon, t.most_K_epsilon):
+    soil = is_outside(r.phi_deg, least.phi_deg, most.phi_deg) or is_outside(r.rho_s, least.rho_s, most.rho_s)
+    if soil or is_outside(r.K_epsilon, least.K_epsilon, most.K_epsilon):
         flags |= 512
     return flags
 

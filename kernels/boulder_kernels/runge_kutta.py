@@ -134,17 +134,6 @@ def contact_change(q: Tracks, u: float, u_end: float, h: float, c: Constants) ->
     return 0.5 * (b.low + b.high)
 
 
-@kernel
-def time_of_limit(q: Track, limit: float, tau_end: float) -> float:
-    """Fraction of a step at which the rotation reaches a limit that it has passed at tau_end [rad]."""
-    low, high = 0.0, tau_end
-    for _ in range(ITERATIONS):
-        middle = 0.5 * (low + high)
-        beyond = abs(displacement_at(q, middle)) >= limit
-        low, high = (low, middle) if beyond else (middle, high)
-    return high
-
-
 @inlined
 def foot_rises(work: np.ndarray, q: Tracks, tau_end: float, h: float, f: HeaveConstants) -> float:
     """Fraction of a step at which the first strip that is pressed in comes back; tau_end if none does.

@@ -19,7 +19,7 @@ import numpy as np
 
 from ._jit import inlined, kernel
 from .design import Constants, G, constants_of, corrected, design_in, is_computable
-from .dormand_prince import displacement_at, slope_at, turning_point
+from .dormand_prince import displacement_at, slope_at, time_of_limit, turning_point
 from .heave import (
     ALONG_X,
     FINEST,
@@ -56,7 +56,6 @@ from .runge_kutta import (
     keep,
     press_in,
     step,
-    time_of_limit,
     track_of,
 )
 from .soil import soil_kinematics

@@ -21,7 +21,21 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 
-from ._jit import IS_PLAIN, LINE, align_stack, fields_of, inlined, is_none, kernel, load, overload, plain, store, taken
+from ._jit import (
+    IS_PLAIN,
+    LINE,
+    align_stack,
+    by_types,
+    fields_of,
+    inlined,
+    is_none,
+    kernel,
+    load,
+    plain,
+    store,
+    taken,
+    through,
+)
 from .control import ACCEPTED, MOST_STEPS, RETRY, STEP_RATIO, Control, control_for, first_step
 from .design import Body, Constants, Design, DesignTable, Readings, constants_of, design_at, design_in, is_computable
 from .dormand_prince import step
@@ -42,7 +56,6 @@ from .impact import (
     nothing_watched,
     outcome_of,
     simulate_alone,
-    simulate_last_resort,
     stop_of,
     watch,
 )
@@ -68,7 +81,9 @@ from .outcomes import (
     write_outcome,
 )
 from .pieces import (
+    BODY_SIZE,
     COUNTS,
+    PIECE_SIZE,
     PRESSURE,
     FewPieces,
     GivenPiece,
@@ -170,29 +185,9 @@ def field_of(group: Any, name: str) -> Any:
     return group[name] if name in group.dtype.names else None
 
 
-def by_soil(uniform: Callable[..., Any], in_pieces: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function that calls one for groups of uniform soils, and another where the soil is in pieces."""
-
-    def chosen(group: Any) -> Callable[..., Any]:
-        """Return the one for a group or its type."""
-        return uniform if field_of(group, "pieces") is None else in_pieces
-
-    def call(group: Any, lane: int, *others: Any) -> Any:
-        """Call the function that suits the soil of the group."""
-        return chosen(group)(group, lane, *others)
-
-    def choose(group: Any, lane: Any, *others: Any) -> Callable[..., Any]:
-        """Return the call for these types."""
-        of_soil = chosen(group)
-        calls: list[Callable[..., Any]] = [
-            lambda group, lane: of_soil(group, lane),
-            lambda group, lane, c: of_soil(group, lane, c),
-            lambda group, lane, one, other: of_soil(group, lane, one, other),
-        ]
-        return calls[len(others)]  # Numba inlines nothing whose number of arguments is open
-
-    overload(call)(choose)
-    return call
+def is_uniform(group: Any) -> bool:
+    """Return whether a group of lanes, or its type, is of uniform soils."""
+    return field_of(group, "pieces") is None
 
 
 @inlined
@@ -230,42 +225,29 @@ def load_given(group: Any, m: int, lane: int) -> GivenPiece:
     return piece
 
 
-def by_count(load_one: Callable[[Any, int, int], Any]) -> Callable[[Any, int], tuple[Any, ...]]:
-    """Return a function that loads a record of each piece, one after another, into a tuple."""
-
-    def load_all(group: Any, lane: int) -> tuple[Any, ...]:
-        """Return all of them."""
-        return tuple(load_one(group, m, lane) for m in range(len(group.pieces)))
-
-    @inlined
-    def one(group: Any, m: int, lane: int) -> Any:
-        """Load one, as a tuple."""
-        return (load_one(group, m, lane),)
-
-    @inlined
-    def two(group: Any, m: int, lane: int) -> Any:
-        """Load two from m on, as a tuple."""
-        return one(group, m, lane) + one(group, m + 1, lane)
-
-    @inlined
-    def four(group: Any, m: int, lane: int) -> Any:
-        """Load four from m on, as a tuple."""
-        return two(group, m, lane) + two(group, m + 2, lane)
-
-    def choose(group: Any, lane: Any) -> Callable[..., Any]:
-        """Return the function for so many."""
-        return {
-            1: lambda group, lane: one(group, 0, lane),
-            2: lambda group, lane: two(group, 0, lane),
-            4: lambda group, lane: four(group, 0, lane),
-            8: lambda group, lane: four(group, 0, lane) + four(group, 4, lane),
-        }[field_of(group, "pieces").shape[0]]
-
-    overload(load_all)(choose)
-    return load_all
+@inlined
+def load_next(above: Any, at: Any, m: int) -> Any:
+    """Return the pieces above, and one more."""
+    group, lane = at
+    return (*above, load_piece(group, m, lane))
 
 
-load_pieces, load_all_given = by_count(load_piece), by_count(load_given)
+@inlined
+def load_next_given(above: Any, at: Any, m: int) -> Any:
+    """Return the pieces above as they are given, and one more."""
+    group, lane = at
+    return (*above, load_given(group, m, lane))
+
+
+load_all, load_all_given = through(load_next), through(load_next_given)
+
+
+@by_types
+def numbers_of_pieces(group: Any) -> Callable[..., tuple[int, ...]]:
+    """Return the numbers of the pieces of a soil, which the compiler knows."""
+    pieces = field_of(group, "pieces")
+    numbers = tuple(range(pieces.shape[0]))
+    return lambda group: numbers
 
 
 @inlined
@@ -278,18 +260,16 @@ def load_numbers(group: Any, lane: int) -> Constants:
 @inlined
 def load_in_soil(group: Any, lane: int) -> Any:
     """Return the constants of a lane whose soil is in pieces."""
-    soil = FewPieces(load(group.sums, lane, SoilSums), load_pieces(group, lane))
+    soil = FewPieces(load(group.sums, lane, SoilSums), load_all((), (group, lane), numbers_of_pieces(group)))
     return with_soil(load_numbers(group, lane), load(group, lane, Leaning).lean, soil)
 
 
-load_constants = by_soil(load_numbers, load_in_soil)
-"""Return the constants of a lane."""
-
-
-@inlined
-def store_numbers(group: Any, lane: int, c: Any) -> None:
-    """Write the constants of a lane but for its soil."""
-    store(group.constants, lane, c)
+@by_types
+def load_constants(group: Any, lane: int) -> Callable[..., Any]:
+    """Return the constants of a lane."""
+    if is_uniform(group):
+        return lambda group, lane: load_numbers(group, lane)
+    return lambda group, lane: load_in_soil(group, lane)
 
 
 @inlined
@@ -302,16 +282,16 @@ def store_in_soil(group: Any, lane: int, c: Any) -> None:
         store(group.pieces[m], lane, c.soil.pieces[m])
 
 
-store_constants = by_soil(store_numbers, store_in_soil)
-"""Write the constants of a lane."""
+@by_types
+def store_constants(group: Any, lane: int, c: Any) -> Callable[..., None]:
+    """Write the constants of a lane."""
+    if is_uniform(group):
+        return lambda group, lane, c: store(group.constants, lane, c)
+    return lambda group, lane, c: store_in_soil(group, lane, c)
 
-BELOW, BODY_SIZE, PIECE_SIZE = len(Design._fields), len(Body._fields), len(GivenPiece._fields)
-"""Rows of a table of designs: above the soil, of the body, and of each piece."""
 
-
-@inlined
-def store_nothing_given(group: Any, lane: int, a: np.ndarray, row: int) -> None:
-    """Write nothing of uniform soil."""
+BELOW = len(Design._fields)
+"""Rows of a table of designs above what is given of the soil."""
 
 
 @inlined
@@ -322,24 +302,22 @@ def store_pieces_given(group: Any, lane: int, a: np.ndarray, row: int) -> None:
         store(group.given[m], lane, taken(a, BELOW + BODY_SIZE + PIECE_SIZE * m, row, GivenPiece))
 
 
-store_given = by_soil(store_nothing_given, store_pieces_given)
-"""Write what is given of the soil of a design that is to be started, the rows of a table below its `Design`."""
+@by_types
+def store_given(group: Any, lane: int, a: np.ndarray, row: int) -> Callable[..., None]:
+    """Write what is given of the soil of a design that is to be started, the rows of a table below its `Design`."""
+    if is_uniform(group):
+        return lambda group, lane, a, row: None
+    return lambda group, lane, a, row: store_pieces_given(group, lane, a, row)
 
 
-@inlined
-def uniform_in_lane(group: Any, lane: int, design: Design, readings: Readings) -> Constants:
-    """Return the constants of a design in uniform soil."""
-    return constants_of(design, readings, 0)
-
-
-@inlined
-def pieces_in_lane(group: Any, lane: int, design: Design, readings: Readings) -> Any:
-    """Return the constants of a design whose soil is in pieces."""
-    return constants_of_few(design, readings, load(group.body, lane, Body), load_all_given(group, lane))
-
-
-constants_in_lane = by_soil(uniform_in_lane, pieces_in_lane)
-"""Return the constants of a design that is being started."""
+@by_types
+def constants_in_lane(group: Any, lane: int, design: Design, readings: Readings) -> Callable[..., Any]:
+    """Return the constants of a design that is being started."""
+    if is_uniform(group):
+        return lambda group, lane, design, readings: constants_of(design, readings, 0)
+    return lambda group, lane, design, readings: constants_of_few(
+        design, readings, load(group.body, lane, Body), load_all_given((), (group, lane), numbers_of_pieces(group))
+    )
 
 
 @inlined
@@ -458,7 +436,7 @@ def start_designs(group: Any, designs: np.ndarray, first: int, readings: Reading
     group
         The group.
     designs, first
-        The designs of `simulate_lanes`, and the row of the design in the first lane.
+        The designs of `LaneDesigns`, and the row of the design in the first lane.
     readings, control
         How they are simulated.
 
@@ -593,25 +571,27 @@ def filled_up(designs: np.ndarray) -> np.ndarray:
     return np.pad(designs, ((0, 0), (0, missing)), "edge") if missing else designs
 
 
+class LaneDesigns(NamedTuple):
+    """Designs as lanes take them."""
+
+    designs: np.ndarray
+    """Designs, SI, shape (15 + G, n): the fields of `DesignTable`, and below them what is given where the soil is in
+    pieces: the body and the pieces (`Body`, `GivenPiece`) one after another."""
+    pieces: int = 0
+    has_strength: bool = False
+    has_outline: bool = False
+    """The same as in `group_type`."""
+
+
 def simulate_lanes(
-    designs: np.ndarray,
-    pieces: int,
-    has_strength: bool,
-    has_outline: bool,
-    readings: Readings,
-    control: Control,
-    record: Record,
-    out: np.ndarray,
+    given: LaneDesigns, readings: Readings, control: Control, record: Record, out: np.ndarray
 ) -> Outcome:
     """Simulate every design of a table in lanes, by a closed form of the soil.
 
     Parameters
     ----------
-    designs
-        Designs, SI, shape (15 + G, n): first the fields of `DesignTable`, then what is given where the soil is in
-        pieces: the body and the pieces (`Body`, `GivenPiece`) one after another.
-    pieces, has_strength, has_outline
-        The same as in `group_type`.
+    given
+        The designs.
     readings
         Which formulas are read as printed.
     control
@@ -628,38 +608,36 @@ def simulate_lanes(
     """
     rows = np.full(LANES + 1, EMPTY)
     rows[NEXT] = 0
-    groups = empty_groups(pieces, has_strength=has_strength, has_outline=has_outline)
-    return run_lanes(filled_up(designs), readings, control, groups, rows, record, out)
+    groups = empty_groups(given.pieces, has_strength=given.has_strength, has_outline=given.has_outline)
+    return run_lanes(filled_up(given.designs), readings, control, groups, rows, record, out)
 
 
-@kernel
-def take_profile(row: int, soil: Any, layers: np.ndarray, outlines: np.ndarray) -> SoilProfile:
-    """Return the soil of one design of a `PiecewiseTable`."""
-    return SoilProfile(layers[row], outlines[row], soil)
+class Soils(NamedTuple):
+    """The soils of designs that are no boxes in uniform soil."""
+
+    layers: np.ndarray
+    outlines: np.ndarray
+    """Fields of a `PiecewiseTable`."""
+    soil: Any
+    """Elements or pieces that every design fills anew."""
 
 
-def profile_in(row: int, soil: Any, layers: np.ndarray | None, outlines: np.ndarray | None) -> SoilProfile | None:
+def soils_of(layers: np.ndarray, outlines: np.ndarray, elements: int) -> Soils:
+    """Return the soils of designs, with room for the soil of one: N elements, or pieces where N is 0."""
+    return Soils(layers, outlines, empty_soil(layers.shape[1], outlines.shape[1], elements))
+
+
+@by_types
+def profile_in(row: int, soils: Any) -> Callable[..., SoilProfile | None]:
     """Return the soil of one design of a table; None for the uniform soil of a box."""
-    return None if layers is None else plain(take_profile)(row, soil, layers, outlines)
-
-
-@overload(profile_in)
-def _profile_in(row: Any, soil: Any, layers: Any, outlines: Any) -> Callable[..., Any]:
-    if is_none(layers):
-        return lambda row, soil, layers, outlines: None
-    return lambda row, soil, layers, outlines: take_profile(row, soil, layers, outlines)
+    if is_none(soils):
+        return lambda row, soils: None
+    return lambda row, soils: SoilProfile(soils.layers[row], soils.outlines[row], soils.soil)
 
 
 @kernel
 def run_rows(
-    designs: np.ndarray,
-    layers: np.ndarray | None,
-    outlines: np.ndarray | None,
-    soil: Any,
-    readings: Readings,
-    control: Control,
-    record: Record,
-    out: np.ndarray,
+    designs: np.ndarray, soils: Soils | None, readings: Readings, control: Control, record: Record, out: np.ndarray
 ) -> Outcome:
     """Simulate designs one by one, in any soil, and return the last outcome.
 
@@ -667,37 +645,15 @@ def run_rows(
     ----------
     designs
         Shape (15, n), at least one.
-    layers, outlines
-        Of `PiecewiseTable`; None for boxes in uniform soils.
-    soil
-        Elements or pieces that every design fills anew; None for boxes in uniform soils.
-    readings
-        Which formulas are read as printed.
-    control
-        How the simulation is run.
-    record
-        Filled with the time history of one design at the times it names; for several, one that keeps nothing.
-    out
-        Where the outcomes go, an array of `empty_outcomes`.
+    soils
+        Their soils; None for boxes in uniform soils.
+    readings, control, record, out
+        See `simulate_lanes`.
     """
     outcome = failed(Status.INVALID.value)
     for row in range(designs.shape[1]):
-        profile = profile_in(row, soil, layers, outlines)
         design = design_in(designs, row)
-        outcome = simulate_alone(Problem(design, profile), readings, control, record)
-        write_outcome(out, row, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
-    return outcome
-
-
-@kernel
-def run_last_resort(
-    designs: np.ndarray, readings: Readings, control: Control, record: Record, out: np.ndarray
-) -> Outcome:
-    """Simulate designs one by one by `simulate_last_resort`, which takes those that need too many steps."""
-    outcome = failed(Status.INVALID.value)
-    for row in range(designs.shape[1]):
-        design = design_in(designs, row)
-        outcome = simulate_last_resort(design, readings, control, record)
+        outcome = simulate_alone(Problem(design, profile_in(row, soils)), readings, control, record)
         write_outcome(out, row, outcome, step_errors(outcome, design, control.theta_limit, control.horizon))
     return outcome
 
@@ -723,28 +679,11 @@ def step_of_solution(control: Control) -> float:
     return finer_step(control.h) if control.refined else control.h
 
 
-class LaneDesigns(NamedTuple):
-    """Designs as lanes take them, arguments of `simulate_lanes`."""
-
-    designs: np.ndarray
-    pieces: int = 0
-    has_strength: bool = False
-    has_outline: bool = False
-
-
-def given_to_lanes(designs: np.ndarray, layers: np.ndarray | None, outlines: np.ndarray | None) -> LaneDesigns | None:
-    """Return designs as lanes take them, or None of those that they do not take.
-
-    Parameters
-    ----------
-    designs
-        Shape (15, n).
-    layers, outlines
-        Of `PiecewiseTable`; None for boxes in uniform soils.
-    """
-    if layers is None or outlines is None:
+def given_to_lanes(designs: np.ndarray, soils: Soils | None) -> LaneDesigns | None:
+    """Return designs as lanes take them, or None of those that they do not take; arguments: see `run_rows`."""
+    if soils is None:
         return LaneDesigns(designs)
-    points = outlines.shape[1]
+    layers, outlines, points = soils.layers, soils.outlines, soils.outlines.shape[1]
     count = lanes_count(pieces_count(layers.shape[1], points))
     if count == 0:
         return None
@@ -760,22 +699,15 @@ def has_strength(layers: np.ndarray) -> bool:
 
 
 def solve_rows(
-    designs: np.ndarray,
-    layers: np.ndarray | None,
-    outlines: np.ndarray | None,
-    soil: Any,
-    readings: Readings,
-    control: Control,
-    record: Record,
-    out: np.ndarray,
+    designs: np.ndarray, soils: Soils | None, readings: Readings, control: Control, record: Record, out: np.ndarray
 ) -> Outcome:
     """Solve designs once: in lanes where they can be, else one by one; see `run_rows` for arguments and result."""
-    given = given_to_lanes(designs, layers, outlines) if control.side_by_side and control.elements == 0 else None
-    if control.last_resort and control.stop_at_limit and layers is None:
-        return run_last_resort(designs, readings, control, record, out)
-    if given is not None and (control.stop_at_limit or designs.shape[1] == 1):
-        return simulate_lanes(*given, readings, control, record, out)
-    return run_rows(designs, layers, outlines, soil, readings, control, record, out)
+    resort = control.last_resort and control.stop_at_limit and soils is None
+    if control.side_by_side and control.elements == 0 and not resort:
+        given = given_to_lanes(designs, soils)
+        if given is not None and (control.stop_at_limit or designs.shape[1] == 1):
+            return simulate_lanes(given, readings, control, record, out)
+    return run_rows(designs, soils, readings, control, record, out)
 
 
 def solve(table: DesignTable, readings: Readings, control: Control) -> tuple[np.ndarray, np.ndarray]:
@@ -788,16 +720,11 @@ def solve(table: DesignTable, readings: Readings, control: Control) -> tuple[np.
     second : ndarray, shape (n,)
         Which second solution each of them needs, see `boulder_kernels.outcomes.StepErrors`.
     """
-    n = len(table.L)
-    layers: np.ndarray | None = getattr(table, "layers", None)
-    outlines: np.ndarray | None = getattr(table, "outlines", None)
-    out = empty_outcomes(n)
-    if n:
-        soil = None
-        if layers is not None and outlines is not None:
-            soil = empty_soil(layers.shape[1], outlines.shape[1], control.elements)
-        designs = np.stack(table[: len(DesignTable._fields)])
-        solve_rows(designs, layers, outlines, soil, readings, control, no_record(), out)
+    out, soils = empty_outcomes(len(table.L)), None
+    if isinstance(table, PiecewiseTable):
+        soils = soils_of(table.layers, table.outlines, control.elements)
+    if len(table.L):
+        solve_rows(np.stack(table[:BELOW]), soils, readings, control, no_record(), out)
     second = out[SECOND].copy()
     out[STEP] = np.where(np.isnan(out[T_END]), np.nan, step_of_solution(control))
     return out, second
@@ -810,23 +737,19 @@ def simulate(problem: Problem, readings: Readings, control: Control, record: Rec
     ----------
     problem
         Design and soil.
-    readings
-        Which formulas are read as printed.
-    control
-        Step, horizon, limit, representation of the soil; nothing is estimated of errors.
-    record
-        Filled with the time history at the times it names.
+    readings, control, record
+        See `boulder_kernels.impact.simulate_alone`; nothing is estimated of errors.
 
     Returns
     -------
     Outcome
         Maxima from the dense output; NaN where the status says that there is no result, see `Status`.
     """
-    designs = np.array(problem.design, dtype=float)[:, None]
-    if problem.profile is None:
-        return solve_rows(designs, None, None, None, readings, control, record, empty_outcomes(1))
-    layers, outline, soil = problem.profile
-    return solve_rows(designs, layers[None], outline[None], soil, readings, control, record, empty_outcomes(1))
+    designs, soils = np.array(problem.design, dtype=float)[:, None], None
+    if problem.profile is not None:
+        layers, outline, soil = problem.profile
+        soils = Soils(layers[None], outline[None], soil)
+    return solve_rows(designs, soils, readings, control, record, empty_outcomes(1))
 
 
 def simulate_design(design: Design, readings: Readings, control: Control, record: Record) -> Outcome:
@@ -886,6 +809,5 @@ def simulate_table(table: DesignTable, readings: Readings, control: Control) -> 
             continue
         some = some_rows(table, rows)
         found, _ = solve(some, readings, plain(control_for)(solution, control))
-        designs = np.stack(some[: len(DesignTable._fields)])
-        take_seconds(out, rows, found, needed, designs, plain(safety_of)(readings))
+        take_seconds(out, rows, found, needed, np.stack(some[:BELOW]), plain(safety_of)(readings))
     return outcome_table(out)

@@ -8,7 +8,7 @@ import pytest
 from boulder_kernels import SIMULATED, Record, Status, constants_of, simulate_design, simulate_table
 from boulder_kernels.control import ACCEPTED, Rates, first_step, rates_of, refusal, stable_step
 from boulder_kernels.design import design_at
-from boulder_kernels.dynamics import Modes, acceleration, switches_of
+from boulder_kernels.dynamics import Modes, State, acceleration, switches_of
 from boulder_sweep.judge.accuracy import STEPS
 from docs.studies.coverage import random_table
 from tests.accuracy.box import LIMIT, PRESETS, box_table, how, rows
@@ -21,7 +21,7 @@ def fastest(y: np.ndarray, modes: Modes, readings, c) -> float:
     switches = switches_of(modes, readings, c)
 
     def rate(z: np.ndarray) -> np.ndarray:
-        k = acceleration(*z, switches, c)
+        k = acceleration(State(*z), switches, c)
         return np.array([z[1], k.a_b, z[3], k.alpha_b, z[5], k.a_v])
 
     sizes = 1e-6 * np.maximum(np.abs(y), 1e-3)

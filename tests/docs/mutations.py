@@ -51,7 +51,7 @@ MUTATIONS = (
         "limited = min(displacement, c.x_yield)",
     ),
     Mutation((22,), _SOIL, "x_b - c.l_n * versin + c.z_0 * sin", "x_b + c.l_n * versin + c.z_0 * sin"),
-    Mutation((24,), _DESIGN, "return 1e6 * design.beta * design.W", "return 1e6 * design.beta"),
+    Mutation((24,), _DESIGN, "return 1e6 * beta * design.W", "return 1e6 * beta"),
     Mutation((24,), _DESIGN, "return (n - 0.5) * d / elements", "return n * d / elements"),
     Mutation((25,), _DESIGN, "return d * (1.0 - half * half)", "return d * (1.0 + half * half)"),
     Mutation((27,), _DESIGN, "passive_pressure_coefficient(phi) ** 2", "passive_pressure_coefficient(phi)"),
@@ -165,8 +165,8 @@ MUTATIONS = (
     Mutation(
         (143,), _DESIGN, "(far * far * far + near * near * near) / 3.0", "(far * far * far - near * near * near) / 3.0"
     ),
-    Mutation((144,), _DYNAMICS, '+ getattr(c, "lean", 0.0) * c.d * sin', '- getattr(c, "lean", 0.0) * c.d * sin'),
-    Mutation((144,), _DYNAMICS, 'c.C_cos - abs(getattr(c, "lean", 0.0)) * c.d', "c.C_cos"),
+    Mutation((144,), _DYNAMICS, "+ c.lean * c.d * sin", "- c.lean * c.d * sin"),
+    Mutation((144,), _DYNAMICS, "c.C_cos - abs(c.lean) * c.d", "c.C_cos"),
     Mutation((144,), _DYNAMICS, "reaction.M - times(lean, k.lever_d)", "reaction.M + times(lean, k.lever_d)"),
     Mutation(
         (145,), _PIECES, "-slope_of(outline, i, WIDTH) * d / design.W", "slope_of(outline, i, WIDTH) * d / design.W"

@@ -148,6 +148,13 @@ def control(
     return bk.Control(h, horizon, theta_limit, elements, error_estimate, stop_at_limit)
 
 
+def record_at(times: np.ndarray) -> bk.Record:
+    """Room for a time history at some instants: NaN and no mode where it is not written."""
+    n = len(times)
+    states, exchanged = np.full((n, 6), np.nan), np.full((n, 4), np.nan)
+    return bk.Record(times, states, np.full(n, -1, np.int8), np.zeros(n, np.bool_), exchanged)
+
+
 def same_bits(a: np.ndarray, b: np.ndarray) -> bool:
     """Whether two arrays of floats are equal bit for bit, NaN and the sign of zero included."""
     return a.shape == b.shape and a.tobytes() == b.tobytes()

@@ -9,9 +9,9 @@ import numpy as np
 
 import boulder_kernels as bk
 from boulder_kernels.dormand_prince import step
-from boulder_kernels.dynamics import Modes, State, rate_of
+from boulder_kernels.dynamics import Modes, State, acceleration
 from boulder_kernels.impact import RUNNING, Clock, Impact, Pace, enter_modes, follow, go_on
-from boulder_kernels.outcomes import compression_at, no_maxima
+from boulder_kernels.outcomes import all_maxima, compression_at
 from boulder_kernels.settling import NO_PROOF
 
 from .samples import compression, control
@@ -43,8 +43,8 @@ def advance(begin: Start, T: float, steps: int, locate_yield: bool = False) -> t
     how = control(h, T, NO_LIMIT, stop_at_limit=True)._replace(locate_yield=locate_yield)
     switches, factors = enter_modes(modes, readings, NO_LIMIT, locate_yield, how.event_tolerance, c)
     clock = Clock(0.0, h, h, 0.0, NO_PROOF, T, 0.0, 0.0)
-    k, front = rate_of(y, switches, c), compression_at(y, switches, c)
-    i = Impact(Pace(h, h, 1e6), y, k, front, no_maxima(), clock, modes, switches, factors)
+    k, front = acceleration(y, switches, c), compression_at(y, switches, c)
+    i = Impact(Pace(h, h, 1e6), y, k, front, all_maxima(0.0), clock, modes, switches, factors)
     status, met = RUNNING, []
     while status == RUNNING:
         y_end, k_end, error = step(i.y, i.k, i.clock.h, i.switches, c)

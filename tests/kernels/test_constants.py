@@ -129,7 +129,7 @@ def test_soil_parameters() -> None:
         assert passive_pressure_coefficient(design.phi) == pytest.approx(K_p, rel=1e-12)
         assert atan(design.d / compression_wedge_length(design.d, design.phi)) == pytest.approx(design.phi)
         k_n = spring_constants(inputs, alpha, height)[0]
-        assert spring_per_depth(design) * alpha[0] * height[0] == pytest.approx(k_n, rel=1e-13)
+        assert spring_per_depth(design, design.phi, design.beta) * alpha[0] * height[0] == pytest.approx(k_n, rel=1e-13)
         F_u = ultimate_forces(inputs, alpha, height)[0]
         pressure = ultimate_pressure(alpha[0], design.phi, design.rho_s, design.K_epsilon)
         assert pressure * design.W * height[0] == pytest.approx(F_u, rel=1e-13)

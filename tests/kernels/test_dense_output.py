@@ -6,7 +6,7 @@ import pytest
 import boulder_kernels as bk
 from boulder_kernels.design import constants_of
 from boulder_kernels.dormand_prince import dense_output, displacement_at, slope_at, state_at, step, track
-from boulder_kernels.dynamics import TURNING_FORWARD, Modes, State, rate_of, switches_of
+from boulder_kernels.dynamics import TURNING_FORWARD, Modes, State, acceleration, switches_of
 from tests import oracle
 
 from .samples import design_of
@@ -47,7 +47,7 @@ def test_within_a_step_of_the_integrator() -> None:
     y = with_compression(State(0.0, 6.0, 0.1, 0.5, 0.0, 10.0), 0.05, c)
     modes = Modes(TURNING_FORWARD, True, 1.0, 1.0, 0, 0)
     switches = switches_of(modes, readings, c)
-    k = rate_of(y, switches, c)
+    k = acceleration(y, switches, c)
     gaps, steps = [], np.array([8e-3, 4e-3, 2e-3])
     for h in steps:
         y_end, k_end, _ = step(y, k, h, switches, c)

@@ -67,7 +67,7 @@ def forward_mode(M: float, theta: float, c: bk.Constants) -> int:
 
 
 def net_moment(y: State, modes: Modes, readings: bk.Readings, c: bk.Constants) -> float:
-    return acceleration(*y, switches_of(modes, readings, c), c).M
+    return acceleration(y, switches_of(modes, readings, c), c).M
 
 
 def check_rate(
@@ -83,7 +83,7 @@ def check_rate(
     c = constants_of(design, readings, elements)
     problem = oracle.problem(inputs_of(design), oracle_readings(readings), elements or None)
     modes = modes_in(turning, touching, y.theta_b, readings, c)
-    found = acceleration(*y, switches_of(modes, readings, c), c)
+    found = acceleration(y, switches_of(modes, readings, c), c)
     literal = literal_state(y, c)
     if known.contact == "coasting":
         literal[6] = 0.0
@@ -172,7 +172,7 @@ def test_at_rest_as_printed() -> None:
                 if known.rotation == "held":
                     check_rate(design, readings, 0, y, HELD, touching, known)
                     held = modes_in(HELD, touching, y.theta_b, readings, c)
-                    assert acceleration(*y, switches_of(held, readings, c), c).alpha_b == 0.0
+                    assert acceleration(y, switches_of(held, readings, c), c).alpha_b == 0.0
     assert {(mode, corner) for mode, corner, _ in met} == set(words)
     assert {(HELD, 1.0, 1.0), (HELD, 1.0, -1.0)} <= met
 
@@ -234,5 +234,5 @@ def test_no_motion_without_a_blow() -> None:
         for readings, turning in ((bk.as_printed(), FREE), (bk.as_printed(), HELD), (bk.corrected(), SEATED)):
             c = constants_of(design._replace(v_0=0.0), readings, 0)
             s = switches_of(modes_in(turning, True, 0.0, readings, c), readings, c)
-            found = acceleration(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, s, c)
+            found = acceleration(State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), s, c)
             assert max(abs(found.a_b), abs(found.alpha_b), abs(found.a_v)) == 0.0

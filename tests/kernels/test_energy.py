@@ -28,6 +28,7 @@ from .samples import (
     oracle_readings,
     random_designs,
     random_state,
+    record_at,
 )
 
 SAMPLES = 26
@@ -46,13 +47,7 @@ class Audit(NamedTuple):
 
 def audit(design: bk.Design, readings: bk.Readings, h: float, horizon: float = 0.5) -> Audit:
     """Simulate an impact and sum up its energies at evenly spaced instants."""
-    record = bk.Record(
-        np.linspace(0.0, horizon, SAMPLES),
-        np.full((SAMPLES, 6), np.nan),
-        np.full(SAMPLES, -1, np.int8),
-        np.zeros(SAMPLES, np.bool_),
-        np.full((SAMPLES, 4), np.nan),
-    )
+    record = record_at(np.linspace(0.0, horizon, SAMPLES))
     bk.simulate_design(design, readings, control(h, horizon), record)
     c = constants_of(design, readings, 0)
     written = record.turning >= 0
@@ -147,14 +142,7 @@ def test_corrected_energy_after_release_only_falls() -> None:
     """What boulder, soil and weight hold together never grows once the truck moves back."""
     for design in [design_of(oracle.RWG), *random_designs(10, seed=96)]:
         c = constants_of(design, bk.corrected(), 0)
-        n = 101
-        record = bk.Record(
-            np.linspace(0.0, 0.8, n),
-            np.full((n, 6), np.nan),
-            np.full(n, -1, np.int8),
-            np.zeros(n, np.bool_),
-            np.full((n, 4), np.nan),
-        )
+        record = record_at(np.linspace(0.0, 0.8, 101))
         bk.simulate_design(design, bk.corrected(), control(1e-3, 0.8), record)
         behind = record.states[:, 5] <= 0.0
         held = np.array(

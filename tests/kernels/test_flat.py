@@ -13,7 +13,7 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels.design import constants_of
-from boulder_kernels.dynamics import fill_soil, profile_of
+from boulder_kernels.dynamics import constants_in, profile_of
 from boulder_kernels.numerics import WIDTH
 from boulder_kernels.pieces import reaction_of_elements, uniform_layers
 from boulder_kernels.soil import Kinematics, element_sums
@@ -49,7 +49,7 @@ def sums(count: int) -> tuple[float, ...]:
     """Return force and moment of one design by so many elements, of a uniform soil and of a soil in layers."""
     design = random_designs(1, seed=31)[0]
     profile = profile_of(uniform_layers(design), count)
-    fill_soil(design, profile)
+    constants_in(design, bk.corrected(), count, profile)  # which fills it
     uniform = element_sums(LINES, constants_of(design, bk.corrected(), count))
     return (*uniform, *reaction_of_elements(LINES, profile.soil))
 

@@ -10,7 +10,7 @@ import boulder_kernels as bk
 from boulder_kernels.design import constants_of
 from boulder_kernels.dynamics import drag_power, soil_energy, soil_potential, soil_reaction
 from boulder_kernels.pieces import table_in_layers, uniform_layers
-from boulder_kernels.soil import closed_form, uniform_drag_power, uniform_potential
+from boulder_kernels.soil import uniform_drag_power, uniform_potential
 from boulder_kernels.table import problem_at, simulate_table
 from tests import oracle
 from tests.kernels.samples import layered_constants
@@ -154,10 +154,3 @@ def test_whole_impact_is_that_of_the_oracle() -> None:
     exact = recorded_impact(LAYERED, oracle.CORRECTED, elements=500, horizon=0.4, land_on_kinks=False, rtol=1e-8)
     assert limit.maxima.theta == pytest.approx(exact.max_rotation.value, rel=2e-4)
     assert limit.maxima.x_b == pytest.approx(exact.max_displacement.value, rel=2e-4)
-
-
-def test_closed_form_is_left_alone() -> None:
-    """The uniform soil has no arrays, and is what it was."""
-    c = constants_of(DESIGNS[0], READINGS, 0)
-    k = lines(random_state(np.random.default_rng(2)), c)
-    assert soil_reaction(k, c) == closed_form(k, c)

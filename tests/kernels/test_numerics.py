@@ -96,7 +96,7 @@ def jacobian(y: State, s: Switches, c: bk.Constants) -> np.ndarray:
     """Derivative of the rate of the six states by central differences."""
 
     def rate(z: np.ndarray) -> np.ndarray:
-        k = acceleration(*z, s, c)
+        k = acceleration(State(*z), s, c)
         return np.array([z[1], k.a_b, z[3], k.alpha_b, z[5], k.a_v])
 
     columns = []

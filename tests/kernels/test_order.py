@@ -44,7 +44,7 @@ def printed_modes(y: State, c: bk.Constants) -> Modes:
     arm = signed_arm(np.sin(y.theta_b), 1.0 - np.cos(y.theta_b), c)
     corner = 1.0 if y.theta_b < c.theta_corner else -1.0
     free = Modes(FREE, True, corner, 1.0 if arm >= 0.0 else -1.0, 0, 0)
-    M = acceleration(*y, switches_of(free, bk.as_printed(), c), c).M
+    M = acceleration(y, switches_of(free, bk.as_printed(), c), c).M
     if y.omega_b <= 0.0:
         return free
     if abs(M) <= abs(arm):

@@ -7,7 +7,7 @@ import boulder_kernels as bk
 from tests import oracle
 from tests.oracle.vehicle import WallImpact
 
-from .samples import control, design_of
+from .samples import control, design_of, record_at
 
 KNOWN = {
     # m = 6800 kg, v_0 = 13.4 m/s, k = 3103.3e3 N/m, c = 138.91e3 N s/m
@@ -25,14 +25,7 @@ def wall(**changes: float) -> bk.Design:
 
 
 def simulate(design: bk.Design, readings: bk.Readings, horizon: float = 0.5) -> tuple[bk.Outcome, bk.Record]:
-    n = 201
-    record = bk.Record(
-        np.linspace(0.0, horizon, n),
-        np.full((n, 6), np.nan),
-        np.full(n, -1, np.int8),
-        np.zeros(n, np.bool_),
-        np.full((n, 4), np.nan),
-    )
+    record = record_at(np.linspace(0.0, horizon, 201))
     return bk.simulate_design(design, readings, control(2e-4, horizon), record), record
 
 

@@ -7,7 +7,7 @@ import boulder_kernels as bk
 from boulder_kernels import Status
 from tests import oracle
 
-from .samples import control, design_of, random_designs, table_of
+from .samples import control, design_of, random_designs, record_at, table_of
 
 LIMIT = np.radians(20.0)
 REPORTED = ("theta_max", "x_b_max", "x_v_max", "F_v_max", "crush_max")
@@ -43,13 +43,7 @@ def test_turned_back_beyond_the_limit() -> None:
     """The limit counts backwards, too."""
     rwg = design_of(oracle.RWG)
     back = rwg._replace(e=np.float64(-1.0), e_bumper=np.float64(-9.0), v_0=np.float64(30.0))
-    record = bk.Record(
-        np.linspace(0.0, 0.5, 201),
-        np.full((201, 6), np.nan),
-        np.full(201, -1, np.int8),
-        np.zeros(201, np.bool_),
-        np.full((201, 4), np.nan),
-    )
+    record = record_at(np.linspace(0.0, 0.5, 201))
     found = bk.simulate_design(back, bk.corrected(), control(1e-3, 0.5, 1e-3, stop_at_limit=True), record)
     assert found.status == Status.LIMIT
     assert found.maxima.theta == 1e-3

@@ -75,7 +75,7 @@ def test_force_is_mass_times_deceleration() -> None:
             known = crush_force(design.m_v, float(literal_state(y, c)[6]))
             s = switches_of(Modes(TURNING_FORWARD, True, 1.0, 1.0, 0, 0), bk.corrected(), c)
             apart = s._replace(k_contact=0.0)
-            found, without = acceleration(*y, s, c), acceleration(*y, apart, c)
+            found, without = acceleration(y, s, c), acceleration(y, apart, c)
             assert -design.m_v * found.a_v == pytest.approx(known, rel=1e-12)
             assert c.m_eff * (found.a_b - without.a_b) == pytest.approx(known, rel=1e-8, abs=1e-3)
 

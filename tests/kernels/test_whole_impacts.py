@@ -24,6 +24,7 @@ from .samples import (
     inputs_of,
     oracle_readings,
     random_designs,
+    record_at,
     single_switches,
 )
 
@@ -138,13 +139,7 @@ def test_time_history(readings: bk.Readings) -> None:
     """State, modes and exchanged energies at 200 instants."""
     design = design_of(oracle.RWG)
     times = np.linspace(0.0, 0.5, 201)
-    record = bk.Record(
-        times,
-        np.full((201, 6), np.nan),
-        np.full(201, -1, np.int8),
-        np.zeros(201, np.bool_),
-        np.full((201, 4), np.nan),
-    )
+    record = record_at(times)
     bk.simulate_design(design, readings, control(H, 0.5), record)
     known = oracle.simulate(inputs_of(design), oracle_readings(readings), rotation_limit=9.0)
     states, ledger = known.states(times), known.energy(times)

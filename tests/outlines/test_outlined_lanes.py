@@ -22,8 +22,7 @@ from boulder_kernels.dynamics import (
 from boulder_kernels.pieces import COUNTS, GivenPiece, PiecewiseTable, constants_of_few, given_pieces, uniform_layers
 from boulder_kernels.table import LANES, is_layered, is_paired, simulate_table, some_rows
 from tests.kernels.samples import control, random_designs, random_layers, random_state, table_of
-from tests.kernels.test_lanes import PRESETS, assert_alike, assert_same
-from tests.kernels.test_layered_lanes import one_by_one
+from tests.kernels.test_lanes import PRESETS, assert_alike, assert_same, one_by_one
 from tests.kernels.test_soil import lines
 from tests.outlines.stones import SHAPES, box, crooked, superellipsoid, taper
 

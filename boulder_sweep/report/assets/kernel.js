@@ -29,6 +29,9 @@
  * @property {number} c_y
  */
 
+/** Room for a call: two addresses, and the numbers of the longer record. */
+const CALL = 2 + 24;
+
 /** The compiled kernels. Every call writes its arguments into the module's memory and reads the results there. */
 class Kernel {
   /**
@@ -42,7 +45,7 @@ class Kernel {
     this.layout = layout;
     this.soil = soil;
     this.exports._initialize();
-    /** Where the memory is free; `call` takes the first two places. */
+    /** Where the memory is free; `call` takes the first places. */
     this.base = Math.ceil(this.exports.__heap_base.value / 8) * 8;
   }
 
@@ -101,13 +104,15 @@ class Kernel {
   }
 
   /**
-   * Call an exported function. Before its own arguments, compiled Python takes the addresses of a result and of an
-   * exception; none of ours uses them, and what it returns is 0 where all went well.
+   * Call an exported function with the address of its record. Before that, compiled Python takes the addresses of a
+   * result and of an exception; none of ours uses them, and what it returns is 0 where all went well.
    * @param {string} name
-   * @param {number[]} values
+   * @param {number[]} values the numbers and addresses of the record
    */
   call(name, values) {
-    const status = this.exports[name](this.base, this.base + 8, ...values);
+    const record = this.base + 16;
+    new Float64Array(this.exports.memory.buffer, record, values.length).set(values);
+    const status = this.exports[name](this.base, this.base + 8, record);
     if (status !== 0) throw new Error(`the kernel ended with status ${status}`);
   }
 
@@ -125,7 +130,7 @@ class Kernel {
     const n = designs.length;
     const results = outcome.length * n;
     const { at, views } = this.room([
-      2, design.length * n, ...this.soilLengths(controls[0], n), controls.flat().length, sizes.length * n,
+      CALL, design.length * n, ...this.soilLengths(controls[0], n), controls.flat().length, sizes.length * n,
       flag_inputs.length * n, limits.length, results, 3 * results, 2 * course.length * n, n,
     ]);
     design.forEach((name, field) => designs.forEach((one, row) => (views[1][field * n + row] = one[name])));
@@ -153,7 +158,7 @@ class Kernel {
     const { design, history } = this.layout;
     const n = times.length;
     const { at, views } = this.room([
-      2, design.length, ...this.soilLengths(settings, 1), settings.length, n, 6 * n, 2 * n, 4 * n,
+      CALL, design.length, ...this.soilLengths(settings, 1), settings.length, n, 6 * n, 2 * n, 4 * n,
       history.length * n, 2,
     ]);
     design.forEach((name, field) => (views[1][field] = one[name]));
