@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from boulder_sweep.errors import BackendError, ComputationError
+from boulder_sweep.errors import ComputationError
 from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST
 from boulder_sweep.judge.judged import Judged, joined, not_computed
 from boulder_sweep.locations import location_of
-from boulder_sweep.runner.pool import Fingerprint, fingerprint, other_versions_text
+from boulder_sweep.runner.pool import Fingerprint, refuse_other_versions
 from boulder_sweep.soils import is_layered
 from boulder_sweep.store.folder import Ranges, put_part, ranges_of
 from boulder_sweep.text import one_line
@@ -87,7 +87,7 @@ class Work:
     rows_per_block
         Rows that are computed at once.
     made_by
-        What a worker elsewhere must have, see `pool.fingerprint`; one that comes later may have other versions.
+        What a worker elsewhere must have, see `pool.fingerprint`.
     """
 
     evaluate: Callable[[DesignBlock], Judged]
@@ -117,8 +117,8 @@ class Work:
         BackendError
             This worker has other versions.
         """
-        if self.made_by is not None and fingerprint() != self.made_by:
-            raise BackendError(other_versions_text("a worker"))
+        if self.made_by is not None:
+            refuse_other_versions(self.made_by)
         from boulder_sweep.store.part import encoded_part  # imports pyarrow
 
         pieces = []

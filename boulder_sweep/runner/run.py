@@ -35,7 +35,6 @@ from boulder_sweep.runner.pool import (
     check_jobs,
     cluster,
     fingerprint,
-    telling_start_failure,
 )
 from boulder_sweep.runner.progress import (
     Estimate,
@@ -169,16 +168,15 @@ def run(
         whole = _Run(out, signals, sweep.n_designs, jobs, backend, scheduler)
         whole.is_counted = not resume
         try:
-            with telling_start_failure(jobs):
-                signals.call(lambda: _refuse_taken(out, resume, overwrite))
-                if said := too_large(sweep.n_designs, "at least", sweep.n_designs if not resume else 0, out):
-                    raise failures.DoesNotFitError(said)  # a row takes a byte or more; nothing is compiled yet
-                plan = signals.call(lambda: _planned(sweep, simulate))
-                plan.there = signals.call(lambda: _there(plan, out, overwrite))
-                whole.done, whole.is_counted = plan.rows_done, True
-                firmness = signals.call(lambda: _firmness(plan, out))
-                whole.compute(plan, plan.metadata(firmness), progress)
-                signals.call(lambda: _check_whole(out, plan, whole.written))
+            signals.call(lambda: _refuse_taken(out, resume, overwrite))
+            if said := too_large(sweep.n_designs, "at least", sweep.n_designs if not resume else 0, out):
+                raise failures.DoesNotFitError(said)  # a row takes a byte or more; nothing is compiled yet
+            plan = signals.call(lambda: _planned(sweep, simulate))
+            plan.there = signals.call(lambda: _there(plan, out, overwrite))
+            whole.done, whole.is_counted = plan.rows_done, True
+            firmness = signals.call(lambda: _firmness(plan, out))
+            whole.compute(plan, plan.metadata(firmness), progress)
+            signals.call(lambda: _check_whole(out, plan, whole.written))
         except Interrupted as stop:
             raise Interrupted(stop.signum, whole.rows_safe, sweep.n_designs, again) from None
         except (ClusterLostError, ComputationError, failures.WriteError) as problem:
