@@ -67,7 +67,7 @@ def take_sample(
 
     guess = seconds_per_row(sweep, evaluation)
     beside_rows = len(encode(pa.Table.from_batches([], table_schema(metadata))))
-    seconds, table = 0.0, None
+    seconds, table = 0.0, pa.table({})
     try:
         for size in (1, min(max(int(_SAMPLE_S / guess), 1), _MOST_SAMPLED)):  # the first loads what it needs
             begun = work_clock()

@@ -352,13 +352,19 @@ def _refuse_taken(out: Location, resume: bool, overwrite: bool) -> None:
     names = _names_in(out)
     parts = part_files(names)
     strange = [name for name in names if not part_file(name) and not name.startswith(".")]
-    if strange and not parts:
-        raise failures.ForeignFilesError(out, strange)
-    if strange := [name for name in strange if name.endswith(".parquet")]:
-        raise failures.ForeignFilesError(out, strange)  # readers would take them for rows
+    if parts:  # readers would take other tables for rows
+        strange = [name for name in strange if name.endswith(".parquet")]
+    if strange:
+        shown = ", ".join(strange[:5]) + (f" and {len(strange) - 5} more" if len(strange) > 5 else "")
+        raise failures.ForeignFilesError(
+            f"{out} contains files that no sweep wrote ({shown}): choose another folder or move them"
+        )
     if parts and not (resume or overwrite):
         there = FinishedRows(out)
-        raise failures.OutputExistsError(out, there.rows_done, there.rows)
+        state = f"is finished: see it with `sweep report {out}`, or"
+        if there.rows_done < there.rows:
+            state = f"holds {there.rows_done:,} of {there.rows:,} rows: use --resume to continue it, or"
+        raise failures.OutputExistsError(f"{out} exists and {state} use --overwrite to start again")
     check_writable(out)
 
 
@@ -394,13 +400,17 @@ def _same(plan: _Plan, out: Location) -> Contents:
     here = Table(plan.identity, plan.ranges).described
     for table in {id(one.table): one.table for one in found.intact.values()}.values():
         if unlike := differences(table.described, here):
-            raise failures.SettingsDifferError(out, unlike)
+            lines = "\n  ".join(["Differences (there -> here):", *unlike])
+            raise failures.SettingsDifferError(
+                f"{out} was started with other settings or another version, and rows must not be mixed. {lines}\n"
+                f"Resume with the original settings, use --overwrite, or choose another folder"
+            )
     return found
 
 
 def _firmness(plan: _Plan, out: Location) -> dict[str, Any]:
     """Return how firm the verdicts are; and check that the table will fit."""
-    firmness = firmness_of(plan.sweep).to_dict()
+    firmness = firmness_of(plan.sweep)
     rows = plan.ranges.rows
     if plan.parts_missing and too_large(rows, "", (rows - plan.rows_done) * _MOST_BYTES_PER_ROW, out):
         plan.evaluation.warm_up()
@@ -474,7 +484,7 @@ def estimate(
         plan.there = _same(plan, location_of(out))
     plan.evaluation.warm_up()
     cores = available_cores()
-    cost = take_sample(plan.evaluation, sweep, plan.metadata(firmness_of(sweep).to_dict()))
+    cost = take_sample(plan.evaluation, sweep, plan.metadata(firmness_of(sweep)))
     missing = sweep.n_designs - plan.rows_done
     needed = time_and_disk(cost, missing, plan.parts_missing, min(jobs or cores, cores))
     return Estimate(sweep.n_designs, missing, *needed, jobs or cores, plan.there.damaged)

@@ -168,7 +168,9 @@ def _table_of(folder: Location, part: PartFile, file: TableFile) -> Table:
     try:
         said = identity_in(common_in(file.schema.metadata))
         if other := other_version(said):
-            raise failures.OtherVersionError(folder, other)
+            raise failures.OtherVersionError(
+                f"{folder} {other}. `sweep run` writes into another folder, or into this one once it is empty"
+            )
         rows, count, _ = (said.pop(key, None) for key in ("rows", "ranges", "firmness"))
         check_identity(said)
         if not (type(rows) is type(count) is int and 1 <= count <= rows <= _MOST_ROWS):
@@ -233,7 +235,10 @@ def refuse_two(folder: Location, parts: Sequence[PartFile]) -> None:
     for part in parts:
         other = seen.setdefault(part.first, part)
         if other is not part:
-            raise failures.TwoResultsError(folder, other.name, part.name)
+            raise failures.TwoResultsError(
+                f"{folder} holds two different results for the same rows: {other.name} and {part.name}. `sweep run` of "
+                f"its settings file with --resume removes a damaged one; if both are intact, remove the wrong one"
+            )
 
 
 def refuse_no_result(folder: Location) -> None:
@@ -346,36 +351,23 @@ class FinishedRows:
         wanted = list(columns) if columns is not None else None
         return _ahead(lambda part: self._read(part, wanted, verify), self._parts)
 
-    def row(self, number: int) -> pa.Table | None:
-        """Return one row; None where it is not finished.
-
-        Raises
-        ------
-        DamagedError
-            Its part is truncated, changed or of another run.
-        """
-        at = bisect_right(self._parts, number, key=lambda part: part.first) - 1
-        if at < 0 or number >= self._parts[at].stop:
-            return None
-        return self._read(self._parts[at], None, verify=True).slice(number - self._parts[at].first, 1)
-
-    def asked(self, number: int) -> pa.Table:
-        """Return one row that a user asks for.
+    def row(self, number: int) -> pa.Table:
+        """Return one row, from the one part that holds it.
 
         Raises
         ------
         IndexError
             The table has no such row, or it is not computed yet.
         DamagedError
-            As for `row`.
+            Its part is truncated, changed or of another run.
         """
         if not 0 <= number < self.rows:
             held = counted(self.rows, "design")
             raise IndexError(f"{self._folder} has {held}, numbered from 0; there is no {number}")
-        row = self.row(number)
-        if row is None:
+        at = bisect_right(self._parts, number, key=lambda part: part.first) - 1
+        if at < 0 or number >= self._parts[at].stop:
             raise IndexError(f"design {number} has not been computed yet; `sweep run` with --resume goes on")
-        return row
+        return self._read(self._parts[at], None, verify=True).slice(number - self._parts[at].first, 1)
 
     def _open(self, part: PartFile) -> IO[bytes]:
         """Open the file of a part."""
@@ -421,19 +413,6 @@ class FinishedRows:
 def finished_table(folder: Location, columns: Sequence[str] | None = None, *, verify: bool = True) -> pa.Table:
     """Read the finished parts of a folder as one Arrow table; otherwise as `read`."""
     return _read(folder, columns, verify)[0]
-
-
-def read_row(folder: Location, design_id: int) -> pa.Table:
-    """Read one row of a result, from the one part that holds it.
-
-    Raises
-    ------
-    IndexError
-        The table has no such row, or it is not computed yet.
-    DamagedError
-        The part is truncated or changed.
-    """
-    return FinishedRows(folder).asked(design_id)
 
 
 def _read(folder: Location, columns: Sequence[str] | None, verify: bool) -> tuple[pa.Table, FinishedRows]:
