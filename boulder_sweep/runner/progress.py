@@ -124,15 +124,12 @@ class Progress:
         Rows that were there when the run began, rows computed since, and rows of the whole table.
     seconds
         Since the computing began.
-    notes
-        What the user should know so far.
     """
 
     rows_before: int
     rows_computed: int
     rows: int
     seconds: float
-    notes: Sequence[str] = ()
 
     @property
     def rows_done(self) -> int:

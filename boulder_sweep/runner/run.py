@@ -246,8 +246,7 @@ class _Run:
                 thread.join(_LOOK_EVERY_S)
                 self._signals.check()
                 if progress is not None:
-                    seconds = time.monotonic() - begun
-                    progress(Progress(before, self._ticked, self._rows, seconds, _notes(plan)))
+                    progress(Progress(before, self._ticked, self._rows, time.monotonic() - begun))
         except BaseException:
             self._stopped.set()
             thread.join(_PATIENCE_S)
@@ -328,13 +327,7 @@ def _folder(out: Location) -> Iterator[None]:
 
 
 def _names_in(out: Location) -> list[str]:
-    """Return the names in a folder of parts.
-
-    Raises
-    ------
-    WriteError
-        It cannot be read.
-    """
+    """Return the names in a folder of parts."""
     try:
         return names_in(out)
     except OSError as problem:
@@ -342,13 +335,7 @@ def _names_in(out: Location) -> list[str]:
 
 
 def _refuse_taken(out: Location, resume: bool, overwrite: bool) -> None:
-    """Refuse a folder that holds something else, or a result that is neither continued nor replaced.
-
-    Raises
-    ------
-    StoreError
-        Says what it holds.
-    """
+    """Refuse a folder that holds something else, or a result that is neither continued nor replaced."""
     names = _names_in(out)
     parts = part_files(names)
     strange = [name for name in names if not part_file(name) and not name.startswith(".")]
@@ -389,13 +376,7 @@ def _there(plan: _Plan, out: Location, overwrite: bool) -> Contents:
 
 
 def _same(plan: _Plan, out: Location) -> Contents:
-    """Return what a folder holds of a table.
-
-    Raises
-    ------
-    SettingsDifferError
-        It holds rows of another.
-    """
+    """Return what a folder holds of a table."""
     found = contents(out)
     here = Table(plan.identity, plan.ranges).described
     for table in {id(one.table): one.table for one in found.intact.values()}.values():
@@ -422,15 +403,7 @@ def _firmness(plan: _Plan, out: Location) -> dict[str, Any]:
 
 
 def _check_whole(out: Location, plan: _Plan, written: list[PartReport]) -> None:
-    """Check that the parts of all workers are in the folder as this machine sees it.
-
-    Raises
-    ------
-    BackendError
-        Some are not.
-    TwoResultsError
-        Somebody else wrote other rows.
-    """
+    """Check that the parts of all workers are in the folder as this machine sees it."""
     names = _names_in(out)
     refuse_two(out, part_files(names))
     if missing := {part.name for part in written} - {*names}:
@@ -491,13 +464,7 @@ def estimate(
 
 
 def _check_arguments(sweep: Sweep, jobs: int | None, progress: Report | None) -> None:
-    """Refuse arguments of wrong types and counts below one, by name.
-
-    Raises
-    ------
-    TypeError, ValueError
-        Says what is allowed.
-    """
+    """Refuse arguments of wrong types and counts below one, by name."""
     from boulder_sweep.settings import Sweep
 
     if not isinstance(sweep, Sweep):

@@ -156,15 +156,7 @@ def _opened(source: Any) -> TableFile:
 
 
 def _table_of(folder: Location, part: PartFile, file: TableFile) -> Table:
-    """Return what an opened part says of its table.
-
-    Raises
-    ------
-    OtherVersionError
-        It is in the format of another version.
-    ImpossibleRecordsError
-        It says what no sweep writes.
-    """
+    """Return what an opened part says of its table."""
     try:
         said = identity_in(common_in(file.schema.metadata))
         if other := other_version(said):
@@ -181,13 +173,7 @@ def _table_of(folder: Location, part: PartFile, file: TableFile) -> Table:
 
 
 def _own(folder: Location, part: PartFile, file: TableFile, table: Table) -> dict[str, int]:
-    """Return the rows of an opened part by verdict, once it holds the rows that its name says, in all columns.
-
-    Raises
-    ------
-    ImpossibleRecordsError
-        It holds others.
-    """
+    """Return the rows of an opened part by verdict, once it holds the rows that its name says, in all columns."""
     ranges = table.ranges
     try:
         said = identity_in({key: value for key, value in (file.schema.metadata or {}).items() if is_own(key)})
@@ -208,13 +194,7 @@ def _counts(verdicts: Mapping[str, Any]) -> Iterator[int]:
 
 
 def _parts_in(folder: Location) -> list[PartFile]:
-    """Return the parts in a folder, in the order of their rows.
-
-    Raises
-    ------
-    StoreError
-        The folder cannot be read.
-    """
+    """Return the parts in a folder, in the order of their rows."""
     try:
         return part_files(names_in(folder))
     except NotADirectoryError:
