@@ -127,13 +127,15 @@ def say_notes(sweep: Sweep, units: str | None = None) -> None:
 
     They are in the units of the file where none are asked for.
     """
+    from boulder_sweep.judge.quantiles import words_of
     from boulder_sweep.settings.sweep import derived_words
 
     for words in derived_words(sweep.derived, units or sweep.units):
         say("\n".join(textwrap.wrap(f"note: {words}", 80, subsequent_indent="  ")))
     for note in sweep.notes:
         say(f"note: {note}")
-    say_values(sweep, units)
+    if sweep.taken_at:
+        say("\n".join(wrap(f"note: {words_of(sweep, units or sweep.units)}")))
 
 
 def say_percents(**shares: str | None) -> None:
@@ -142,14 +144,6 @@ def say_percents(**shares: str | None) -> None:
         with suppress(ValueError):
             if text is not None and float(text) > 1.0:
                 say(f"note: --{name.replace('_', '-')} {text} is read as {text} %")
-
-
-def say_values(sweep: Sweep, units: str | None = None) -> None:
-    """Print the values that uncertain inputs are taken at, if any are."""
-    from boulder_sweep.judge.quantiles import words_of
-
-    if sweep.taken_at:
-        say("\n".join(wrap(f"note: {words_of(sweep, units or sweep.units)}")))
 
 
 def refuse_missing(sweep: Sweep, path: str, number: int) -> None:

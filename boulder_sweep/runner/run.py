@@ -166,14 +166,14 @@ def run(
     with noted_signals() as signals, _folder(out):
         signals.defer()
         whole = _Run(out, signals, sweep.n_designs, jobs, backend, scheduler)
-        whole.is_counted = not resume
+        whole.before = None if resume else 0
         try:
             signals.call(lambda: _refuse_taken(out, resume, overwrite))
             if said := too_large(sweep.n_designs, "at least", sweep.n_designs if not resume else 0, out):
                 raise failures.DoesNotFitError(said)  # a row takes a byte or more; nothing is compiled yet
             plan = signals.call(lambda: _planned(sweep, simulate))
             plan.there = signals.call(lambda: _there(plan, out, overwrite))
-            whole.done, whole.is_counted = plan.rows_done, True
+            whole.before = plan.rows_done
             firmness = signals.call(lambda: _firmness(plan, out))
             whole.compute(plan, plan.metadata(firmness), progress)
             signals.call(lambda: _check_whole(out, plan, whole.written))
@@ -209,10 +209,8 @@ class _Run:
 
     Attributes
     ----------
-    done : int
-        Rows that are safe,
-    is_counted : bool
-        and whether rows of an earlier run are among them.
+    before : int or None
+        Rows of an earlier run; None where they are not counted yet.
     written : list of PartReport
         Parts written by this run.
     jobs : int
@@ -222,7 +220,8 @@ class _Run:
     def __init__(
         self, out: Location, signals: Signals, rows: int, jobs: int, backend: str, scheduler: str | None
     ) -> None:
-        self.done, self.written, self.jobs, self.is_counted = 0, list[PartReport](), jobs, True
+        self.before: int | None = None
+        self.written, self.jobs = list[PartReport](), jobs
         self._out, self._signals, self._rows = out, signals, rows
         self._backend, self._scheduler = backend, scheduler
         self._stopped = threading.Event()
@@ -232,7 +231,11 @@ class _Run:
     @property
     def rows_safe(self) -> int | None:
         """Rows that are safe; None where nobody knows yet."""
-        return self.done if self.is_counted else None
+        return None if self.before is None else self.before + self._rows_written
+
+    @property
+    def _rows_written(self) -> int:
+        return sum(part.rows for part in self.written)
 
     def compute(self, plan: _Plan, metadata: dict[bytes, bytes], progress: Report | None) -> None:
         """Compute and write what is missing; raises as `run`."""
@@ -280,7 +283,7 @@ class _Run:
             self.jobs = workers.jobs
             for part in workers((call(_written, work, *bounds) for bounds in self._missing(plan)), work):
                 self._note(part)
-                self._ticked = self.done - plan.rows_done
+                self._ticked = self._rows_written
                 if self._stopped.is_set():
                     return
 
@@ -291,7 +294,6 @@ class _Run:
     def _note(self, part: PartReport | Exception) -> None:
         if isinstance(part, PartReport):
             self.written.append(part)
-            self.done += part.rows
         else:  # what is in hand ends, and nothing more is begun
             self._problem = self._problem or part
             self._stopped.set()

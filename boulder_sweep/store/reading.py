@@ -11,6 +11,7 @@ import warnings
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import islice
 from multiprocessing.pool import ThreadPool
@@ -133,10 +134,7 @@ def _described(folder: Location, part: PartFile, known: dict[frozenset[Any], Tab
             return f"cannot be read: {problem.strerror}"
         raise failures.StoreError(f"{folder} cannot be read: {why(problem)}") from None  # says nothing of the part
     try:
-        file = _opened(_source(content, part))
-        common = frozenset(common_in(file.schema.metadata).items())
-        table = known.get(common) or _table_of(folder, part, file)
-        known[common] = table
+        file, table = _looked_at(folder, part, _source(content, part), known)
         return PartSummary(table, _own(folder, part, file, table), len(content))
     except (failures.DamagedError, ParquetError) as problem:
         return problem.what if isinstance(problem, failures.ImpossibleRecordsError) else str(problem)
@@ -151,8 +149,15 @@ def _source(content: bytes, part: PartFile) -> Any:
     return pa.BufferReader(content)
 
 
-def _opened(source: Any) -> TableFile:
-    return TableFile(source, _MOST_PART_ROWS, _MOST_PART_BYTES)
+def _looked_at(
+    folder: Location, part: PartFile, source: Any, known: dict[frozenset[Any], Table]
+) -> tuple[TableFile, Table]:
+    """Open a part; return its file, and what it says of its table."""
+    file = TableFile(source, _MOST_PART_ROWS, _MOST_PART_BYTES)
+    common = frozenset(common_in(file.schema.metadata).items())
+    if common not in known:
+        known[common] = _table_of(folder, part, file)
+    return file, known[common]
 
 
 def _table_of(folder: Location, part: PartFile, file: TableFile) -> Table:
@@ -290,7 +295,10 @@ class FinishedRows:
         self._parts = _parts_in(folder)
         if not self._parts:
             refuse_no_result(folder)
-        self._table = self._look_at(self._parts[0])
+        self._known = dict[frozenset[Any], Table]()
+        with self._open(self._parts[0]) as source, self._in_words(self._parts[0]):
+            file, self._table = _looked_at(folder, self._parts[0], source, self._known)
+        self._schema = file.schema
         self.identity, ranges = self._table
         if strange := next((part for part in self._parts if (part.first, part.stop) not in ranges), None):
             raise self._damaged(strange, f"its rows are no part of a table of {ranges.rows:,} rows")
@@ -300,18 +308,6 @@ class FinishedRows:
         self.judged_by = judged_by(self.identity)
         if self.judged_by:
             warnings.warn(f"{folder} was {self.judged_by}", OlderRulesWarning, stacklevel=2)
-
-    def _look_at(self, part: PartFile) -> Table:
-        """Return what a part says of its table, and keep what the others must say, too."""
-        with self._open(part) as source:
-            try:
-                file = _opened(source)
-            except ParquetLimitError as problem:
-                raise failures.ImpossibleRecordsError(self._folder / part.name, str(problem)) from problem
-            except ParquetError as problem:
-                raise self._damaged(part, str(problem)) from problem
-            self._schema, self._common = file.schema, common_in(file.schema.metadata)
-            return _table_of(self._folder, part, file)
 
     def tables(self, columns: Sequence[str] | None = None, *, verify: bool = True) -> Iterator[pa.Table]:
         """Yield all rows in the order of the designs, a part at a time.
@@ -363,24 +359,29 @@ class FinishedRows:
 
     def _read(self, part: PartFile, columns: list[str] | None, verify: bool) -> pa.Table:
         """Read columns of a part, or all of them."""
-        with self._open(part) as source:
-            try:
-                file = _opened(_source(source.read(), part) if verify else source)
-                if common_in(file.schema.metadata) != self._common:  # or only the heading of reports is another
-                    other = _table_of(self._folder, part, file)
-                    if unlike := differences(self._table.described, other.described):
-                        raise self._damaged(part, f"of another run: {unlike[0]}")
-                if not file.schema.equals(self._schema):
-                    raise self._damaged(part, "its columns differ from the first part's")
-                table = file.read(columns)
-                _own(self._folder, part, file, self._table)
-            except ParquetLimitError as problem:
-                raise failures.ImpossibleRecordsError(self._folder / part.name, str(problem)) from problem
-            except (OSError, ParquetError) as problem:
-                raise self._damaged(part, str(problem)) from problem
-            except failures.DamagedError as problem:
-                raise self._damaged(part, CHANGED) if str(problem) == CHANGED else problem from None
+        with self._open(part) as source, self._in_words(part):
+            file, other = _looked_at(
+                self._folder, part, _source(source.read(), part) if verify else source, self._known
+            )
+            if unlike := differences(self._table.described, other.described):
+                raise self._damaged(part, f"of another run: {unlike[0]}")
+            if not file.schema.equals(self._schema):
+                raise self._damaged(part, "its columns differ from the first part's")
+            table = file.read(columns)
+            _own(self._folder, part, file, self._table)
         return table if columns is None else table.select(columns)
+
+    @contextmanager
+    def _in_words(self, part: PartFile) -> Iterator[None]:
+        """Say of what is wrong with a part which it is, and what to do."""
+        try:
+            yield
+        except ParquetLimitError as problem:
+            raise failures.ImpossibleRecordsError(self._folder / part.name, str(problem)) from problem
+        except (OSError, ParquetError) as problem:
+            raise self._damaged(part, str(problem)) from problem
+        except failures.DamagedError as problem:
+            raise self._damaged(part, CHANGED) if str(problem) == CHANGED else problem from None
 
     def _damaged(self, part: PartFile, what: str) -> failures.DamagedError:
         """Return the error that says what is damaged and what to do."""
