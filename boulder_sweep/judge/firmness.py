@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_kernels import DesignTable, Readings, as_printed, corrected
-from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED, accuracy_of, simulated
+from boulder_kernels import DesignTable, Readings, as_printed, corrected, simulate_table
+from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED, accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.inputs import plain_designs, sampled_designs, sampled_rows
 from boulder_sweep.judge.judged import FAIL, PASS
@@ -71,8 +71,7 @@ def firmness_of(sweep: Sweep) -> dict[str, Any]:
         steps = (STEPS if read.restoring_gravity else STEPS_PRINTED)["fast"]
         # Not beyond the horizon: without a proof that would cost ten times as much for a few verdicts.
         fast = control._replace(h=steps.step_s, locate_yield=False, error_estimate=False, longest_horizon=0.0)
-        changed = designs._replace(table=table)
-        return judge(simulated(changed, read, fast), changed, limits)
+        return judge(simulate_table(table, read, fast), designs._replace(table=table), limits)
 
     def by(law: str, change: float = 0.0) -> DesignTable:
         """Return the designs by a law, with all friction angles changed [rad]."""
