@@ -74,7 +74,7 @@ def take_sample(
             block = sweep.plan.selection(_spread_rows(sweep.n_designs, size))
             table = part_table(block, evaluation(block), metadata)
             seconds = work_clock() - begun
-    except Exception:  # the run itself will retry and name the rows
+    except Exception:  # the run itself will name the rows
         return RowCost(guess, _USUAL_BYTES, beside_rows)
     return RowCost(seconds / len(table), max(len(encode(table)) - beside_rows, 0) / len(table), beside_rows)
 

@@ -360,10 +360,9 @@ class FinishedRows:
     def _read(self, part: PartFile, columns: list[str] | None, verify: bool) -> pa.Table:
         """Read columns of a part, or all of them."""
         with self._open(part) as source, self._in_words(part):
-            file, other = _looked_at(
-                self._folder, part, _source(source.read(), part) if verify else source, self._known
-            )
-            if unlike := differences(self._table.described, other.described):
+            checked = _source(source.read(), part) if verify else source
+            file, other = _looked_at(self._folder, part, checked, self._known)
+            if other is not self._table and (unlike := differences(self._table.described, other.described)):
                 raise self._damaged(part, f"of another run: {unlike[0]}")
             if not file.schema.equals(self._schema):
                 raise self._damaged(part, "its columns differ from the first part's")
