@@ -236,11 +236,6 @@ def _whole_numbers(data: bytes, at: int, depth: int) -> tuple[dict[int, int], in
 
     The record is in the compact protocol of Apache Thrift, in which Parquet writes the heads of its pages: field 2 is
     the size of a page once it is unpacked, and field 3 its size in the file [bytes].
-
-    Raises
-    ------
-    LookupError, ValueError
-        It does not end within the data, or is nested deeper than asked for.
     """
     found, field = {}, 0
     while start := data[at]:

@@ -113,18 +113,10 @@ def _indent(text: str, indent: str) -> list[str]:
 
 
 def firmness_lines(firmness: Mapping[str, Any]) -> list[str]:
-    """Return how firm the passes are, from a sample of the designs; nothing where none was taken."""
-    if not firmness or "lost" not in firmness:
-        return []
-    error, lost = firmness["numerical_error_deg"], firmness["lost"]
-    exact = "no numerical error estimated" if error is None else f"numerical error at most {error:g} deg (99.9 %)"
-    lines = [f"firm?  {exact}, sample of {counted(firmness['designs'], 'design')}"]
-    if firmness.get("changing"):
-        share = firmness["changing"] / firmness["designs"]
-        changing = f"the verdict of {share:.0%} changes with the uncertain inputs; it is the worst (changes_side)"
-        lines += _indent(changing, "       ")
+    """Return how firm the passes are, from a sample of the designs; nothing where none of it passes."""
+    lost = firmness["lost"]
     if not lost:
-        return lines
+        return []
     laws = ", ".join(f"{law} {share:.0%}" for law, share in lost.items() if law in RESISTANCES)
     shares = ", ".join(
         (
@@ -134,7 +126,8 @@ def firmness_lines(firmness: Mapping[str, Any]) -> list[str]:
             f"another soil model without friction: {laws}",
         )
     )
-    lines += _indent(f"of its {firmness['passes']:,} passes fail by {shares}", "       ")
+    sample = f"{firmness['passes']:,} passes of a sample of {counted(firmness['designs'], 'design')}"
+    lines = textwrap.wrap(f"firm?  of {sample} fail by {shares}", 80, subsequent_indent="       ")
     shares = ", ".join(f"{name} {count / firmness['passes']:.0%}" for name, count in firmness["flags"].items() if name)
     return [*lines, *_indent(f"flags: {shares}", "       ")] if shares else lines
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from boulder_sweep.cli.output import say, working, wrap
+from boulder_sweep.cli.output import say, wrap
 from boulder_sweep.runner.pool import MOST_JOBS
 from boulder_sweep.text import counted
 
@@ -125,22 +125,17 @@ def load_given(path: str, overrides: Sequence[str], at: str | None = None) -> Sw
 def say_notes(sweep: Sweep, units: str | None = None) -> None:
     """Print the notes on settings, how inputs follow from the data of a site, and which values uncertain inputs have.
 
-    They are in the units of the file where none are asked for. Where the soil has too few elements, some designs are
-    simulated to say what that costs.
+    They are in the units of the file where none are asked for.
     """
+    from boulder_sweep.judge.quantiles import words_of
     from boulder_sweep.settings.sweep import derived_words
 
     for words in derived_words(sweep.derived, units or sweep.units):
         say("\n".join(textwrap.wrap(f"note: {words}", 80, subsequent_indent="  ")))
     for note in sweep.notes:
         say(f"note: {note}")
-    if sweep.model.has_few_elements:
-        from boulder_sweep.judge.few_elements import words_of_few_elements  # the kernels are heavy
-
-        with working(quiet=False):
-            words = words_of_few_elements(sweep)
-        say("\n".join(textwrap.wrap(f"note: model.soil: {words}", 80, subsequent_indent="  ")))
-    say_values(sweep, units)
+    if sweep.taken_at:
+        say("\n".join(wrap(f"note: {words_of(sweep, units or sweep.units)}")))
 
 
 def say_percents(**shares: str | None) -> None:
@@ -149,14 +144,6 @@ def say_percents(**shares: str | None) -> None:
         with suppress(ValueError):
             if text is not None and float(text) > 1.0:
                 say(f"note: --{name.replace('_', '-')} {text} is read as {text} %")
-
-
-def say_values(sweep: Sweep, units: str | None = None) -> None:
-    """Print the values that uncertain inputs are taken at, if any are."""
-    from boulder_sweep.judge.quantiles import words_of
-
-    if sweep.taken_at:
-        say("\n".join(wrap(f"note: {words_of(sweep, units or sweep.units)}")))
 
 
 def refuse_missing(sweep: Sweep, path: str, number: int) -> None:

@@ -12,7 +12,7 @@ import shutil
 import sys
 import textwrap
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
@@ -111,7 +111,7 @@ def working(quiet: bool, doing: str = "simulating", of: str = "designs") -> Iter
 
     It is None where nothing is to be shown (`quiet`). `doing` stands beside the bar, and `of` is what is counted.
     """
-    with progress(quiet, Notes(), doing, of) as shown:
+    with progress(quiet, doing, of) as shown:
         if shown is None:
             yield None
             return
@@ -133,46 +133,31 @@ def working(quiet: bool, doing: str = "simulating", of: str = "designs") -> Iter
 
 @contextmanager
 def progress(
-    quiet: bool, notes: Notes, doing: str = "simulating", of: str = "designs"
+    quiet: bool, doing: str = "simulating", of: str = "designs"
 ) -> Iterator[Callable[[Progress], None] | None]:
-    """Give a function that shows progress and notes: a bar on a terminal, occasional lines elsewhere; None if quiet.
+    """Give a function that shows progress: a bar on a terminal, occasional lines elsewhere; None if quiet.
 
     Nothing is compiled here: commands refuse what they must before they compile, and act on signals while they do.
-    `notes` were shown already; `doing` and `of`: see `working`.
+    `doing` and `of`: see `working`.
     """
     if quiet:
         yield None
         return
     if sys.stderr.isatty():
-        with _bar(notes, doing) as show:
+        with _bar(doing) as show:
             yield show
     else:
         with announced(say, lambda: None):
-            yield _PlainLines(notes, of)
-
-
-class Notes:
-    """The notes of a run that were shown already."""
-
-    def __init__(self) -> None:
-        self._shown = 0
-
-    def new(self, notes: Sequence[str]) -> Sequence[str]:
-        """Return the notes that were not shown yet; they count as shown now."""
-        fresh, self._shown = notes[self._shown :], len(notes)
-        return fresh
+            yield _PlainLines(of)
 
 
 class _PlainLines:
     """Writes a plain line every `PLAIN_EVERY_S`: for logs of batch jobs."""
 
-    def __init__(self, notes: Notes, of: str) -> None:
-        self.last = time.monotonic()
-        self._notes, self._of = notes, of
+    def __init__(self, of: str) -> None:
+        self.last, self._of = time.monotonic(), of
 
     def __call__(self, now: Progress) -> None:
-        for note in self._notes.new(now.notes):
-            say(f"note: {note}")
         if time.monotonic() - self.last < PLAIN_EVERY_S:
             return
         self.last = time.monotonic()
@@ -183,7 +168,7 @@ class _PlainLines:
 
 
 @contextmanager
-def _bar(notes: Notes, doing: str) -> Iterator[Callable[[Progress], None]]:
+def _bar(doing: str) -> Iterator[Callable[[Progress], None]]:
     """Show a bar; give the function that shows progress."""
     # rich is for terminals only. It honours NO_COLOR by itself.
     from rich.console import Console
@@ -197,8 +182,6 @@ def _bar(notes: Notes, doing: str) -> Iterator[Callable[[Progress], None]]:
         task = bars.add_task(printable(doing), total=None, numbers="")
 
         def show(now: Progress) -> None:
-            for note in notes.new(now.notes):
-                bars.console.print(f"note: {printable(note)}", markup=False, highlight=False)
             numbers = f"{now.rows_done:,} of {now.rows:,}, {now.rows_per_second:,.0f}/s"
             bars.update(task, total=now.rows, completed=now.rows_done, numbers=numbers)
 

@@ -25,7 +25,7 @@ from boulder_sweep.cli.options import (
     quantity_of,
     quiet_option,
     refuse_unwritable,
-    say_values,
+    say_notes,
     set_option,
 )
 from boulder_sweep.cli.output import say, show, working
@@ -86,7 +86,7 @@ def tradeoff(
         raise click.UsageError("--seconds nan: give a number of seconds")
     sweep = load_given(grid, overrides, at)
     if not quiet:
-        say_values(sweep)
+        say_notes(sweep)
     if out is not None:
         from boulder_sweep.views.pictures import make_folder, require_matplotlib
 

@@ -25,7 +25,7 @@ from boulder_sweep.cli.options import (
     units_option,
     with_or_without,
 )
-from boulder_sweep.cli.output import Notes, progress, say, show, wrap
+from boulder_sweep.cli.output import progress, say, show, wrap
 from boulder_sweep.errors import Interrupted
 from boulder_sweep.locations import Location, location_of
 from boulder_sweep.runner.pool import BACKENDS, DASK, THREADING
@@ -98,14 +98,13 @@ def run(
         say(f"{sweep.name}: {counted(sweep.n_designs, 'design')} into {target}")
     from boulder_sweep.runner.run import run as run_sweep
 
-    notes = Notes()
-    with progress(quiet, notes) as shown:
+    with progress(quiet) as shown:
         try:
             summary = run_sweep(sweep, target, progress=shown, **options)
         except Interrupted as stop:
             say(str(stop))  # before the bar closes: another signal meanwhile ends the process
             return stop.exit_code
-    for note in notes.new(summary.notes):
+    for note in summary.notes:
         say(f"note: {note}")
     if as_json:
         show(json.dumps({"name": sweep.name, **summary.to_dict()}))

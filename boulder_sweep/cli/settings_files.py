@@ -16,32 +16,24 @@ NEW_EXAMPLES = """\b
 Examples:
   sweep new
   sweep new my-site.yaml
-  sweep new --class M40 --units us -o my-site.yaml
+  sweep new --class M40 --units us my-site.yaml
 """
-DEFAULT = "my-site.yaml"
 
 
 @click.command("new", short_help="Write a commented settings file to start from.", epilog=NEW_EXAMPLES)
-@click.argument("file", type=OutputPath(dir_okay=False, path_type=Path), required=False)
+@click.argument("file", type=OutputPath(dir_okay=False, path_type=Path), default="my-site.yaml")
 @click.option("--class", "vehicle", metavar="CLASS", help="Class of the vehicle in ASTM F2656, such as M40 [M30].")
 @click.option("--units", type=click.Choice(SYSTEMS), help="Units of the values [si].")
-@click.option(
-    "-o", "--output", "output", type=OutputPath(dir_okay=False, path_type=Path), help="The file, as the argument."
-)
-@click.option("-y", "--yes", is_flag=True, help="Do not prompt; take the answers in brackets.")
-def new(file: Path | None, vehicle: str | None, units: str | None, output: Path | None, yes: bool) -> int:
+def new(file: Path, vehicle: str | None, units: str | None) -> int:
     """Write FILE [my-site.yaml], a settings file with a comment for every entry.
 
-    Asks for name, class and units, unless --class or --units is given.
+    On a terminal it asks for name, class and units, unless --class or --units is given.
     """
     from boulder_sweep.errors import ExistingFileError
     from boulder_sweep.settings import load
     from boulder_sweep.settings.starter import CLASSES, is_published, starter
 
-    if file is not None and output is not None:
-        raise click.UsageError(f"two files are named, {file} and {output}; name one")
-    file = file or output or Path(DEFAULT)
-    asks = not yes and vehicle is None and units is None and sys.stdin.isatty()
+    asks = vehicle is None and units is None and sys.stdin.isatty()
     vehicle, units = (vehicle or next(iter(CLASSES))).upper(), units or SYSTEMS[0]
     if vehicle not in CLASSES:
         raise click.UsageError(f"--class {vehicle} is not a class of ASTM F2656; there are {', '.join(CLASSES)}")

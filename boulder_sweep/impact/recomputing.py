@@ -107,7 +107,7 @@ def recompute(out: str | Location, design_id: int) -> Recomputation:
     folder = location_of(out)
     finished = FinishedRows(folder)
     there = finished.identity
-    row = finished.asked(design_id)
+    row = finished.row(design_id)
     values = row.to_pylist()[0]
     inputs = {name: values[name] for name in (*INPUT_COLUMNS, *OPTIONAL_COLUMNS) if name in values}
     control, readings = Control(**there["control"]), Readings(**there["readings"])

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from boulder_kernels import Control, OutcomeTable, Readings, Status, simulate_table
+from boulder_kernels import Control, Readings, Status, simulate_table
 from boulder_kernels._jit import plain
 from boulder_kernels.control import EVENT_TOLERANCE
 from boulder_kernels.rules import AGREEING, FIRST_FACTOR
@@ -64,8 +64,6 @@ FEWEST_DESIGNS = 256
 """Smallest number of designs, for any number of soil elements."""
 QUANTILE = 0.999
 """Fraction of the designs whose estimated error must not exceed the requested accuracy."""
-AT_ONCE, AT_ONCE_CLOSED = 256, 4096
-"""Designs simulated per call, with element sums and in closed form: an interruption waits for the current call."""
 
 
 @dataclass(frozen=True)
@@ -250,21 +248,13 @@ def pilot_size(elements: int) -> int:
     return max(FEWEST_DESIGNS, DESIGNS * ELEMENTS_AS_FAST // max(elements, ELEMENTS_AS_FAST))
 
 
-def simulated(designs: Designs, readings: Readings, control: Control) -> OutcomeTable:
-    """Simulate designs in pieces, so that an interruption takes effect soon."""
-    size = AT_ONCE if control.elements else AT_ONCE_CLOSED
-    rows = [designs.rows(slice(at, at + size)) for at in range(0, designs.size, size)] or [designs]
-    pieces = [simulate_table(some.table, readings, control) for some in rows]
-    return type(pieces[0])(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))
-
-
 def estimated_error_deg(designs: Designs, readings: Readings, control: Control) -> float:
     """Quantile of the estimated errors of the rotation [deg]; 0 where no error could be estimated.
 
     A boulder that overturns has no error of its largest rotation, but its other errors stand for one: the errors of the
     displacements, over the embedment depth or half the height of the boulder, as `estimate_error` compares them.
     """
-    outcomes = simulated(designs, readings, control)
+    outcomes = simulate_table(designs.table, readings, control)
     arm = np.maximum(designs.table.d, 0.5 * designs.table.H)
     limit = (outcomes.status == Status.LIMIT) & np.isfinite(outcomes.theta_error)
     errors = np.where(limit, outcomes.x_error / arm, outcomes.theta_error)

@@ -33,7 +33,7 @@ from boulder_sweep.judge.accuracy import (
     readings_of,
 )
 from boulder_sweep.judge.inputs import Designs, designs_of
-from boulder_sweep.judge.judged import FAIL, PASS, Judged, joined, not_computed, with_rows, worst_case, worst_of
+from boulder_sweep.judge.judged import FAIL, PASS, Judged, joined, merged, not_computed, with_rows, worst_case, worst_of
 from boulder_sweep.judge.robustness import DECISIVE, can_be_asked, with_second_opinions
 from boulder_sweep.judge.verdict import Limits, judged_rows, limits_of, rows_of
 from boulder_sweep.settings.model import Model
@@ -127,12 +127,7 @@ class Evaluation:
         refused = not_computed(tuple(block.reasons.texts[1:]), codes[~computable] - 1)
         if not computable.any():
             return joined([refused])
-        both = joined([self.judged(self.designs(block, computable)), refused])
-        # In `both` the refused rows follow the others; restore the order of the block.
-        order = np.empty(len(codes), dtype=np.int64)
-        order[computable] = np.arange(computable.sum())
-        order[~computable] = np.arange(computable.sum(), len(codes))
-        return both.rows(order)
+        return merged(computable, self.judged(self.designs(block, computable)), refused)
 
     def by_case(self, block: DesignBlock) -> list[Judged]:
         """Return the rows of a block as judged at its own inputs, and then in each of its cases."""
@@ -168,10 +163,7 @@ class Evaluation:
         """
         taped = designs.taped
         if taped.any():
-            some = np.flatnonzero(taped)
-            return joined([self.judged(designs.rows(~taped)), self._worst_shapes(designs.rows(some))]).rows(
-                np.argsort(np.concatenate([np.flatnonzero(~taped), some]))
-            )
+            return merged(taped, self._worst_shapes(designs.rows(taped)), self.judged(designs.rows(~taped)))
         rows = self._decided(designs)
         if self.against_slower:
             self._hold_slower(rows, designs)

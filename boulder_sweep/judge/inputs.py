@@ -71,9 +71,8 @@ class Designs(NamedTuple):
     def rows(self, chosen: np.ndarray | slice) -> Designs:
         """Return some of the designs, chosen by a mask, by their indices or by a slice."""
         table = type(self.table)(*(np.ascontiguousarray(column[chosen]) for column in self.table))
-        fills = None if self.fills is None else self.fills[chosen]
-        rocks = None if self.rocks is None else self.rocks[chosen]
-        factors = None if self.factors is None else self.factors[chosen]
+        given = (self.fills, self.rocks, self.factors)
+        fills, rocks, factors = (None if values is None else values[chosen] for values in given)
         return Designs(table, self.bed_offset[chosen], fills, rocks, factors, self.shape)
 
     @property
@@ -160,12 +159,8 @@ def designs_of(
 
 def _values(block: DesignBlock, name: str, rows: np.ndarray | None) -> np.ndarray:
     """Values of one input column, one a row."""
-    column = block.columns[name]
-    if rows is None:
-        values = column.to_numpy()
-    else:
-        values = column.values[rows] if column.codes is None else column.values[column.codes[rows]]
-    return np.ascontiguousarray(values, dtype=np.float64)
+    values = block.columns[name].to_numpy()
+    return np.ascontiguousarray(values if rows is None else values[rows], dtype=np.float64)
 
 
 MOST_CORNERS = 64

@@ -123,6 +123,11 @@ def joined(pieces: list[Judged]) -> Judged:
     return Judged(columns, words)
 
 
+def merged(chosen: np.ndarray, some: Judged, others: Judged) -> Judged:
+    """Return n rows, of which those where `chosen` is true (bool, shape (n,)) are `some`, and the rest `others`."""
+    return joined([some, others]).rows(np.argsort(np.concatenate([np.flatnonzero(chosen), np.flatnonzero(~chosen)])))
+
+
 def with_rows(judged: Judged, indices: np.ndarray, rows: Judged) -> Judged:
     """Return judged rows with those at some indices replaced."""
     order = np.arange(len(judged))

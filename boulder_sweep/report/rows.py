@@ -245,9 +245,7 @@ class ResultRows:
         IndexError
             The table does not have this row (yet).
         """
-        finished = self.finished
-        table = finished.row(number) if isinstance(finished, AnswerFile) else finished.asked(number)
-        row: dict[str, Any] = table.to_pylist()[0]
+        row: dict[str, Any] = self.finished.row(number).to_pylist()[0]
         if BOULDER_MASS in row and BOULDER_MASS not in self.settings["inputs"]:
             del row[BOULDER_MASS]  # answers tell it whether it was given or not
         return row

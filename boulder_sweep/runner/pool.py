@@ -23,7 +23,7 @@ BACKENDS = (THREADING, DASK)
 MOST_JOBS = 4096
 """Most workers that may be asked for, more than a machine has cores; starting a million would exhaust it."""
 CONNECT_S = 10.0
-"""How long to wait for a scheduler, for a first worker, and for the answer of every worker [s]."""
+"""How long to wait for a scheduler, and for a first worker [s]."""
 Call = tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
 """Function, arguments and named arguments, see `call`."""
 Fingerprint = tuple[dict[str, str], str, str]
@@ -65,11 +65,6 @@ class Pool:
             What to call.
         in_order
             Whether results come in the order of the calls, or as they are there.
-
-        Raises
-        ------
-        BackendError
-            The system cannot start as many threads.
         """
         calls = iter(calls)
         first = list(itertools.islice(calls, 2))
@@ -78,11 +73,10 @@ class Pool:
             return (function(*arguments, **named) for function, arguments, named in calls)
         import joblib  # a quarter of the time of a short question
 
-        with telling_start_failure(self._jobs):
-            how = "generator" if in_order else "generator_unordered"
-            threads = joblib.Parallel(n_jobs=self._jobs or -1, backend=THREADING, return_as=how, batch_size=1)
-            results: Iterator[Any] = threads(calls)
-            return results
+        how = "generator" if in_order else "generator_unordered"
+        threads = joblib.Parallel(n_jobs=self._jobs or -1, backend=THREADING, return_as=how, batch_size=1)
+        results: Iterator[Any] = threads(calls)
+        return results
 
 
 class Cluster:
@@ -180,7 +174,7 @@ def cluster(jobs: int | None, scheduler: str | None) -> Iterator[Cluster]:
                 client = _connected(distributed, scheduler)
             ends.insert(0, client.close)
             if scheduler is not None:
-                _check_workers(client, scheduler)
+                _wait_for_worker(client, scheduler)
             yield Cluster(client)
         finally:
             for end in ends:
@@ -214,34 +208,15 @@ def _connected(distributed: Any, scheduler: str) -> Any:
         raise BackendError(f"no Dask scheduler answers at {scheduler}: {one_line(problem)}") from problem
 
 
-def _check_workers(client: Any, scheduler: str) -> None:
-    """Wait for a worker, and refuse workers whose rows could differ from this machine's.
-
-    Raises
-    ------
-    BackendError
-        There is none, one does not answer, or one has other versions.
-    """
-    work = client.submit(int, pure=False)  # the scheduler of an adaptive cluster starts a worker when there is work
+def _wait_for_worker(client: Any, scheduler: str) -> None:
+    """Wait for a worker; the scheduler of an adaptive cluster starts one when there is work."""
+    work = client.submit(int, pure=False)
     try:
         client.wait_for_workers(1, timeout=CONNECT_S)
     except TimeoutError:
         text = f"the Dask scheduler at {scheduler} has no worker; start one with: dask worker {scheduler}"
         raise BackendError(text) from None
     work.release()
-    try:
-        answers = client.sync(client._run, fingerprint, on_error="return", callback_timeout=CONNECT_S)
-    except TimeoutError:
-        raise BackendError("a worker of the Dask scheduler does not answer: look whether it hangs") from None
-    here, different = fingerprint(), []
-    for address, there in answers.items():
-        if isinstance(there, Exception):
-            if not isinstance(there, OSError):  # one that leaves meanwhile does not matter
-                raise BackendError(f"the worker {address} cannot compute: {one_line(there)}")
-        elif tuple(there) != here:
-            different.append(address)
-    if different:
-        raise BackendError(other_versions_text(f"the workers {', '.join(different)}"))
 
 
 def fingerprint() -> Fingerprint:
@@ -251,13 +226,20 @@ def fingerprint() -> Fingerprint:
     return versions(), kernels_sha256(), rules_sha256()
 
 
-def other_versions_text(who: str) -> str:
-    """Say that versions differ."""
-    return (
-        f"{who} and this machine have different versions of boulder-sweep, Python or NumPy, or processors that differ "
-        f"in the last bits (with and without fused multiply-add); install the same versions everywhere, on processors "
-        f"of one kind"
-    )
+def refuse_other_versions(there: Fingerprint) -> None:
+    """Refuse to compute here, on a worker, for a machine with other versions.
+
+    Raises
+    ------
+    BackendError
+        The fingerprint of that machine is another.
+    """
+    if fingerprint() != there:
+        raise BackendError(
+            "a worker and this machine have different versions of boulder-sweep, Python or NumPy, or processors that "
+            "differ in the last bits (with and without fused multiply-add); install the same versions everywhere, on "
+            "processors of one kind"
+        )
 
 
 @contextmanager
@@ -310,30 +292,3 @@ def check_jobs(jobs: int | None) -> None:
         raise TypeError(f"jobs must be a whole number, not {type(jobs).__name__}")
     if not 1 <= jobs <= MOST_JOBS:
         raise ValueError(f"jobs must be at {'least 1' if jobs < 1 else f'most {MOST_JOBS:,}'}, not {jobs:,}")
-
-
-@contextmanager
-def telling_start_failure(jobs: int | None) -> Iterator[None]:
-    """Turn what fails because the system starts no more threads into an error for the user.
-
-    `multiprocessing` then stumbles over the threads it has started, which cannot be terminated; the cause is the
-    context of its error.
-
-    Raises
-    ------
-    BackendError
-        The system starts no more threads.
-    """
-    try:
-        yield
-    except BoulderSweepError:
-        raise
-    except Exception as problem:
-        cause: BaseException | None = problem
-        while cause is not None:
-            if isinstance(cause, RuntimeError) and "can't start new thread" in str(cause):
-                wanted = "a thread for every core" if jobs is None else f"{jobs:,} threads"
-                text = f"the system cannot start {wanted}; give a smaller number of --jobs"
-                raise BackendError(text) from problem
-            cause = cause.__cause__ or cause.__context__
-        raise

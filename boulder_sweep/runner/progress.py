@@ -14,18 +14,20 @@ import numpy as np
 
 from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
 from boulder_sweep.locations import Location
+from boulder_sweep.runner.ranges import seconds_per_row
 from boulder_sweep.text import size_text
 
 if TYPE_CHECKING:
     from boulder_sweep.judge.evaluation import Evaluation
     from boulder_sweep.settings import Sweep
 
-_SAMPLES = (1, 16, 128, 1024, 8192)
-"""Rows of the samples, each computed if the one before lets expect no more than `_SAMPLE_S`; the last one counts."""
-_SAMPLE_S = 0.2
+_SAMPLE_S, _MOST_SAMPLED = 0.1, 8192
+"""Work of a sample, by the table of costs [s], and most of its rows: about as many as a block of the run has."""
 _STRETCHES = 24
 """Positions all over the table from which a sample takes consecutive rows, equally many from each."""
 _GOLDEN = 0.618033988749895
+_USUAL_BYTES = 50.0
+"""Of a row on the disk."""
 
 
 class RowCost(NamedTuple):
@@ -34,10 +36,6 @@ class RowCost(NamedTuple):
     seconds_per_row: float
     bytes_per_row: float
     bytes_per_part: float
-
-
-_GUESS = RowCost(seconds_per_row=1e-5, bytes_per_row=50.0, bytes_per_part=30_000.0)
-"""For a sweep none of whose sampled rows can be computed."""
 
 
 @dataclass(frozen=True)
@@ -58,31 +56,27 @@ def take_sample(
     metadata: Mapping[bytes, bytes],
     work_clock: Callable[[], float] = time.thread_time,
 ) -> RowCost:
-    """Compute a few rows spread over the table and measure the time; the kernels must be warm.
+    """Compute rows spread over the table and measure the time; the kernels must be warm.
 
-    The largest sample counts: it is computed like a block of the run, so that what a block costs besides its rows, and
-    lanes that are not full, weigh as little as they will. The time is the processor's, by `work_clock` [s]: while other
-    programs keep it busy, blocks must not become shorter.
+    They are computed like a block of the run, so that what a block costs besides its rows weighs as little as it will.
+    The time is the processor's, by `work_clock` [s], whatever else keeps it busy.
     """
     import pyarrow as pa  # heavy, and only runs need it
 
     from boulder_sweep.store.part import encode, part_table, table_schema
 
-    seconds_per_row, table = 0.0, None
-    for size in (1, *_SAMPLES):  # the first loads what it needs, which takes time of its own
-        if size > 1 and (table is None or size * seconds_per_row > _SAMPLE_S or len(table) == sweep.n_designs):
-            break
-        begun = work_clock()
-        try:
+    guess = seconds_per_row(sweep, evaluation)
+    beside_rows = len(encode(pa.Table.from_batches([], table_schema(metadata))))
+    seconds, table = 0.0, pa.table({})
+    try:
+        for size in (1, min(max(int(_SAMPLE_S / guess), 1), _MOST_SAMPLED)):  # the first loads what it needs
+            begun = work_clock()
             block = sweep.plan.selection(_spread_rows(sweep.n_designs, size))
             table = part_table(block, evaluation(block), metadata)
-        except Exception:  # the run itself will retry and name the rows; the sample before counts
-            break
-        seconds_per_row = (work_clock() - begun) / len(block)
-    if table is None:
-        return _GUESS
-    beside_rows = len(encode(pa.Table.from_batches([], table_schema(metadata))))
-    return RowCost(seconds_per_row, max(len(encode(table)) - beside_rows, 0) / len(table), beside_rows)
+            seconds = work_clock() - begun
+    except Exception:  # the run itself will name the rows
+        return RowCost(guess, _USUAL_BYTES, beside_rows)
+    return RowCost(seconds / len(table), max(len(encode(table)) - beside_rows, 0) / len(table), beside_rows)
 
 
 def _spread_rows(rows: int, count: int) -> np.ndarray:
@@ -130,15 +124,12 @@ class Progress:
         Rows that were there when the run began, rows computed since, and rows of the whole table.
     seconds
         Since the computing began.
-    notes
-        What the user should know so far.
     """
 
     rows_before: int
     rows_computed: int
     rows: int
     seconds: float
-    notes: Sequence[str] = ()
 
     @property
     def rows_done(self) -> int:

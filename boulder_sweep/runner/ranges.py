@@ -1,8 +1,8 @@
 """How many rows a part and a block have, and what is done with them; the same on every machine.
 
 The numbers follow from the class of the designs by a fixed table of costs, never from a clock. A block that raises is
-tried again, then halved until the rows that raise are alone; those become rows of verdict ``error``. Where thousands of
-tries fail, nothing more is computed.
+halved until the rows that raise are alone; those become rows of verdict ``error``. Where thousands of calls fail,
+nothing more is computed.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from boulder_sweep.errors import BackendError, ComputationError
+from boulder_sweep.errors import ComputationError
 from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST
 from boulder_sweep.judge.judged import Judged, joined, not_computed
 from boulder_sweep.locations import location_of
-from boulder_sweep.runner.pool import Fingerprint, fingerprint, other_versions_text
+from boulder_sweep.runner.pool import Fingerprint, refuse_other_versions
 from boulder_sweep.soils import is_layered
 from boulder_sweep.store.folder import Ranges, put_part, ranges_of
 from boulder_sweep.text import one_line
@@ -36,9 +36,8 @@ _STEP_S, _LOCATED_STEP_S, _LOCATED = 0.012, 0.006, 3.0
 """Steps at which these hold; where steps end at the yield, rows take three times as long at half the step."""
 _OPINION_S = 1e-5
 """Cost of a second opinion [s] per design, of which a third pass."""
-_TRIES = 2
 _FAILURES_BUDGET = 5_000
-"""Failed tries after which a run stops: something is then wrong with more than single designs."""
+"""Failed calls after which a run stops: something is then wrong with more than single designs."""
 
 
 def seconds_per_row(sweep: Sweep, evaluation: Evaluation) -> float:
@@ -87,7 +86,7 @@ class Work:
     rows_per_block
         Rows that are computed at once.
     made_by
-        What a worker elsewhere must have, see `pool.fingerprint`; one that comes later may have other versions.
+        What a worker elsewhere must have, see `pool.fingerprint`.
     """
 
     evaluate: Callable[[DesignBlock], Judged]
@@ -117,8 +116,8 @@ class Work:
         BackendError
             This worker has other versions.
         """
-        if self.made_by is not None and fingerprint() != self.made_by:
-            raise BackendError(other_versions_text("a worker"))
+        if self.made_by is not None:
+            refuse_other_versions(self.made_by)
         from boulder_sweep.store.part import encoded_part  # imports pyarrow
 
         pieces = []
@@ -136,25 +135,22 @@ class Work:
             for number in range(count)
         )
 
-    def judged(self, start: int, stop: int, tries: int = _TRIES) -> Judged:
-        """Compute the rows [start, stop); those that fail every time are rows of verdict ``error``.
+    def judged(self, start: int, stop: int) -> Judged:
+        """Compute the rows [start, stop); those that raise alone are rows of verdict ``error``.
 
         Raises
         ------
         ComputationError
-            So many tries have failed, of these rows or others, that something must be wrong with all of them.
+            So many calls have failed, of these rows or others, that something must be wrong with all of them.
         """
-        reason = ""
-        for _ in range(tries):
-            try:
-                return self.evaluate(self.make_block(start, stop))
-            except Exception as problem:
-                self._failures += 1
-                reason = one_line(problem)
+        try:
+            return self.evaluate(self.make_block(start, stop))
+        except Exception as problem:
+            self._failures += 1
+            reason = one_line(problem)
         if self._failures >= _FAILURES_BUDGET:
             raise ComputationError(f"{self._failures:,} attempts to compute designs failed, the last with: {reason}")
         if stop - start > 1:
             middle = (start + stop) // 2
-            return joined([self.judged(start, middle, 1), self.judged(middle, stop, 1)])
-        reasons = (f"the computation of this design failed: {reason}",)
-        return not_computed(reasons, np.zeros(stop - start, dtype=np.int32))
+            return joined([self.judged(start, middle), self.judged(middle, stop)])
+        return not_computed((f"the computation of this design failed: {reason}",), np.zeros(1, dtype=np.int32))

@@ -35,7 +35,6 @@ from boulder_sweep.runner.pool import (
     check_jobs,
     cluster,
     fingerprint,
-    telling_start_failure,
 )
 from boulder_sweep.runner.progress import (
     Estimate,
@@ -167,18 +166,17 @@ def run(
     with noted_signals() as signals, _folder(out):
         signals.defer()
         whole = _Run(out, signals, sweep.n_designs, jobs, backend, scheduler)
-        whole.is_counted = not resume
+        whole.before = None if resume else 0
         try:
-            with telling_start_failure(jobs):
-                signals.call(lambda: _refuse_taken(out, resume, overwrite))
-                if said := too_large(sweep.n_designs, "at least", sweep.n_designs if not resume else 0, out):
-                    raise failures.DoesNotFitError(said)  # a row takes a byte or more; nothing is compiled yet
-                plan = signals.call(lambda: _planned(sweep, simulate))
-                plan.there = signals.call(lambda: _there(plan, out, overwrite))
-                whole.done, whole.is_counted = plan.rows_done, True
-                firmness = signals.call(lambda: _firmness(plan, out))
-                whole.compute(plan, plan.metadata(firmness), progress)
-                signals.call(lambda: _check_whole(out, plan, whole.written))
+            signals.call(lambda: _refuse_taken(out, resume, overwrite))
+            if said := too_large(sweep.n_designs, "at least", sweep.n_designs if not resume else 0, out):
+                raise failures.DoesNotFitError(said)  # a row takes a byte or more; nothing is compiled yet
+            plan = signals.call(lambda: _planned(sweep, simulate))
+            plan.there = signals.call(lambda: _there(plan, out, overwrite))
+            whole.before = plan.rows_done
+            firmness = signals.call(lambda: _firmness(plan, out))
+            whole.compute(plan, plan.metadata(firmness), progress)
+            signals.call(lambda: _check_whole(out, plan, whole.written))
         except Interrupted as stop:
             raise Interrupted(stop.signum, whole.rows_safe, sweep.n_designs, again) from None
         except (ClusterLostError, ComputationError, failures.WriteError) as problem:
@@ -211,10 +209,8 @@ class _Run:
 
     Attributes
     ----------
-    done : int
-        Rows that are safe,
-    is_counted : bool
-        and whether rows of an earlier run are among them.
+    before : int or None
+        Rows of an earlier run; None where they are not counted yet.
     written : list of PartReport
         Parts written by this run.
     jobs : int
@@ -224,7 +220,8 @@ class _Run:
     def __init__(
         self, out: Location, signals: Signals, rows: int, jobs: int, backend: str, scheduler: str | None
     ) -> None:
-        self.done, self.written, self.jobs, self.is_counted = 0, list[PartReport](), jobs, True
+        self.before: int | None = None
+        self.written, self.jobs = list[PartReport](), jobs
         self._out, self._signals, self._rows = out, signals, rows
         self._backend, self._scheduler = backend, scheduler
         self._stopped = threading.Event()
@@ -234,7 +231,11 @@ class _Run:
     @property
     def rows_safe(self) -> int | None:
         """Rows that are safe; None where nobody knows yet."""
-        return self.done if self.is_counted else None
+        return None if self.before is None else self.before + self._rows_written
+
+    @property
+    def _rows_written(self) -> int:
+        return sum(part.rows for part in self.written)
 
     def compute(self, plan: _Plan, metadata: dict[bytes, bytes], progress: Report | None) -> None:
         """Compute and write what is missing; raises as `run`."""
@@ -248,8 +249,7 @@ class _Run:
                 thread.join(_LOOK_EVERY_S)
                 self._signals.check()
                 if progress is not None:
-                    seconds = time.monotonic() - begun
-                    progress(Progress(before, self._ticked, self._rows, seconds, _notes(plan)))
+                    progress(Progress(before, self._ticked, self._rows, time.monotonic() - begun))
         except BaseException:
             self._stopped.set()
             thread.join(_PATIENCE_S)
@@ -283,7 +283,7 @@ class _Run:
             self.jobs = workers.jobs
             for part in workers((call(_written, work, *bounds) for bounds in self._missing(plan)), work):
                 self._note(part)
-                self._ticked = self.done - plan.rows_done
+                self._ticked = self._rows_written
                 if self._stopped.is_set():
                     return
 
@@ -294,7 +294,6 @@ class _Run:
     def _note(self, part: PartReport | Exception) -> None:
         if isinstance(part, PartReport):
             self.written.append(part)
-            self.done += part.rows
         else:  # what is in hand ends, and nothing more is begun
             self._problem = self._problem or part
             self._stopped.set()
@@ -330,13 +329,7 @@ def _folder(out: Location) -> Iterator[None]:
 
 
 def _names_in(out: Location) -> list[str]:
-    """Return the names in a folder of parts.
-
-    Raises
-    ------
-    WriteError
-        It cannot be read.
-    """
+    """Return the names in a folder of parts."""
     try:
         return names_in(out)
     except OSError as problem:
@@ -344,23 +337,23 @@ def _names_in(out: Location) -> list[str]:
 
 
 def _refuse_taken(out: Location, resume: bool, overwrite: bool) -> None:
-    """Refuse a folder that holds something else, or a result that is neither continued nor replaced.
-
-    Raises
-    ------
-    StoreError
-        Says what it holds.
-    """
+    """Refuse a folder that holds something else, or a result that is neither continued nor replaced."""
     names = _names_in(out)
     parts = part_files(names)
     strange = [name for name in names if not part_file(name) and not name.startswith(".")]
-    if strange and not parts:
-        raise failures.ForeignFilesError(out, strange)
-    if strange := [name for name in strange if name.endswith(".parquet")]:
-        raise failures.ForeignFilesError(out, strange)  # readers would take them for rows
+    if parts:  # readers would take other tables for rows
+        strange = [name for name in strange if name.endswith(".parquet")]
+    if strange:
+        shown = ", ".join(strange[:5]) + (f" and {len(strange) - 5} more" if len(strange) > 5 else "")
+        raise failures.ForeignFilesError(
+            f"{out} contains files that no sweep wrote ({shown}): choose another folder or move them"
+        )
     if parts and not (resume or overwrite):
         there = FinishedRows(out)
-        raise failures.OutputExistsError(out, there.rows_done, there.rows)
+        state = f"is finished: see it with `sweep report {out}`, or"
+        if there.rows_done < there.rows:
+            state = f"holds {there.rows_done:,} of {there.rows:,} rows: use --resume to continue it, or"
+        raise failures.OutputExistsError(f"{out} exists and {state} use --overwrite to start again")
     check_writable(out)
 
 
@@ -385,24 +378,22 @@ def _there(plan: _Plan, out: Location, overwrite: bool) -> Contents:
 
 
 def _same(plan: _Plan, out: Location) -> Contents:
-    """Return what a folder holds of a table.
-
-    Raises
-    ------
-    SettingsDifferError
-        It holds rows of another.
-    """
+    """Return what a folder holds of a table."""
     found = contents(out)
     here = Table(plan.identity, plan.ranges).described
     for table in {id(one.table): one.table for one in found.intact.values()}.values():
         if unlike := differences(table.described, here):
-            raise failures.SettingsDifferError(out, unlike)
+            lines = "\n  ".join(["Differences (there -> here):", *unlike])
+            raise failures.SettingsDifferError(
+                f"{out} was started with other settings or another version, and rows must not be mixed. {lines}\n"
+                f"Resume with the original settings, use --overwrite, or choose another folder"
+            )
     return found
 
 
 def _firmness(plan: _Plan, out: Location) -> dict[str, Any]:
     """Return how firm the verdicts are; and check that the table will fit."""
-    firmness = firmness_of(plan.sweep).to_dict()
+    firmness = firmness_of(plan.sweep)
     rows = plan.ranges.rows
     if plan.parts_missing and too_large(rows, "", (rows - plan.rows_done) * _MOST_BYTES_PER_ROW, out):
         plan.evaluation.warm_up()
@@ -414,15 +405,7 @@ def _firmness(plan: _Plan, out: Location) -> dict[str, Any]:
 
 
 def _check_whole(out: Location, plan: _Plan, written: list[PartReport]) -> None:
-    """Check that the parts of all workers are in the folder as this machine sees it.
-
-    Raises
-    ------
-    BackendError
-        Some are not.
-    TwoResultsError
-        Somebody else wrote other rows.
-    """
+    """Check that the parts of all workers are in the folder as this machine sees it."""
     names = _names_in(out)
     refuse_two(out, part_files(names))
     if missing := {part.name for part in written} - {*names}:
@@ -476,20 +459,14 @@ def estimate(
         plan.there = _same(plan, location_of(out))
     plan.evaluation.warm_up()
     cores = available_cores()
-    cost = take_sample(plan.evaluation, sweep, plan.metadata(firmness_of(sweep).to_dict()))
+    cost = take_sample(plan.evaluation, sweep, plan.metadata(firmness_of(sweep)))
     missing = sweep.n_designs - plan.rows_done
     needed = time_and_disk(cost, missing, plan.parts_missing, min(jobs or cores, cores))
     return Estimate(sweep.n_designs, missing, *needed, jobs or cores, plan.there.damaged)
 
 
 def _check_arguments(sweep: Sweep, jobs: int | None, progress: Report | None) -> None:
-    """Refuse arguments of wrong types and counts below one, by name.
-
-    Raises
-    ------
-    TypeError, ValueError
-        Says what is allowed.
-    """
+    """Refuse arguments of wrong types and counts below one, by name."""
     from boulder_sweep.settings import Sweep
 
     if not isinstance(sweep, Sweep):

@@ -18,7 +18,7 @@ from boulder_sweep.settings import fields
 from boulder_sweep.settings.distributions import BOUNDED, Distribution, SetDistributions
 from boulder_sweep.settings.entries import Entries
 from boulder_sweep.settings.fields import BY_NAME, Field
-from boulder_sweep.settings.model import WATER_KG_M3, Layer, Model, SolverSettings
+from boulder_sweep.settings.model import CLOSED_FORM, ENOUGH_ELEMENTS, WATER_KG_M3, Layer, Model, SolverSettings
 from boulder_sweep.settings.problems import Position, Problem
 from boulder_sweep.settings.sweep import Sweep
 from boulder_sweep.settings.values import is_unusual, range_words
@@ -262,6 +262,9 @@ def _remarks(sweep: Sweep, written: Mapping[str, str]) -> Iterator[tuple[str, st
     limit, usual = sweep.criterion.max_rotation_deg, BY_NAME["max_rotation_deg"].usual
     if usual is not None and limit > usual.high:
         yield "criterion.max_rotation", f"{limit:g} deg is large: {usual.remark}"
+    if sweep.model.has_few_elements:
+        few = f"{counted(sweep.model.soil_elements, 'soil element')}: sums over so few may give other verdicts"
+        yield "model.soil", f"{few}; take {ENOUGH_ELEMENTS} or more, or {CLOSED_FORM}"
     if sweep.partial_factor != 1.0:
         angles = values["friction_angle_deg"]
         ends = " to ".join(dict.fromkeys((f"{angles.min():.4g}", f"{angles.max():.4g}")))

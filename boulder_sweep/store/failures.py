@@ -28,36 +28,11 @@ class OutputExistsError(StoreError):
 
     exit_code = EXIT_CONFLICT
 
-    def __init__(self, out: Location, rows_done: int, rows: int):
-        self.out, self.rows_done, self.rows = out, rows_done, rows
-        if rows_done == rows:
-            state = f"is finished: see it with `sweep report {out}`, or"
-        else:
-            state = f"holds {rows_done:,} of {rows:,} rows: use --resume to continue it, or"
-        super().__init__(f"{out} exists and {state} use --overwrite to start again")
-
 
 class SettingsDifferError(StoreError):
-    """Resuming would mix rows of different settings, kernels or versions.
-
-    Parameters
-    ----------
-    out
-        The output folder.
-    differences
-        One line each: entry, value there and here.
-    """
+    """Resuming would mix rows of different settings, kernels or versions."""
 
     exit_code = EXIT_CONFLICT
-
-    def __init__(self, out: Location, differences: list[str]):
-        self.out, self.differences = out, differences
-        lines = "".join(f"\n  {difference}" for difference in differences)
-        super().__init__(
-            f"{out} was started with other settings or another version, and rows must not be mixed. "
-            f"Differences (there -> here):{lines}\n"
-            f"Resume with the original settings, use --overwrite, or choose another folder"
-        )
 
 
 class FolderInUseError(StoreError):
@@ -71,32 +46,15 @@ class ForeignFilesError(StoreError):
 
     exit_code = EXIT_CONFLICT
 
-    def __init__(self, out: Location, names: list[str]):
-        self.out, self.names = out, names
-        shown = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
-        super().__init__(f"{out} contains files that no sweep wrote ({shown}): choose another folder or move them")
-
 
 class NotASweepError(StoreError):
     """There is no sweep result at the given location."""
 
 
 class OtherVersionError(StoreError):
-    """A result is in the format of another version.
-
-    Parameters
-    ----------
-    out
-        The folder.
-    said
-        Which version wrote it, and what to do, see `provenance.other_version`.
-    """
+    """A result is in the format of another version."""
 
     exit_code = EXIT_CONFLICT
-
-    def __init__(self, out: Location, said: str):
-        self.out = out
-        super().__init__(f"{out} {said}. `sweep run` writes into another folder, or into this one once it is empty")
 
 
 class DamagedError(StoreError):
@@ -109,13 +67,6 @@ class TwoResultsError(DamagedError):
     """Two parts hold the same rows with different content."""
 
     exit_code = EXIT_CONFLICT
-
-    def __init__(self, out: Location, first: str, second: str):
-        self.out, self.names = out, (first, second)
-        super().__init__(
-            f"{out} holds two different results for the same rows: {first} and {second}. `sweep run` of "
-            f"its settings file with --resume removes a damaged one; if both are intact, remove the wrong one"
-        )
 
 
 class ImpossibleRecordsError(DamagedError):

@@ -270,13 +270,7 @@ def locked(out: Location) -> Iterator[None]:
 
 
 def _runtime_folder() -> Path:
-    """Return a folder of this user for what lasts as long as processes.
-
-    Raises
-    ------
-    OSError
-        There is none that is the user's own.
-    """
+    """Return a folder of this user for what lasts as long as processes."""
     given = os.environ.get("XDG_RUNTIME_DIR")
     place = given or os.environ.get("TMPDIR") or "/tmp"
     folder = Path(place) / ("boulder-sweep" if given else f"boulder-sweep-{os.getuid()}")

@@ -11,6 +11,7 @@ import warnings
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import islice
 from multiprocessing.pool import ThreadPool
@@ -133,10 +134,7 @@ def _described(folder: Location, part: PartFile, known: dict[frozenset[Any], Tab
             return f"cannot be read: {problem.strerror}"
         raise failures.StoreError(f"{folder} cannot be read: {why(problem)}") from None  # says nothing of the part
     try:
-        file = _opened(_source(content, part))
-        common = frozenset(common_in(file.schema.metadata).items())
-        table = known.get(common) or _table_of(folder, part, file)
-        known[common] = table
+        file, table = _looked_at(folder, part, _source(content, part), known)
         return PartSummary(table, _own(folder, part, file, table), len(content))
     except (failures.DamagedError, ParquetError) as problem:
         return problem.what if isinstance(problem, failures.ImpossibleRecordsError) else str(problem)
@@ -151,24 +149,25 @@ def _source(content: bytes, part: PartFile) -> Any:
     return pa.BufferReader(content)
 
 
-def _opened(source: Any) -> TableFile:
-    return TableFile(source, _MOST_PART_ROWS, _MOST_PART_BYTES)
+def _looked_at(
+    folder: Location, part: PartFile, source: Any, known: dict[frozenset[Any], Table]
+) -> tuple[TableFile, Table]:
+    """Open a part; return its file, and what it says of its table."""
+    file = TableFile(source, _MOST_PART_ROWS, _MOST_PART_BYTES)
+    common = frozenset(common_in(file.schema.metadata).items())
+    if common not in known:
+        known[common] = _table_of(folder, part, file)
+    return file, known[common]
 
 
 def _table_of(folder: Location, part: PartFile, file: TableFile) -> Table:
-    """Return what an opened part says of its table.
-
-    Raises
-    ------
-    OtherVersionError
-        It is in the format of another version.
-    ImpossibleRecordsError
-        It says what no sweep writes.
-    """
+    """Return what an opened part says of its table."""
     try:
         said = identity_in(common_in(file.schema.metadata))
         if other := other_version(said):
-            raise failures.OtherVersionError(folder, other)
+            raise failures.OtherVersionError(
+                f"{folder} {other}. `sweep run` writes into another folder, or into this one once it is empty"
+            )
         rows, count, _ = (said.pop(key, None) for key in ("rows", "ranges", "firmness"))
         check_identity(said)
         if not (type(rows) is type(count) is int and 1 <= count <= rows <= _MOST_ROWS):
@@ -179,13 +178,7 @@ def _table_of(folder: Location, part: PartFile, file: TableFile) -> Table:
 
 
 def _own(folder: Location, part: PartFile, file: TableFile, table: Table) -> dict[str, int]:
-    """Return the rows of an opened part by verdict, once it holds the rows that its name says, in all columns.
-
-    Raises
-    ------
-    ImpossibleRecordsError
-        It holds others.
-    """
+    """Return the rows of an opened part by verdict, once it holds the rows that its name says, in all columns."""
     ranges = table.ranges
     try:
         said = identity_in({key: value for key, value in (file.schema.metadata or {}).items() if is_own(key)})
@@ -206,13 +199,7 @@ def _counts(verdicts: Mapping[str, Any]) -> Iterator[int]:
 
 
 def _parts_in(folder: Location) -> list[PartFile]:
-    """Return the parts in a folder, in the order of their rows.
-
-    Raises
-    ------
-    StoreError
-        The folder cannot be read.
-    """
+    """Return the parts in a folder, in the order of their rows."""
     try:
         return part_files(names_in(folder))
     except NotADirectoryError:
@@ -233,7 +220,10 @@ def refuse_two(folder: Location, parts: Sequence[PartFile]) -> None:
     for part in parts:
         other = seen.setdefault(part.first, part)
         if other is not part:
-            raise failures.TwoResultsError(folder, other.name, part.name)
+            raise failures.TwoResultsError(
+                f"{folder} holds two different results for the same rows: {other.name} and {part.name}. `sweep run` of "
+                f"its settings file with --resume removes a damaged one; if both are intact, remove the wrong one"
+            )
 
 
 def refuse_no_result(folder: Location) -> None:
@@ -305,7 +295,10 @@ class FinishedRows:
         self._parts = _parts_in(folder)
         if not self._parts:
             refuse_no_result(folder)
-        self._table = self._look_at(self._parts[0])
+        self._known = dict[frozenset[Any], Table]()
+        with self._open(self._parts[0]) as source, self._in_words(self._parts[0]):
+            file, self._table = _looked_at(folder, self._parts[0], source, self._known)
+        self._schema = file.schema
         self.identity, ranges = self._table
         if strange := next((part for part in self._parts if (part.first, part.stop) not in ranges), None):
             raise self._damaged(strange, f"its rows are no part of a table of {ranges.rows:,} rows")
@@ -315,18 +308,6 @@ class FinishedRows:
         self.judged_by = judged_by(self.identity)
         if self.judged_by:
             warnings.warn(f"{folder} was {self.judged_by}", OlderRulesWarning, stacklevel=2)
-
-    def _look_at(self, part: PartFile) -> Table:
-        """Return what a part says of its table, and keep what the others must say, too."""
-        with self._open(part) as source:
-            try:
-                file = _opened(source)
-            except ParquetLimitError as problem:
-                raise failures.ImpossibleRecordsError(self._folder / part.name, str(problem)) from problem
-            except ParquetError as problem:
-                raise self._damaged(part, str(problem)) from problem
-            self._schema, self._common = file.schema, common_in(file.schema.metadata)
-            return _table_of(self._folder, part, file)
 
     def tables(self, columns: Sequence[str] | None = None, *, verify: bool = True) -> Iterator[pa.Table]:
         """Yield all rows in the order of the designs, a part at a time.
@@ -346,36 +327,23 @@ class FinishedRows:
         wanted = list(columns) if columns is not None else None
         return _ahead(lambda part: self._read(part, wanted, verify), self._parts)
 
-    def row(self, number: int) -> pa.Table | None:
-        """Return one row; None where it is not finished.
-
-        Raises
-        ------
-        DamagedError
-            Its part is truncated, changed or of another run.
-        """
-        at = bisect_right(self._parts, number, key=lambda part: part.first) - 1
-        if at < 0 or number >= self._parts[at].stop:
-            return None
-        return self._read(self._parts[at], None, verify=True).slice(number - self._parts[at].first, 1)
-
-    def asked(self, number: int) -> pa.Table:
-        """Return one row that a user asks for.
+    def row(self, number: int) -> pa.Table:
+        """Return one row, from the one part that holds it.
 
         Raises
         ------
         IndexError
             The table has no such row, or it is not computed yet.
         DamagedError
-            As for `row`.
+            Its part is truncated, changed or of another run.
         """
         if not 0 <= number < self.rows:
             held = counted(self.rows, "design")
             raise IndexError(f"{self._folder} has {held}, numbered from 0; there is no {number}")
-        row = self.row(number)
-        if row is None:
+        at = bisect_right(self._parts, number, key=lambda part: part.first) - 1
+        if at < 0 or number >= self._parts[at].stop:
             raise IndexError(f"design {number} has not been computed yet; `sweep run` with --resume goes on")
-        return row
+        return self._read(self._parts[at], None, verify=True).slice(number - self._parts[at].first, 1)
 
     def _open(self, part: PartFile) -> IO[bytes]:
         """Open the file of a part."""
@@ -391,24 +359,28 @@ class FinishedRows:
 
     def _read(self, part: PartFile, columns: list[str] | None, verify: bool) -> pa.Table:
         """Read columns of a part, or all of them."""
-        with self._open(part) as source:
-            try:
-                file = _opened(_source(source.read(), part) if verify else source)
-                if common_in(file.schema.metadata) != self._common:  # or only the heading of reports is another
-                    other = _table_of(self._folder, part, file)
-                    if unlike := differences(self._table.described, other.described):
-                        raise self._damaged(part, f"of another run: {unlike[0]}")
-                if not file.schema.equals(self._schema):
-                    raise self._damaged(part, "its columns differ from the first part's")
-                table = file.read(columns)
-                _own(self._folder, part, file, self._table)
-            except ParquetLimitError as problem:
-                raise failures.ImpossibleRecordsError(self._folder / part.name, str(problem)) from problem
-            except (OSError, ParquetError) as problem:
-                raise self._damaged(part, str(problem)) from problem
-            except failures.DamagedError as problem:
-                raise self._damaged(part, CHANGED) if str(problem) == CHANGED else problem from None
+        with self._open(part) as source, self._in_words(part):
+            checked = _source(source.read(), part) if verify else source
+            file, other = _looked_at(self._folder, part, checked, self._known)
+            if other is not self._table and (unlike := differences(self._table.described, other.described)):
+                raise self._damaged(part, f"of another run: {unlike[0]}")
+            if not file.schema.equals(self._schema):
+                raise self._damaged(part, "its columns differ from the first part's")
+            table = file.read(columns)
+            _own(self._folder, part, file, self._table)
         return table if columns is None else table.select(columns)
+
+    @contextmanager
+    def _in_words(self, part: PartFile) -> Iterator[None]:
+        """Say of what is wrong with a part which it is, and what to do."""
+        try:
+            yield
+        except ParquetLimitError as problem:
+            raise failures.ImpossibleRecordsError(self._folder / part.name, str(problem)) from problem
+        except (OSError, ParquetError) as problem:
+            raise self._damaged(part, str(problem)) from problem
+        except failures.DamagedError as problem:
+            raise self._damaged(part, CHANGED) if str(problem) == CHANGED else problem from None
 
     def _damaged(self, part: PartFile, what: str) -> failures.DamagedError:
         """Return the error that says what is damaged and what to do."""
@@ -421,19 +393,6 @@ class FinishedRows:
 def finished_table(folder: Location, columns: Sequence[str] | None = None, *, verify: bool = True) -> pa.Table:
     """Read the finished parts of a folder as one Arrow table; otherwise as `read`."""
     return _read(folder, columns, verify)[0]
-
-
-def read_row(folder: Location, design_id: int) -> pa.Table:
-    """Read one row of a result, from the one part that holds it.
-
-    Raises
-    ------
-    IndexError
-        The table has no such row, or it is not computed yet.
-    DamagedError
-        The part is truncated or changed.
-    """
-    return FinishedRows(folder).asked(design_id)
 
 
 def _read(folder: Location, columns: Sequence[str] | None, verify: bool) -> tuple[pa.Table, FinishedRows]:

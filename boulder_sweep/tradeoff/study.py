@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from boulder_kernels import OutcomeTable, Readings, Status, as_printed, corrected
+from boulder_kernels import OutcomeTable, Readings, Status, as_printed, corrected, simulate_table
 from boulder_kernels._jit import plain
 from boulder_kernels.control import STEP_RATIO
 from boulder_kernels.settling import proof_is_possible
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import NothingToMeasureError
-from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST, STEPS, STEPS_PRINTED, Accuracy, Steps, readings_of, simulated
+from boulder_sweep.judge.accuracy import ELEMENTS_AS_FAST, STEPS, STEPS_PRINTED, Accuracy, Steps, readings_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.inputs import Designs, sampled_designs
 from boulder_sweep.judge.judged import FAIL, PASS, UNDECIDED
@@ -171,7 +171,7 @@ def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS) -
                 locate_yield=method.locate_yield,
                 paired=not method.checked,
             )
-            return simulated(some, readings, how)
+            return simulate_table(some.table, readings, how)
 
         known = None
         for method, accuracy in _methods(name, readings):

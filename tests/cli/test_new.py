@@ -80,13 +80,13 @@ def _problems(path):
 
 def test_it_writes_once(sweep, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    code, out, err = sweep("new", "a b.yaml", "--yes")
+    code, out, err = sweep("new", "a b.yaml")
     assert (code, err) == (0, "")
     assert re.fullmatch(r"a b.yaml: \d+ designs. Edit it, then:\n  sweep need 'a b.yaml'\n", out)
     assert "#   sweep check 'a b.yaml' " in (tmp_path / "a b.yaml").read_text()
     assert load("a b.yaml").name == "a-b"
     before = (tmp_path / "a b.yaml").read_bytes()
-    assert sweep("new", "a b.yaml", "--yes") == (4, "", "error: a b.yaml exists already; name another file\n")
+    assert sweep("new", "a b.yaml") == (4, "", "error: a b.yaml exists already; name another file\n")
     assert (tmp_path / "a b.yaml").read_bytes() == before
 
 
@@ -111,7 +111,7 @@ def test_it_asks_three_questions_on_a_terminal(sweep, tmp_path, monkeypatch):
 @pytest.mark.parametrize("file", ["+x.yaml", "two\nlines.yaml", "x\udcff.yaml", "--.yaml"])
 def test_any_name_of_a_file_gives_a_valid_file(sweep, tmp_path, file):
     path = tmp_path / file
-    code, _, err = sweep("new", path, "--yes")
+    code, _, err = sweep("new", path)
     assert (code, err) == (0, "")
     assert load(path).n_designs == 70
 
@@ -146,7 +146,7 @@ def test_options_take_the_place_of_the_questions(sweep, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
     monkeypatch.setattr("click.prompt", lambda *_, **__: pytest.fail("asked"))
-    code, out, err = sweep("new", "--class", "m40", "--units", "us", "-o", "site.yaml")
+    code, out, err = sweep("new", "--class", "m40", "--units", "us", "site.yaml")
     assert (code, err) == (0, "")
     assert re.fullmatch(r"site.yaml: \d+ designs. Edit it, then:\n  sweep need site.yaml\n", out)
     text = (tmp_path / "site.yaml").read_text()

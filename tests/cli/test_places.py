@@ -112,7 +112,7 @@ def test_no_command_writes_through_a_link(sweep, result):
 
 def test_a_new_file_is_not_made_where_a_link_points(sweep, result):
     Path("new.yaml").symlink_to("nowhere")
-    code, _, err = sweep("new", "new.yaml", "--yes")
+    code, _, err = sweep("new", "new.yaml")
     assert code == 4
     assert "new.yaml exists already" in err
     assert not Path("nowhere").exists()

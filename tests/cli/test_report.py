@@ -111,14 +111,6 @@ def test_the_passes_that_are_lost_are_counted_and_listed_with_their_inputs(sweep
     assert lines[at + 1] == "    height 11.81 ft"
 
 
-def test_results_with_nothing_in_common_are_not_compared(sweep, possible_grid):
-    sweep("run", possible_grid, "-q", "-o", "a.sweep")
-    sweep("run", possible_grid, "-q", "-o", "b.sweep", "--set", "boulder.height=[1.7, 2.7] m")
-    code, out, err = sweep("compare", "a.sweep", "b.sweep")
-    assert (code, out) == (2, "")
-    assert err.startswith("error: a.sweep and b.sweep have no design in common: boulder height has 3 values")
-
-
 @pytest.fixture
 def headed(possible_grid):
     """Return the grid with a heading in the file."""

@@ -9,10 +9,8 @@ import re
 import signal
 import subprocess
 import sys
-import threading
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, NoReturn
 
 import pytest
@@ -26,7 +24,7 @@ from boulder_sweep.judge.accuracy import Accuracy, Steps
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.runner.run import resuming
 from tests.conftest import Command
-from tests.waiting import HANG_GUARD_S, wait_until
+from tests.waiting import wait_until
 
 COMMAND = [sys.executable, "-m", "boulder_sweep"]
 
@@ -127,32 +125,6 @@ def test_a_reader_that_goes_away_is_no_error(grid, words):
     assert done.stderr == ""
 
 
-TALKATIVE = """
-import sys
-from boulder_sweep.cli import main, output
-output.PLAIN_EVERY_S = -1.0
-main.main(sys.argv[1:])
-"""
-
-
-@pytest.mark.faults
-@pytest.mark.parametrize(("signum", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_signals_end_a_run_with_their_code_and_the_command_to_go_on(possible_grid, signum, code):
-    words = ["run", "grid.yaml", "--set", "boulder.length={from: 1 m, to: 2 m, count: 1000000}"]
-    command = [sys.executable, "-c", TALKATIVE, *words]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert any(re.search(r"[1-9][\d,]* of 18,000,000 designs", line) for line in process.stderr)
-    process.send_signal(signum)
-    out, err = process.communicate(timeout=HANG_GUARD_S)  # hang guard
-    assert process.returncode == code
-    assert out == ""
-    assert "Traceback" not in err
-    assert (
-        "sweep run grid.yaml -o small-grid.sweep --set 'boulder.length={from: 1 m, to: 2 m, count: 1000000}' --resume"
-        in err
-    )
-
-
 WORDS = (
     "interrupted by SIGINT; 5 of 18 rows are safe. Resume with:",
     "  sweep run grid.yaml -o small-grid.sweep --resume",
@@ -202,33 +174,6 @@ def test_it_is_said_before_a_second_signal_can_end_the_process(
     assert (code, out) == (130, "")
     assert len(before) == 1
     assert all(line in before[0] for line in WORDS)
-
-
-def test_it_is_said_where_the_bar_takes_its_time(
-    sweep: Command, closing: Callable[[Callable[[], None]], None], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The thread that waits for the command looks for signals meanwhile."""
-    looks, waited = list[None](), list[bool]()
-
-    class CountingThread(threading.Thread):
-        def is_alive(self) -> bool:
-            looks.append(None)
-            return super().is_alive()
-
-    functions = {name: getattr(threading, name) for name in ("current_thread", "main_thread")}
-    monkeypatch.setattr(signals, "threading", SimpleNamespace(Thread=CountingThread, **functions))
-
-    def several_looks() -> None:
-        enough = len(looks) + 3
-        wait_until(lambda: len(looks) >= enough or signals._installed is None, "the waiting thread looked thrice")
-        waited.append(len(looks) >= enough)
-
-    closing(several_looks)
-    code, out, err = sweep("run", "grid.yaml")
-    assert (code, out) == (130, "")
-    assert waited == [True]
-    assert err.count("interrupted by SIGINT") == 1
-    assert all(line in err for line in WORDS)
 
 
 COMPILING = "compiling kernels"

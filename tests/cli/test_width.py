@@ -15,7 +15,7 @@ US = ("--units", "us")
 DEEP = "site.embedment_depth=1.9 m"
 """In place of the depth that is to be found."""
 WORDS = {
-    "new": ("made.yaml", "--yes"),
+    "new": ("made.yaml",),
     "run": (SITE, "--set", DEEP),
     "check": (CONFIGS / "m30_sizing.yaml",),
     "stone": (CONFIGS.parent / "docs" / "examples" / "rock.ply", "--mass", "23.5 t"),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import signal
 import subprocess
 import sys
 import threading
@@ -55,10 +54,6 @@ class Cluster:
         """Kill the scheduler at once."""
         self.scheduler.kill()
         self.scheduler.wait()
-
-    def pause_scheduler(self) -> None:
-        """Let the scheduler hang."""
-        self.scheduler.send_signal(signal.SIGSTOP)
 
     def _start(self, *words: str) -> subprocess.Popen[str]:
         """Start a command of Dask."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import threading
 import time
 import uuid
@@ -15,8 +14,8 @@ from boulder_kernels import Control, DesignTable, OutcomeTable, Readings
 from tests.runner.grids import plausible
 from tests.waiting import wait_until
 
-POISON, MAIN_PROCESS = "TEST_POISON", "TEST_MAIN_PROCESS"
-"""Environment variables: the subgrade reactions that do harm [MN/m^3], and the process that must not die of them."""
+POISON = "TEST_POISON"
+"""Environment variable: the subgrade reactions that do harm [MN/m^3]."""
 BAR = "TEST_BAR"
 """Environment variable: the folder of a `Bar`."""
 _BEFORE_THE_RUN = "interruptible work"
@@ -100,13 +99,6 @@ def poisoned(table: DesignTable) -> bool:
     """Whether a design of the table does harm."""
     harmful = [float(value) for value in os.environ[POISON].split()]
     return bool(np.isin(np.round(table.beta, 6), harmful).any())
-
-
-def ends_its_worker(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
-    """Die of a design, like a crash in compiled code."""
-    if poisoned(table) and os.getpid() != int(os.environ[MAIN_PROCESS]):
-        os.kill(os.getpid(), signal.SIGKILL)
-    return plausible(table, readings, control)
 
 
 def raises(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:

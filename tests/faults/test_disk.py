@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -13,7 +11,6 @@ import pytest
 from boulder_sweep.runner import progress as limits
 from boulder_sweep.runner.run import run
 from boulder_sweep.store.failures import DoesNotFitError, StoreError, WriteError
-from tests.faults.processes import ROOT
 from tests.runner.grids import grid, grid_of, plausible
 from tests.store.folders import nothing_left, parts_of, rows_done
 
@@ -116,26 +113,3 @@ def test_a_read_only_disk_is_refused_before_any_work(small_disk, tmp_path):
 
 def _never(table, readings, control):
     raise AssertionError("nothing may be computed")
-
-
-_NO_LONG_FILES = """
-import resource, sys
-resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
-from boulder_sweep.store.failures import WriteError
-from boulder_sweep.runner.run import run
-from tests.store.folders import nothing_left, parts_of, rows_done
-from tests.runner.grids import grid_of, plausible
-try:
-    run(grid_of(20_000), sys.argv[1], simulate=plausible)
-except WriteError as problem:
-    print(problem)
-    sys.exit(problem.exit_code)
-"""
-
-
-def test_a_limit_on_the_size_of_files_stops_the_run_with_words(tmp_path):
-    command = [sys.executable, "-c", _NO_LONG_FILES, str(tmp_path / "out")]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 2, done.stderr
-    assert "File too large" in done.stdout
-    assert list(tmp_path.iterdir()) == []

@@ -103,13 +103,3 @@ def test_writers_at_once_without_a_lock_do_no_harm(tmp_path, bar, round_):
         assert [code for code, *_ in pool.map(write, range(3))] == [3, 3, 3]
     assert parts_of(out) == parts_of(tmp_path / "whole")
     assert nothing_left(out)
-
-
-def test_a_killed_run_is_no_obstacle(tmp_path, bar):
-    out = tmp_path / "out"
-    first = Driver(out, *OPTIONS, **bar.environment)
-    wait_for_rows(out, HALF)
-    first.signal(signal.SIGKILL)
-    first.end()
-    assert run(grid_of(ROWS), out, resume=True, simulate=plausible).rows_computed == ROWS - HALF
-    assert nothing_left(out)

@@ -6,12 +6,10 @@ import signal
 
 import pytest
 
-from boulder_sweep.runner.run import run
 from boulder_sweep.store.reading import finished_table
 from tests.faults.faulty import Bar
 from tests.faults.processes import Driver, signalled
-from tests.runner.grids import grid_of, plausible
-from tests.store.folders import nothing_left, parts_of, rows_done
+from tests.store.folders import nothing_left, rows_done
 from tests.waiting import wait_until
 
 pytestmark = pytest.mark.faults
@@ -63,17 +61,6 @@ def test_a_run_stops_soon_keeps_what_is_done_and_says_how_to_go_on(tmp_path, bar
     assert nothing_left(out)
     assert rows_done(out) == REACHED
     assert finished_table(out)["design_id"].to_pylist() == list(range(REACHED))
-
-
-def test_an_interrupted_run_goes_on_to_the_same_table(tmp_path, bar):
-    out = tmp_path / "out"
-    driver = held_up(out, bar)
-    driver.signal(signal.SIGINT)
-    assert driver.end()[0] == 130
-    again = run(grid_of(ROWS), out, resume=True, simulate=plausible)
-    assert again.rows_computed == ROWS - REACHED
-    run(grid_of(ROWS), tmp_path / "whole", simulate=plausible)
-    assert parts_of(out) == parts_of(tmp_path / "whole")
 
 
 @pytest.mark.parametrize("backend", ["threading", pytest.param("dask", marks=pytest.mark.nightly)])

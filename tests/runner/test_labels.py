@@ -48,17 +48,6 @@ def test_the_name_of_the_soil_is_a_column(soils: Sweep, tmp_path: Path) -> None:
     assert plain.sort_values("design_id").soil.tolist() == table.soil.tolist()
 
 
-def test_it_survives_a_resume(soils: Sweep, tmp_path: Path) -> None:
-    out, whole = tmp_path / "parts.sweep", tmp_path / "whole.sweep"
-    run(soils, whole, simulate=plausible, jobs=1)
-    run(soils, out, simulate=plausible, jobs=1)
-    parts = sorted(out.glob("rows-*.parquet"))
-    assert len(parts) == 4
-    parts[1].unlink()
-    run(soils, out, simulate=plausible, jobs=1, resume=True)
-    pd.testing.assert_frame_equal(read(out), read(whole))
-
-
 def test_ids_of_a_table_are_carried_into_the_result(tmp_path: Path) -> None:
     lines = "".join(f"B-{k:03d},{5 + 0.1 * k:.1f}\n" for k in range(30))
     (tmp_path / "designs.csv").write_text("boulder_id,boulder_height_ft\n" + lines)
@@ -71,8 +60,3 @@ def test_ids_of_a_table_are_carried_into_the_result(tmp_path: Path) -> None:
     table = read(tmp_path / "table.sweep")
     assert table.boulder_id.tolist() == [f"B-{k:03d}" for k in range(30)]
     assert table.boulder_height_m.tolist() == pytest.approx([(5 + 0.1 * k) * 0.3048 for k in range(30)])
-
-
-def test_another_name_is_another_result(soils: Sweep, tmp_path: Path) -> None:
-    (tmp_path / "soils.yaml").write_text(SOILS.replace("loose", "poor"))
-    assert load(tmp_path / "soils.yaml").resolved() != soils.resolved()

@@ -54,13 +54,6 @@ def test_a_failure_on_a_cluster_is_told_in_one_line(fails, words):
         list(workers([call(globals()[fails], 1)]))
 
 
-@pytest.mark.parametrize("started", [0, 2])
-def test_threads_that_the_system_does_not_start_are_told_in_one_line(no_more_threads, started):
-    no_more_threads(started)
-    with pytest.raises(BackendError, match="the system cannot start 3,000 threads; give a smaller number of --jobs"):
-        list(Pool(3000)(call(times, value) for value in range(9)))
-
-
 def test_other_failures_of_calls_are_passed_on():
     with pytest.raises(ZeroDivisionError, match="by chance"):
         list(Pool(2)([call(fail, 1)]))

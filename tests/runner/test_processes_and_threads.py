@@ -100,39 +100,6 @@ def test_a_call_returns_raises_and_is_left_at_a_signal():
         signals.call(lambda: pytest.fail("begun"))
 
 
-class CountingSignals(Signals):
-    """Tells how often somebody looked for a signal since one was caught."""
-
-    looks, _caught = threading.Semaphore(0), None
-
-    @property
-    def caught(self):
-        if self._caught is not None:
-            self.looks.release()
-        return self._caught
-
-    @caught.setter
-    def caught(self, number):
-        self._caught = number
-
-
-def test_a_call_waits_for_what_acts_on_signals_itself():
-    signals = CountingSignals()
-    closed = []
-
-    def orderly():
-        signals.defer()
-        signals.caught = signal.SIGINT
-        for _ in range(3):
-            assert signals.looks.acquire(timeout=HANG_GUARD_S)  # hang guard
-        closed.append(True)
-        signals.check()
-
-    with pytest.raises(Interrupted):
-        signals.call(orderly)
-    assert closed
-
-
 def test_within_noted_signals_others_give_the_same():
     with noted_signals() as outer, noted_signals() as inner:
         assert outer is inner

@@ -7,7 +7,7 @@ import pytest
 from boulder_sweep.errors import BackendError
 from boulder_sweep.runner import run as running
 from boulder_sweep.runner.run import run
-from boulder_sweep.store.failures import DoesNotFitError, OutputExistsError, StoreError
+from boulder_sweep.store.failures import DoesNotFitError, StoreError
 from tests.runner.grids import grid, grid_of
 
 HUGE = {
@@ -44,20 +44,6 @@ def test_an_output_that_cannot_be_written(tmp_path, name):
     with pytest.raises(StoreError):
         run(grid(), tmp_path / name)
     assert [path.name for path in tmp_path.iterdir()] == ["a file"]
-
-
-def test_an_output_that_exists(tmp_path, monkeypatch):
-    out = tmp_path / "out"
-    with monkeypatch.context() as patch:
-        from boulder_sweep.judge.accuracy import accuracy_of
-        from boulder_sweep.judge.evaluation import evaluation_of
-        from tests.runner.grids import plausible
-
-        patch.setattr(running, "accuracy_of", accuracy_of)
-        patch.setattr(running, "evaluation_of", evaluation_of)
-        run(grid_of(10), out, simulate=plausible)
-    with pytest.raises(OutputExistsError):
-        run(grid_of(10), out)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,6 @@ import duckdb
 import numpy as np
 import pandas as pd
 import polars as pl
-import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -67,14 +66,6 @@ def test_pandas_duckdb_and_polars_open_it_as_one_table_in_design_order(finished)
     assert dict(counts) == frame["verdict"].value_counts().loc[lambda n: n > 0].to_dict()
 
 
-def test_nothing_is_nan(finished):
-    out, _ = finished
-    for column in finished_table(out).itercolumns():
-        if pa.types.is_floating(column.type):
-            present = column.drop_null().to_numpy()
-            assert np.isfinite(present).all()
-
-
 def test_units_and_meanings_are_in_the_fields_and_in_what_pandas_reads(finished):
     out, _ = finished
     schema = pq.read_schema(next(out.glob("rows-*.parquet")))
@@ -124,22 +115,6 @@ def test_the_size_of_parts_changes_no_bit(finished, tmp_path, monkeypatch):
     run(grid(), tmp_path / "out")
     assert len(part_files(tmp_path / "out")) == 440
     assert same_bits(finished_table(tmp_path / "out"), finished_table(finished[0]))
-
-
-def test_blocks_change_no_bit(finished):
-    """The rows computed one by one are those computed at once."""
-    from boulder_sweep.judge.accuracy import accuracy_of
-    from boulder_sweep.judge.evaluation import evaluation_of
-    from boulder_sweep.store.part import encode, part_table
-
-    sweep = grid()
-    evaluation = evaluation_of(sweep, accuracy_of(sweep))
-    order = np.random.default_rng(0).permutation(441)[:100]
-    whole = finished_table(finished[0])
-    for row in order:
-        block = sweep.block(int(row), int(row) + 1)
-        alone = pq.read_table(pa.BufferReader(encode(part_table(block, evaluation(block), {}))))
-        assert same_bits(alone, whole.slice(int(row), 1))
 
 
 def test_impossible_rows_are_errors_with_a_reason_and_exit_3(tmp_path):

@@ -16,7 +16,7 @@ from boulder_sweep.settings.distributions import SetDistributions
 from boulder_sweep.settings.soil_readings import CORRELATION, covered_depth
 from boulder_sweep.settings.sweep import derived_words
 from boulder_sweep.settings.vehicle import Approach, G, NoApproachError
-from boulder_sweep.store.reading import read_row
+from boulder_sweep.store.reading import FinishedRows
 from tests.answers.designs import bare_need
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -51,7 +51,7 @@ def test_it_stands_for_plain_entries(tmp_path):
     rows = []
     for one, folder in ((sweep, "a"), (plain, "b")):
         run(one, tmp_path / folder)
-        rows.append(read_row(tmp_path / folder, 0).to_pylist())
+        rows.append(FinishedRows(tmp_path / folder).row(0).to_pylist())
     assert rows[0] == rows[1]
 
 

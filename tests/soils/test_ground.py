@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import boulder_sweep
-from boulder_kernels import DesignTable
+from boulder_kernels import DesignTable, simulate_table
 from boulder_kernels.ground import put_soil, slope_factor
 from boulder_kernels.pieces import PiecewiseTable, table_in_layers
 from boulder_sweep.impact.history import soil_profile
 from boulder_sweep.impact.recomputing import recompute
-from boulder_sweep.judge.accuracy import accuracy_of, simulated
+from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
-from boulder_sweep.judge.inputs import Designs, sampled_designs
+from boulder_sweep.judge.inputs import sampled_designs
 from boulder_sweep.settings.model import RESISTANCES, Ground, Layer
 from boulder_sweep.soils import SLICES, ground_of, with_soil
 from tests import oracle
@@ -98,8 +98,7 @@ def test_what_is_proportional_to_depth_is_a_factor(law: str, ground: Ground) -> 
         boulder_sweep.load("configs/rwg.yaml"), accuracy_of(boulder_sweep.load("configs/rwg.yaml"))
     )
     layered = table_in_layers(table, layers_of(table, law, ground, 1))
-    designs = (Designs(table, np.zeros(1)) for table in (folded, layered))
-    one, other = (simulated(some, evaluation.readings, evaluation.control) for some in designs)
+    one, other = (simulate_table(some, evaluation.readings, evaluation.control) for some in (folded, layered))
     assert one.status == other.status
     np.testing.assert_allclose(one[1:6], other[1:6], rtol=1e-8)
 

@@ -28,7 +28,7 @@ from boulder_sweep.store.failures import (
 )
 from boulder_sweep.store.folder import WRITING
 from boulder_sweep.store.provenance import judged_by, versions
-from boulder_sweep.store.reading import FinishedRows, contents, finished_table, read_row
+from boulder_sweep.store.reading import FinishedRows, contents, finished_table
 from tests.runner.grids import grid, plausible, same_bits
 from tests.store.damages import DAMAGES
 from tests.store.folders import (
@@ -80,12 +80,12 @@ def test_some_columns(out):
 def test_one_row(out):
     whole = finished_table(out)
     for number in (0, 109, 110, 440):
-        assert same_bits(read_row(out, number), whole.slice(number, 1))
+        assert same_bits(FinishedRows(out).row(number), whole.slice(number, 1))
     with pytest.raises(IndexError, match="has 441 designs, numbered from 0; there is no 441"):
-        read_row(out, 441)
+        FinishedRows(out).row(441)
     (out / part_of(out, 1).name).unlink()
     with pytest.raises(IndexError, match="design 110 has not been computed yet"):
-        read_row(out, 110)
+        FinishedRows(out).row(110)
 
 
 @pytest.mark.parametrize("there", [[0], [2], [0, 3], [1, 2, 3]])
@@ -108,7 +108,7 @@ def test_a_result_on_an_object_store(out):
     for name, content in parts_of(out).items():
         there.fs.pipe_file((there / name).path, content)
     assert read("memory://reading/out.sweep").equals(read(out))
-    assert read_row(there, 300).equals(read_row(out, 300))
+    assert FinishedRows(there).row(300).equals(FinishedRows(out).row(300))
 
 
 @pytest.mark.parametrize(
