@@ -13,20 +13,36 @@ Soil, foot and sides are sums over as many pieces each, of which 16 are enough: 
 are averaged exactly, strips of the foot that are narrower at its ends, and Gauss's points of the sides. Pieces are
 added up in one order, so that every processor gives the same bits. Every force is either the slope of one potential or
 takes energy out of the motion.
+
+In uniform soil all parts have the same stiffness, yield displacement and drag. In other soil each has its own, averaged
+over it exactly (`lay_soil`); the type of the constants of the planar motion says which (`part_of_soil`).
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import inlined, kernel
-from .design import Constants, Design, G, boulder_mass, passive_pressure_coefficient, soil_mass
+from ._jit import inlined, kernel, overload
+from .design import (
+    Body,
+    Constants,
+    Design,
+    G,
+    SoilMass,
+    boulder_mass,
+    passive_pressure_coefficient,
+    soil_mass,
+)
 from .dynamics import contact_displacement, contact_lever, spring_compression
+from .ground import WATER
 from .numerics import field, put, sine_versine
+from .pieces import DENSITY, FRICTION, TO, ManyPieces, SoilConstants, combined, powers_of, times
 from .soil import TINY, Kinematics, soil_kinematics
+from .soil_laws import type_of
 
 GROUP, FINEST = 16, 4
 """Pieces of the coarsest solution: two of the widest registers; and what their number may be multiplied by, twice."""
@@ -36,8 +52,12 @@ ROW = MOST + GROUP
 SETS, FOOT, STRIP, SIDE_A, SIDE_DEPTH, SIDE, ALONG_X, TURNING, LIFTING, FAR, NEAR = (ROW * n for n in range(11))
 """Offsets in the workspace: sets of the strips, where they lie along the foot, and their shares of it; points of the
 sides, and their friction per depth; what all pieces have of five sums."""
-ROOM = 11 * ROW
+STIFFNESS, YIELD, DRAG, STAYS, ROUGHNESS = (ROW * n for n in range(11, 16))
+"""Offsets of the fields of `Part`, which only the parts of a soil that is not uniform keep there."""
+ROOM = 16 * ROW
 """Numbers in the workspace."""
+LEAST_FOLLOWING = 0.1
+"""What follows a rise or fall by less counts as not following it, so that every boulder leaves the soil somewhere."""
 SIDE_POINTS = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262)
 """Gauss's four points of a length 1: the sides are four points by four."""
 SIDE_WEIGHTS = (0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692)
@@ -53,6 +73,10 @@ class Base(NamedTuple):
     """Speed c_P of a compression wave, whose impedance rho_s c_P damps the foot [m/s]."""
     slip_speed: float = 0.02
     """Speed of slip v_s at which friction has 0.71 of its full value [m/s]."""
+    water: float = math.inf
+    """Depth of the water table [m], below which soil presses on foot and sides by its weight under water."""
+    slope: float = 0.0
+    """Angle at which the ground falls away behind the boulder [rad]."""
 
 
 class HeaveOptions(NamedTuple):
@@ -67,8 +91,9 @@ class HeaveOptions(NamedTuple):
 class HeaveConstants(NamedTuple):
     """What the motion of one design depends on."""
 
-    c: Constants
-    """Constants of the planar motion, with corrected readings and the soil in closed form."""
+    c: Any
+    """Constants of the planar motion, with corrected readings and the soil in closed form: `Constants` in uniform soil
+    beside a box, `SoilConstants` where the workspace holds the parts of the soil."""
     heave: float
     """1 where the boulder may rise, else 0."""
     m_b: float
@@ -86,7 +111,11 @@ class HeaveConstants(NamedTuple):
     M_second: float
     """Sum of m_n d_n^2 [kg m^2]."""
     L: float
-    """Length of the boulder [m]."""
+    """Length of the foot [m]."""
+    l_near: float
+    """Near face right of the common centre of mass [m]."""
+    out: float
+    """Rise at which no soil holds the boulder any more [m]."""
     pieces: int
     """Parts of the soil, strips of the foot, and points of the sides: 16, 64, 144 or 256."""
     k_foot: float
@@ -125,8 +154,37 @@ def bearing_capacity_factor(phi: float) -> float:
 
 
 @kernel
+def falling_ground_factor(slope: float) -> float:
+    """Bearing capacity beside ground that falls by a slope [rad] over that of level ground, after Vesic (Eq 148)."""
+    return max(1.0 - math.tan(slope), 0.0) ** 2
+
+
+class Bed(NamedTuple):
+    """What a boulder stands on and in."""
+
+    mass: SoilMass
+    """The soil lumped on it."""
+    density: float
+    """Density of the soil at the foot [kg/m^3]."""
+    phi: float
+    """Friction angle of the soil at the foot [rad]."""
+    stress: float
+    """Effective vertical stress at the depth of the foot [Pa]."""
+    side: float
+    """Friction of both sides per mean depth of their points [N/m]; what `lay_soil` multiplies for it in other soil."""
+    deep: float
+    """Depths of embedment by which a boulder must rise beyond itself until no soil holds it."""
+
+
+@inlined
+def friction_of(phi: float, form: HeaveOptions) -> float:
+    """Coefficient of friction tan(2/3 phi) between boulder and soil (Eq 134), zero without friction."""
+    return math.tan(2.0 / 3.0 * phi) if form.friction else 0.0
+
+
+@kernel
 def heave_constants(design: Design, c: Constants, form: HeaveOptions, base: Base, fineness: int) -> HeaveConstants:
-    """Constants of the motion with heave and friction (Eqs 131-134).
+    """Constants of the motion of a box in uniform soil with heave and friction (Eqs 131-134).
 
     Parameters
     ----------
@@ -142,31 +200,45 @@ def heave_constants(design: Design, c: Constants, form: HeaveOptions, base: Base
         1 for 16 pieces, up to `FINEST`; their number grows by its square.
     """
     m_b = boulder_mass(design)
-    soil = soil_mass(design, 0)
-    a_b, b_b = 0.5 * design.L - c.c_x, 0.5 * design.H - c.c_y
     J_box = m_b / 12.0 * (design.H * design.H + design.L * design.L)
+    body = Body(m_b, J_box, 0.5 * design.L, 0.5 * design.H, design.L, 0.5 * design.L, 0.0)
+    density = design.rho_s - (WATER if base.water <= 0.0 else 0.0)
+    friction = friction_of(design.phi, form)
+    side = 2.0 * friction * (1.0 - math.sin(design.phi)) * density * G * design.L * design.d
+    bed = Bed(soil_mass(design, 0), design.rho_s, design.phi, density * G * design.d, side, 3.0)
+    return constants_on(bed, design, body, c, form, base, fineness)
+
+
+@kernel
+def constants_on(
+    bed: Bed, design: Design, body: Body, c: Any, form: HeaveOptions, base: Base, fineness: int
+) -> HeaveConstants:
+    """Constants of the motion with heave and friction (Eqs 131-134) on a bed; see `heave_constants`."""
+    m_b = body.m_b
+    soil = bed.mass
+    a_b, b_b = body.x - c.c_x, body.y - c.c_y
     foot = design.W * design.L
-    capacity = bearing_capacity_factor(design.phi)
-    friction = math.tan(2.0 / 3.0 * design.phi) if form.friction else 0.0
-    at_rest = 1.0 - math.sin(design.phi)
+    s_0 = m_b * G / (base.stiffness * foot)
     return HeaveConstants(
         c,
         1.0 if form.heave else 0.0,
         m_b,
         a_b,
         b_b,
-        J_box + m_b * (a_b * a_b + b_b * b_b),
+        body.J + m_b * (a_b * a_b + b_b * b_b),
         soil.mass,
         c.c_y * soil.mass - soil.first,
         c.c_y * c.c_y * soil.mass - 2.0 * c.c_y * soil.first + soil.second,
         design.L,
+        c.l_n - design.L,
+        design.L + bed.deep * c.d + s_0,
         GROUP * fineness * fineness,
         base.stiffness * foot,
-        design.rho_s * base.wave_speed * foot,
-        design.rho_s * G * design.d * capacity * foot,
-        m_b * G / (base.stiffness * foot),
-        friction,
-        2.0 * friction * at_rest * design.rho_s * G * design.L * design.d,
+        bed.density * base.wave_speed * foot,
+        bed.stress * bearing_capacity_factor(bed.phi) * falling_ground_factor(base.slope) * foot,
+        s_0,
+        friction_of(bed.phi, form),
+        bed.side,
         base.slip_speed,
     )
 
@@ -189,6 +261,94 @@ def prepare(work: np.ndarray, f: HeaveConstants) -> None:
         put(work, SIDE_A, n, f.L * ((square % fineness + SIDE_POINTS[column]) / fineness) - c.c_x)
         put(work, SIDE_DEPTH, n, c.d * ((square // fineness + SIDE_POINTS[row]) / fineness))
         put(work, SIDE, n, f.side * SIDE_WEIGHTS[row] * SIDE_WEIGHTS[column] * GROUP / f.pieces)
+
+
+@inlined
+def vertical_stress(depth: float, layers: np.ndarray, water: float) -> float:
+    """Effective vertical stress at a depth [Pa] (Eq 106); the last layer reaches down without end."""
+    stress = top = 0.0
+    for m in range(len(layers)):
+        low = max(min(layers[m, TO], depth), top)
+        stress += G * (layers[m, DENSITY] * (low - top) - WATER * max(low - max(top, water), 0.0))
+        top = low
+    return stress
+
+
+@inlined
+def layer_under(depth: float, layers: np.ndarray) -> int:
+    """Return the number of the layer that lies under a depth [m]."""
+    m = 0
+    while m < len(layers) - 1 and layers[m, TO] <= depth:
+        m += 1
+    return m
+
+
+@kernel
+def bed_of(design: Design, mass: SoilMass, layers: np.ndarray, form: HeaveOptions, base: Base) -> Bed:
+    """Return what a boulder in layers of soil, shape (M, 6), stands on (Eq 148)."""
+    under = layer_under(design.d, layers)
+    phi, stress = layers[under, FRICTION], vertical_stress(design.d, layers, base.water)
+    side = 2.0 * friction_of(phi, form) * design.L * design.d
+    return Bed(mass, layers[under, DENSITY], phi, stress, side, 3.0 + 1.0 / LEAST_FOLLOWING)
+
+
+@kernel
+def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces, f: HeaveConstants) -> None:
+    """Write the parts of a soil in pieces into a workspace that `prepare` has filled (Eqs 148, 149).
+
+    Parameters
+    ----------
+    work
+        The workspace.
+    layers
+        Layers of the design, shape (M, 6).
+    base
+        The ground under the foot, with its water.
+    soil
+        Pieces of the soil beside the boulder, filled.
+    f
+        Constants of the design.
+    """
+    d, parts = f.c.d, soil.pieces
+    foot = math.tan(2.0 / 3.0 * layers[layer_under(d, layers), FRICTION])
+    for n in range(f.pieces):
+        low, to, r = n / f.pieces, (n + 1.0) / f.pieces, (n + 0.5) / f.pieces
+        spring = ultimate = drag = stiffness = strength = 0.0
+        for m in range(len(parts)):
+            K, P_0, P_1, R, w_0, w_1 = parts[m, 2], parts[m, 4], parts[m, 5], parts[m, 6], parts[m, 7], parts[m, 8]
+            start, end = max(parts[m, 0], low), min(parts[m, 1], to)
+            if start < end:
+                i = combined(powers_of(end), -1.0, powers_of(start))
+                spring += K * (w_0 * i.two + w_1 * i.three)
+                ultimate += P_0 * (w_0 * i.one + w_1 * i.two) + P_1 * (w_0 * i.two + w_1 * i.three)
+                drag += R * (w_0 * i.one + w_1 * i.two)
+                stiffness += K * i.two * f.pieces
+                strength += (P_0 * i.one + P_1 * i.two) * f.pieces
+        # The steepest line through stiffness and strength at rest that neither exceeds deeper down to the foot.
+        slope = 1.0 / r
+        for m in range(len(parts)):
+            K, P_0, P_1 = parts[m, 2], parts[m, 4], parts[m, 5]
+            start, end = max(parts[m, 0], to), parts[m, 1]
+            if start <= end and parts[m, 0] < end:
+                slope = min(slope, (K * start / stiffness - 1.0) / (start - r))
+                slope = min(slope, ((P_0 + P_1 * start) / strength - 1.0) / (start - r))
+                slope = min(slope, ((P_0 + P_1 * end) / strength - 1.0) / (end - r))
+        follows = slope * r
+        put(work, STIFFNESS, n, spring / (r * d))
+        put(work, YIELD, n, ultimate / spring)
+        put(work, DRAG, n, drag)
+        put(work, STAYS, n, 1.0 - follows if follows >= LEAST_FOLLOWING else 1.0)
+        top = rough = 0.0
+        for m in range(len(layers)):
+            bottom = layers[m, TO] / d if m < len(layers) - 1 else 1.0
+            length = max(min(bottom, to) - max(top, low), 0.0)
+            rough += length * f.pieces * math.tan(2.0 / 3.0 * layers[m, FRICTION])
+            top = bottom
+        put(work, ROUGHNESS, n, rough / foot)
+        depth = field(work, SIDE_DEPTH, n)
+        phi = layers[layer_under(depth, layers), FRICTION]
+        pressure = (1.0 - math.sin(phi)) * vertical_stress(depth, layers, base.water) / depth
+        put(work, SIDE, n, field(work, SIDE, n) * pressure * math.tan(2.0 / 3.0 * phi) / foot)
 
 
 @inlined
@@ -241,6 +401,51 @@ def parts_of_soil(sin: float, k: Kinematics, f: HeaveConstants) -> Parts:
     )
 
 
+class Part(NamedTuple):
+    """What one part of the soil is like."""
+
+    stiffness: float
+    """Stiffness of its springs per depth [N/m^2]."""
+    x_yield: float
+    """Displacement at which it reaches its ultimate resistance [m]."""
+    drag: float
+    """Its drag at a velocity of 1 m/s [N s^2/m^2]."""
+    stays: float
+    """Share of a rise or fall of the face that the depth of the part does not follow, 0 ... 1 (Eq 149)."""
+    roughness: float
+    """Coefficient of its friction over that of the soil at the foot [-]."""
+
+
+def part_of_soil(n: int, work: np.ndarray, p: Parts, f: HeaveConstants) -> Part:
+    """Return part n of the soil: from the workspace, but in uniform soil beside a box, where all are alike."""
+    return laid_part(n, work) if type(f.c) is SoilConstants else uniform_part(p, f)
+
+
+@overload(part_of_soil)
+def _part_of_soil(n: Any, work: Any, p: Any, f: Any) -> Callable[..., Part]:
+    if type_of(f[0]) is SoilConstants:
+        return lambda n, work, p, f: laid_part(n, work)
+    return lambda n, work, p, f: uniform_part(p, f)
+
+
+@inlined
+def uniform_part(p: Parts, f: HeaveConstants) -> Part:
+    """Return any part of a uniform soil."""
+    return Part(p.stiffness, f.c.x_yield, p.drag, 0.0, 1.0)
+
+
+@inlined
+def laid_part(n: int, work: np.ndarray) -> Part:
+    """Return a part of the soil that `lay_soil` has written."""
+    return Part(
+        field(work, STIFFNESS, n),
+        field(work, YIELD, n),
+        field(work, DRAG, n),
+        field(work, STAYS, n),
+        field(work, ROUGHNESS, n),
+    )
+
+
 class Beyond(NamedTuple):
     """Averages along a part of the soil in which u goes in a line from u - w/2 to u + w/2 (Eq 132)."""
 
@@ -280,17 +485,18 @@ class FaceForces(NamedTuple):
 
 
 @inlined
-def pressed(u: float, drag: float, z: float, p: Parts, f: HeaveConstants) -> FaceForces:
-    """Return what a part does to a face that presses on it where u > 0 and is in soil z deep, by its middle."""
-    all_of_it, yielded = beyond(u, 0.0, p), beyond(u, f.c.x_yield, p)
-    depth = max(z, 0.0)
-    energy = p.stiffness * (all_of_it.energy - yielded.energy)
-    covered = min(depth * p.inverse_cover, 1.0)
+def pressed(u: float, drag: float, z: float, alpha: float, part: Part, p: Parts, f: HeaveConstants) -> FaceForces:
+    """Return what a part does to a face that presses on it where u > 0 and is in soil z deep, alpha at rest."""
+    all_of_it, yielded = beyond(u, 0.0, p), beyond(u, part.x_yield, p)
+    counted = z - times(part.stays, z - alpha)
+    depth = max(counted, 0.0)
+    energy = part.stiffness * (all_of_it.energy - yielded.energy)
+    covered = min(max(z, 0.0) * p.inverse_cover, 1.0)
     return FaceForces(
-        p.stiffness * depth * (all_of_it.slope - yielded.slope),
+        part.stiffness * depth * (all_of_it.slope - yielded.slope),
         all_of_it.share * covered * drag,
-        p.stiffness * depth * (all_of_it.widening - yielded.widening),
-        f.heave * energy if z > 0.0 else 0.0,
+        part.stiffness * depth * (all_of_it.widening - yielded.widening),
+        f.heave * (energy - times(part.stays, energy)) if counted > 0.0 else 0.0,
         energy * depth,
     )
 
@@ -310,25 +516,29 @@ class Element(NamedTuple):
     """Vertical force on the boulder [N]."""
     energy: float
     """Energy in its springs [J]."""
+    roughness: float
+    """Coefficient of its friction over that of the soil at the foot [-]."""
 
 
 @inlined
-def soil_element(n: int, y_b: float, sin: float, versin: float, k: Kinematics, p: Parts, f: HeaveConstants) -> Element:
+def soil_element(
+    n: int, y_b: float, sin: float, versin: float, k: Kinematics, p: Parts, work: np.ndarray, f: HeaveConstants
+) -> Element:
     """Forces and energy of part n of the soil: its depth follows the rise of the faces that press on it (Eq 132)."""
-    c = f.c
+    c, part = f.c, part_of_soil(n, work, p, f)
     ratio = (n + 0.5) * p.share
     u, v = k.A - k.slope_x * ratio, k.B - k.slope_v * ratio
     alpha = c.d * ratio
-    d_n, l_near = alpha - c.z_0, c.l_n - f.L
-    drag = -p.drag * v * abs(v)
+    d_n = alpha - c.z_0
+    drag = -part.drag * v * abs(v)
     z = alpha - f.heave * (y_b + d_n * versin)
-    far = pressed(u, drag, z + f.heave * c.l_n * sin, p, f)
-    near = pressed(-u, drag, z + f.heave * l_near * sin, p, f)
+    far = pressed(u, drag, z + f.heave * c.l_n * sin, alpha, part, p, f)
+    near = pressed(-u, drag, z + f.heave * f.l_near * sin, alpha, part, p, f)
     F_far, F_near = far.drag - far.spring, near.drag + near.spring
     lift = far.lift + near.lift
-    turning = lift * d_n * sin - (far.lift * c.l_n + near.lift * l_near) * (1.0 - versin)
+    turning = lift * d_n * sin - (far.lift * c.l_n + near.lift * f.l_near) * (1.0 - versin)
     turning -= (F_far + F_near) * (k.lever_d * ratio + k.q) + (far.widening + near.widening) * p.slope_w
-    return Element(near.spring - far.spring, F_far, F_near, turning, lift, far.energy + near.energy)
+    return Element(near.spring - far.spring, F_far, F_near, turning, lift, far.energy + near.energy, part.roughness)
 
 
 class Strip(NamedTuple):
@@ -404,7 +614,7 @@ def forces(
     k = soil_kinematics(x_b, v_b, omega_b, sin, versin, c)
     p = parts_of_soil(sin, k, f)
     for n in range(f.pieces):
-        e = soil_element(n, y_b, sin, versin, k, p, f)
+        e = soil_element(n, y_b, sin, versin, k, p, work, f)
         a, depth = field(work, SIDE_A, n), field(work, SIDE_DEPTH, n)
         b = c.z_0 - depth
         X, Y = a * cos + b * sin, b * cos - a * sin
@@ -421,16 +631,16 @@ def forces(
         put(work, ALONG_X, n, e.far + e.near + share * v_x + rub)
         put(work, TURNING, n, e.turning + share * (v_x * Y - v_y * X) + rub * s.Y - push * s.X)
         put(work, LIFTING, n, e.lift + share * v_y + push)
-        put(work, FAR, n, max(-e.far, 0.0) + max(-e.near, 0.0))
-        put(work, NEAR, n, max(e.far, 0.0) + max(e.near, 0.0))
+        put(work, FAR, n, e.roughness * (max(-e.far, 0.0) + max(-e.near, 0.0)))
+        put(work, NEAR, n, e.roughness * (max(e.far, 0.0) + max(e.near, 0.0)))
     far, near = summed(work, FAR, f.pieces), summed(work, NEAR, f.pieces)
     # The faces slip along themselves, each with one speed all over.
     along = v_b * sin + w_b * cos
     F_far = -f.friction * far * slipping(along - omega_b * c.l_n, f)
-    F_near = -f.friction * near * slipping(along + omega_b * (f.L - c.l_n), f)
+    F_near = -f.friction * near * slipping(along - omega_b * f.l_near, f)
     Q_x = summed(work, ALONG_X, f.pieces) + (F_far + F_near) * sin
     Q_y = summed(work, LIFTING, f.pieces) + (F_far + F_near) * cos
-    Q_theta = summed(work, TURNING, f.pieces) + F_near * (f.L - c.l_n) - F_far * c.l_n
+    Q_theta = summed(work, TURNING, f.pieces) + -F_near * f.l_near - F_far * c.l_n
     weight = f.m_b * G
     if f.heave > 0.0:
         Q_theta += weight * (f.a_b * cos + f.b_b * sin)

@@ -13,12 +13,13 @@ never reaches the limit.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import inlined, kernel
-from .design import Constants, G, constants_of, corrected, design_in, is_computable
+from ._jit import inlined, is_none, kernel, overload, plain
+from .design import Constants, Design, DesignTable, G, constants_of, corrected, design_in, is_computable
 from .dormand_prince import displacement_at, slope_at, turning_point
 from .heave import (
     ALONG_X,
@@ -30,8 +31,11 @@ from .heave import (
     Forces,
     HeaveConstants,
     HeaveOptions,
+    bed_of,
+    constants_on,
     heave_constants,
     inertia_at,
+    lay_soil,
     parts_of_soil,
     prepare,
     seated_sine,
@@ -41,6 +45,8 @@ from .heave import (
 )
 from .numerics import ITERATIONS, Bracket, field, narrowed, next_guess, put, sine_versine
 from .outcomes import Status
+from .outline import body_with
+from .pieces import ManyPieces, constants_in_soil, fill_pieces
 from .runge_kutta import (
     AXES,
     RATES,
@@ -60,6 +66,7 @@ from .runge_kutta import (
     track_of,
 )
 from .soil import soil_kinematics
+from .soil_laws import empty_soil
 
 READINGS = corrected()
 """The only readings that there are second opinions of."""
@@ -162,7 +169,7 @@ def potential_energy(x_b: float, theta_b: float, y_b: float, work: np.ndarray, f
     k = soil_kinematics(x_b, 0.0, 0.0, sin, versin, f.c)
     p = parts_of_soil(sin, k, f)
     for n in range(f.pieces):
-        e = soil_element(n, y_b, sin, versin, k, p, f)
+        e = soil_element(n, y_b, sin, versin, k, p, work, f)
         depth = max(strip_depth(work, n, y_b, sin, versin, f), 0.0)
         elastic = min(f.k_foot * depth, f.q_foot)
         share = f.heave * field(work, STRIP, n)
@@ -209,7 +216,7 @@ def least_energy(theta: float, work: np.ndarray, f: HeaveConstants) -> float:
     sin, versin = sine_versine(theta)
     upper = f.c.l_n * versin - f.c.z_0 * sin
     left, right = min(upper, upper + f.c.d * sin), max(upper, upper + f.c.d * sin)
-    bottom, top = 0.0, f.L + 3.0 * f.c.d + f.s_0
+    bottom, top = 0.0, f.out
     for n in range(f.pieces):
         bottom = min(bottom, strip_depth(work, n, 0.0, sin, versin, f) - f.q_foot / f.k_foot)
     least = np.inf
@@ -283,12 +290,11 @@ def simulate_heave(
     control
         Limit, horizon and tolerance.
     work
-        Workspace, shape (WORKSPACE,).
+        Workspace, shape (WORKSPACE,), of a design at rest: what `boulder_kernels.heave.prepare` has filled.
     record
         Filled with the time history at the times it names.
     """
     c = f.c
-    prepare(work, f)
     for axis in range(2 * AXES):
         put(work, START, axis, 0.0)
     put(work, START, 7, c.v_0)
@@ -377,8 +383,72 @@ def simulate_heave(
 
 
 @kernel
+def prepare_in_pieces(
+    design: Design,
+    row: int,
+    layers: np.ndarray,
+    outlines: np.ndarray,
+    soil: ManyPieces,
+    form: HeaveOptions,
+    base: Base,
+    fineness: int,
+    work: np.ndarray,
+) -> HeaveConstants:
+    """Fill the workspace for a design whose soil is in pieces, and return its constants."""
+    lumped, body = fill_pieces(design, layers[row], outlines[row], soil), body_with(design, outlines[row])
+    c = constants_in_soil(design, READINGS, body, lumped, None)
+    f = constants_on(bed_of(design, lumped.mass, layers[row], form, base), design, body, c, form, base, fineness)
+    prepare(work, f)
+    lay_soil(work, layers[row], base, soil, f)
+    return f
+
+
+@kernel
+def prepare_in_uniform_soil(
+    design: Design, form: HeaveOptions, base: Base, fineness: int, work: np.ndarray
+) -> HeaveConstants:
+    """Fill the workspace for a box in uniform soil, and return its constants."""
+    f = heave_constants(design, constants_of(design, READINGS, 0), form, base, fineness)
+    prepare(work, f)
+    return f
+
+
+def prepare_design(
+    design: Design,
+    row: int,
+    layers: np.ndarray | None,
+    outlines: np.ndarray | None,
+    soil: ManyPieces | None,
+    form: HeaveOptions,
+    base: Base,
+    fineness: int,
+    work: np.ndarray,
+) -> HeaveConstants:
+    """Fill the workspace for a design of a table, and return its constants; arguments: see `run_second_opinions`."""
+    if layers is None:
+        return prepare_in_uniform_soil(design, form, base, fineness, work)
+    return plain(prepare_in_pieces)(design, row, layers, outlines, soil, form, base, fineness, work)
+
+
+@overload(prepare_design)
+def _prepare_design(
+    design: Any, row: Any, layers: Any, outlines: Any, soil: Any, form: Any, base: Any, fineness: Any, work: Any
+) -> Callable[..., HeaveConstants]:
+    if is_none(layers):
+        return lambda design, row, layers, outlines, soil, form, base, fineness, work: prepare_in_uniform_soil(
+            design, form, base, fineness, work
+        )
+    return lambda design, row, layers, outlines, soil, form, base, fineness, work: prepare_in_pieces(
+        design, row, layers, outlines, soil, form, base, fineness, work
+    )
+
+
+@kernel
 def run_second_opinions(
     designs: np.ndarray,
+    layers: np.ndarray | None,
+    outlines: np.ndarray | None,
+    soil: ManyPieces | None,
     form: HeaveOptions,
     base: Base,
     control: HeaveControl,
@@ -386,16 +456,17 @@ def run_second_opinions(
     record: HeaveRecord,
     out: np.ndarray,
 ) -> None:
-    """Simulate designs one by one; see `second_opinions`."""
+    """Simulate designs one by one; see `second_opinions`.
+
+    Layers, outlines and the pieces that every design fills anew are None for boxes in uniform soils.
+    """
     for row in range(designs.shape[1]):
         design = design_in(designs, row)
-        c = constants_of(design, READINGS, 0)
         outcome = HeaveOutcome(Status.INVALID.value, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, 0.0)
-        if is_computable(c):
-            f = heave_constants(design, c, form, base, control.fineness)
-            # A boulder that the base cannot carry is not at rest at first, and no depth of it is the least energy.
-            if not form.heave or f.k_foot * f.s_0 < f.q_foot:
-                outcome = simulate_heave(f, design.m_v, control, work, record)
+        f = prepare_design(design, row, layers, outlines, soil, form, base, control.fineness, work)
+        # A boulder that the base cannot carry is not at rest at first, and no depth of it is the least energy.
+        if is_computable(f.c) and (not form.heave or f.k_foot * f.s_0 < f.q_foot):
+            outcome = simulate_heave(f, design.m_v, control, work, record)
         o = outcome
         out[0, row], out[1, row], out[2, row], out[3, row] = o.status, o.theta_max, o.x_b_max, o.y_b_max
         out[4, row], out[5, row], out[6, row], out[7, row] = o.x_v_max, o.t_limit, o.t_end, o.attempts
@@ -413,7 +484,7 @@ def second_opinions(
     Parameters
     ----------
     table
-        `boulder_kernels.DesignTable` of n designs that the truck hits.
+        `boulder_kernels.DesignTable` of n designs that the truck hits, or a `PiecewiseTable` of boxes.
     control
         Limit, horizon and tolerance.
     form
@@ -430,7 +501,10 @@ def second_opinions(
     """
     if not 1 <= control.fineness <= FINEST:
         raise ValueError(f"the fineness is 1 to {FINEST}, not {control.fineness}")
-    designs = np.stack(table)
+    layers, outlines = getattr(table, "layers", None), getattr(table, "outlines", None)
+    soil = None if layers is None else empty_soil(layers.shape[1], outlines.shape[1], 0)
+    designs = np.stack(table[: len(DesignTable._fields)])
     out = np.full((len(HeaveOutcome._fields), designs.shape[1]), np.nan)
-    run_second_opinions(designs, form, base, control, np.empty(WORKSPACE), record or no_heave_record(), out)
+    work, kept = np.empty(WORKSPACE), record or no_heave_record()
+    run_second_opinions(designs, layers, outlines, soil, form, base, control, work, kept, out)
     return HeaveOutcome(out[0].astype(np.int8), *out[1:])
