@@ -96,10 +96,10 @@ def overturned(passes: Designs, evaluation: Evaluation) -> np.ndarray:
 
 def held(evaluation: Evaluation, passes: Designs) -> GradeCounts:
     """Grade passes, and hold the grades to fine solutions."""
-    judged, model = evaluation.judged(passes), evaluation.model
+    judged = evaluation.judged(passes)
     begun = time.process_time()
     graded = with_second_opinions(
-        judged, passes, (DECISIVE,), model.resistance, evaluation.limits, evaluation.longest_s
+        judged, passes, (DECISIVE,), evaluation.model, evaluation.limits, evaluation.longest_s
     )
     cpu_s = time.process_time() - begun
     stand, lost = standing(graded), overturned(passes, evaluation)

@@ -52,9 +52,9 @@ ROW = MOST + GROUP
 SETS, FOOT, STRIP, SIDE_A, SIDE_DEPTH, SIDE, ALONG_X, TURNING, LIFTING, FAR, NEAR = (ROW * n for n in range(11))
 """Offsets in the workspace: sets of the strips, where they lie along the foot, and their shares of it; points of the
 sides, and their friction per depth; what all pieces have of five sums."""
-STIFFNESS, YIELD, DRAG, STAYS, ROUGHNESS = (ROW * n for n in range(11, 16))
-"""Offsets of the fields of `Part`, which only the parts of a soil that is not uniform keep there."""
-ROOM = 16 * ROW
+RATIO, HEIGHT, INVERSE_HEIGHT, STIFFNESS, YIELD, DRAG, STAYS, ROUGHNESS = (ROW * n for n in range(11, 19))
+"""Offsets of what only the parts of a soil that is not uniform keep there: see `lay_soil`."""
+ROOM = 19 * ROW
 """Numbers in the workspace."""
 LEAST_FOLLOWING = 0.1
 """What follows a rise or fall by less counts as not following it, so that every boulder leaves the soil somewhere."""
@@ -292,6 +292,19 @@ def bed_of(design: Design, mass: SoilMass, layers: np.ndarray, form: HeaveOption
     return Bed(mass, layers[under, DENSITY], phi, stress, side, 3.0 + 1.0 / LEAST_FOLLOWING)
 
 
+@inlined
+def edge_of(n: int, count: int, parts: np.ndarray) -> float:
+    """Return the ratio of the depth at which part n of so many begins: a boundary of pieces, (M, 9), if one is nearest.
+
+    A part that a boundary cuts would yield as a whole, and not one side of it after the other.
+    """
+    for m in range(len(parts) - 1):
+        if 0 < n < count and int(parts[m, 1] * count + 0.5) == n:
+            edge: float = parts[m, 1]
+            return edge
+    return n / count
+
+
 @kernel
 def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces, f: HeaveConstants) -> None:
     """Write the parts of a soil in pieces into a workspace that `prepare` has filled (Eqs 148, 149).
@@ -312,7 +325,8 @@ def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces,
     d, parts = f.c.d, soil.pieces
     foot = math.tan(2.0 / 3.0 * layers[layer_under(d, layers), FRICTION])
     for n in range(f.pieces):
-        low, to, r = n / f.pieces, (n + 1.0) / f.pieces, (n + 0.5) / f.pieces
+        low, to = edge_of(n, f.pieces, parts), edge_of(n + 1, f.pieces, parts)
+        r, inverse = 0.5 * (low + to), 1.0 / (to - low)
         spring = ultimate = drag = stiffness = strength = 0.0
         for m in range(len(parts)):
             K, P_0, P_1, R, w_0, w_1 = parts[m, 2], parts[m, 4], parts[m, 5], parts[m, 6], parts[m, 7], parts[m, 8]
@@ -322,8 +336,8 @@ def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces,
                 spring += K * (w_0 * i.two + w_1 * i.three)
                 ultimate += P_0 * (w_0 * i.one + w_1 * i.two) + P_1 * (w_0 * i.two + w_1 * i.three)
                 drag += R * (w_0 * i.one + w_1 * i.two)
-                stiffness += K * i.two * f.pieces
-                strength += (P_0 * i.one + P_1 * i.two) * f.pieces
+                stiffness += K * i.two * inverse
+                strength += (P_0 * i.one + P_1 * i.two) * inverse
         # The steepest line through stiffness and strength at rest that neither exceeds deeper down to the foot.
         slope = 1.0 / r
         for m in range(len(parts)):
@@ -334,6 +348,9 @@ def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces,
                 slope = min(slope, ((P_0 + P_1 * start) / strength - 1.0) / (start - r))
                 slope = min(slope, ((P_0 + P_1 * end) / strength - 1.0) / (end - r))
         follows = slope * r
+        put(work, RATIO, n, r)
+        put(work, HEIGHT, n, (to - low) * f.pieces)
+        put(work, INVERSE_HEIGHT, n, inverse / f.pieces)
         put(work, STIFFNESS, n, spring / (r * d))
         put(work, YIELD, n, ultimate / spring)
         put(work, DRAG, n, drag)
@@ -342,7 +359,7 @@ def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces,
         for m in range(len(layers)):
             bottom = layers[m, TO] / d if m < len(layers) - 1 else 1.0
             length = max(min(bottom, to) - max(top, low), 0.0)
-            rough += length * f.pieces * math.tan(2.0 / 3.0 * layers[m, FRICTION])
+            rough += length * inverse * math.tan(2.0 / 3.0 * layers[m, FRICTION])
             top = bottom
         put(work, ROUGHNESS, n, rough / foot)
         depth = field(work, SIDE_DEPTH, n)
@@ -402,14 +419,22 @@ def parts_of_soil(sin: float, k: Kinematics, f: HeaveConstants) -> Parts:
 
 
 class Part(NamedTuple):
-    """What one part of the soil is like."""
+    """What one part of the soil is like at a state."""
 
+    ratio: float
+    """Depth of its middle over the embedment depth [-]."""
+    w: float
+    inverse_w: float
+    slope_w: float
+    """See `Parts`."""
     stiffness: float
     """Stiffness of its springs per depth [N/m^2]."""
     x_yield: float
     """Displacement at which it reaches its ultimate resistance [m]."""
     drag: float
     """Its drag at a velocity of 1 m/s [N s^2/m^2]."""
+    inverse_cover: float
+    """See `Parts`."""
     stays: float
     """Share of a rise or fall of the face that the depth of the part does not follow, 0 ... 1 (Eq 149)."""
     roughness: float
@@ -418,29 +443,36 @@ class Part(NamedTuple):
 
 def part_of_soil(n: int, work: np.ndarray, p: Parts, f: HeaveConstants) -> Part:
     """Return part n of the soil: from the workspace, but in uniform soil beside a box, where all are alike."""
-    return laid_part(n, work) if type(f.c) is SoilConstants else uniform_part(p, f)
+    return laid_part(n, work, p) if type(f.c) is SoilConstants else uniform_part(n, p, f)
 
 
 @overload(part_of_soil)
 def _part_of_soil(n: Any, work: Any, p: Any, f: Any) -> Callable[..., Part]:
     if type_of(f[0]) is SoilConstants:
-        return lambda n, work, p, f: laid_part(n, work)
-    return lambda n, work, p, f: uniform_part(p, f)
+        return lambda n, work, p, f: laid_part(n, work, p)
+    return lambda n, work, p, f: uniform_part(n, p, f)
 
 
 @inlined
-def uniform_part(p: Parts, f: HeaveConstants) -> Part:
-    """Return any part of a uniform soil."""
-    return Part(p.stiffness, f.c.x_yield, p.drag, 0.0, 1.0)
+def uniform_part(n: int, p: Parts, f: HeaveConstants) -> Part:
+    """Return part n of a uniform soil."""
+    ratio = (n + 0.5) * p.share
+    return Part(ratio, p.w, p.inverse_w, p.slope_w, p.stiffness, f.c.x_yield, p.drag, p.inverse_cover, 0.0, 1.0)
 
 
 @inlined
-def laid_part(n: int, work: np.ndarray) -> Part:
-    """Return a part of the soil that `lay_soil` has written."""
+def laid_part(n: int, work: np.ndarray, p: Parts) -> Part:
+    """Return part n of the soil that `lay_soil` has written."""
+    height, inverse = field(work, HEIGHT, n), field(work, INVERSE_HEIGHT, n)
     return Part(
+        field(work, RATIO, n),
+        p.w * height,
+        p.inverse_w * inverse,
+        p.slope_w * height,
         field(work, STIFFNESS, n),
         field(work, YIELD, n),
         field(work, DRAG, n),
+        p.inverse_cover * inverse,
         field(work, STAYS, n),
         field(work, ROUGHNESS, n),
     )
@@ -460,7 +492,7 @@ class Beyond(NamedTuple):
 
 
 @inlined
-def beyond(u: float, q: float, p: Parts) -> Beyond:
+def beyond(u: float, q: float, p: Part) -> Beyond:
     """Return the averages beyond q, exactly, without a branch and without a difference of large numbers."""
     over = max(u - q + 0.5 * p.w, 0.0)
     length = min(over, p.w)
@@ -485,13 +517,13 @@ class FaceForces(NamedTuple):
 
 
 @inlined
-def pressed(u: float, drag: float, z: float, alpha: float, part: Part, p: Parts, f: HeaveConstants) -> FaceForces:
+def pressed(u: float, drag: float, z: float, alpha: float, part: Part, f: HeaveConstants) -> FaceForces:
     """Return what a part does to a face that presses on it where u > 0 and is in soil z deep, alpha at rest."""
-    all_of_it, yielded = beyond(u, 0.0, p), beyond(u, part.x_yield, p)
+    all_of_it, yielded = beyond(u, 0.0, part), beyond(u, part.x_yield, part)
     counted = z - times(part.stays, z - alpha)
     depth = max(counted, 0.0)
     energy = part.stiffness * (all_of_it.energy - yielded.energy)
-    covered = min(max(z, 0.0) * p.inverse_cover, 1.0)
+    covered = min(max(z, 0.0) * part.inverse_cover, 1.0)
     return FaceForces(
         part.stiffness * depth * (all_of_it.slope - yielded.slope),
         all_of_it.share * covered * drag,
@@ -526,18 +558,18 @@ def soil_element(
 ) -> Element:
     """Forces and energy of part n of the soil: its depth follows the rise of the faces that press on it (Eq 132)."""
     c, part = f.c, part_of_soil(n, work, p, f)
-    ratio = (n + 0.5) * p.share
+    ratio = part.ratio
     u, v = k.A - k.slope_x * ratio, k.B - k.slope_v * ratio
     alpha = c.d * ratio
     d_n = alpha - c.z_0
     drag = -part.drag * v * abs(v)
     z = alpha - f.heave * (y_b + d_n * versin)
-    far = pressed(u, drag, z + f.heave * c.l_n * sin, alpha, part, p, f)
-    near = pressed(-u, drag, z + f.heave * f.l_near * sin, alpha, part, p, f)
+    far = pressed(u, drag, z + f.heave * c.l_n * sin, alpha, part, f)
+    near = pressed(-u, drag, z + f.heave * f.l_near * sin, alpha, part, f)
     F_far, F_near = far.drag - far.spring, near.drag + near.spring
     lift = far.lift + near.lift
     turning = lift * d_n * sin - (far.lift * c.l_n + near.lift * f.l_near) * (1.0 - versin)
-    turning -= (F_far + F_near) * (k.lever_d * ratio + k.q) + (far.widening + near.widening) * p.slope_w
+    turning -= (F_far + F_near) * (k.lever_d * ratio + k.q) + (far.widening + near.widening) * part.slope_w
     return Element(near.spring - far.spring, F_far, F_near, turning, lift, far.energy + near.energy, part.roughness)
 
 

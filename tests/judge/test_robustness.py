@@ -33,7 +33,7 @@ from boulder_sweep.judge.robustness import (
 from boulder_sweep.judge.validity import are_studied
 from boulder_sweep.judge.verdict import Limits, judge
 from boulder_sweep.settings import load
-from boulder_sweep.settings.model import SECOND_OPINIONS
+from boulder_sweep.settings.model import SECOND_OPINIONS, Model
 from boulder_sweep.soils import with_law
 from tests.judge.plain import plain_designs
 from tests.judge.test_verdict import outcome
@@ -140,7 +140,7 @@ def test_near_the_limit_a_fine_solution_decides_with_its_error_taken_off() -> No
         for more_deg in (-0.2, 0.5 * ERROR_DEG, 0.2):
             limits = evaluation.limits._replace(rotation=watched[row] + math.radians(more_deg))
             one = passes.rows(slice(row, row + 1))
-            above[more_deg] = bool(robustness.stands(one, DECISIVE, "kp_squared", limits, evaluation.longest_s)[0])
+            above[more_deg] = bool(robustness.stands(one, DECISIVE, Model(), limits, evaluation.longest_s)[0])
         assert above == {-0.2: False, 0.5 * ERROR_DEG: False, 0.2: True}
 
 
@@ -248,7 +248,7 @@ def test_a_margin_is_asked_of_second_opinions_too() -> None:
     reduced = careful(block)
     passing = designs_of(block).rows(judged.verdict == PASS)
     limits = evaluation.limits._replace(rotation=0.6 * evaluation.limits.rotation)
-    known = [robustness.stands(passing, law, "kp_squared", limits, evaluation.longest_s) for law in SECOND_OPINIONS]
+    known = [robustness.stands(passing, law, Model(), limits, evaluation.longest_s) for law in SECOND_OPINIONS]
     found = reduced["stands_under"][judged.verdict == PASS]
     assert np.array_equal(found, known[0] + 2 * known[1])
     assert not np.array_equal(found, judged["stands_under"][judged.verdict == PASS])
@@ -260,6 +260,6 @@ def test_a_penetration_beyond_the_rating_overturns_a_pass() -> None:
     evaluation, judged = evaluated(sweep, *SECOND_OPINIONS)
     passing = designs_of(sweep.block(0, sweep.n_designs)).rows(judged.verdict == PASS)
     near = passing._replace(bed_offset=np.full(passing.size, -30.0))
-    stands = robustness.stands(near, "broms", "kp_squared", evaluation.limits, 10.0)
+    stands = robustness.stands(near, "broms", Model(), evaluation.limits, 10.0)
     assert not stands.any()
     assert GRADES.index("sensitive") == SENSITIVE
