@@ -14,7 +14,7 @@ from boulder_sweep.answers.recommendation import OF_A_DESIGN, Design, Nearest, R
 from boulder_sweep.answers.trials import USUALLY
 from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.designs import SIDES
-from boulder_sweep.judge.robustness import MEANINGS, can_be_asked
+from boulder_sweep.judge.robustness import DECISIVE, MEANINGS, can_be_asked
 from boulder_sweep.judge.validity import BY_FLAG, UNSTUDIED
 from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT
 from boulder_sweep.settings.shown_units import quantity_text, shown_unit
@@ -36,6 +36,12 @@ MOST_NAMED = 6
 """Most boulders that are named one by one because they will not do."""
 ROUNDED = 0.01
 """Share by which rounding may make a side smaller than the usual one."""
+
+
+def stood(design: Design) -> bool:
+    """Return whether a design that no study covers stands under the second opinion that decides, in all its cases."""
+    asked = [row["stands_under"] or "" for row in design.rows if row["robustness"] == "open"]
+    return design.grade == "open" and all(DECISIVE in names for names in asked)
 
 
 class Again(NamedTuple):
@@ -276,7 +282,9 @@ class _Words:
         else:
             holds = f" with {percent(design.margin)} to spare{self.opinions(design)}"
         not_graded = self.not_graded(design)
-        return f"{f'{not_graded} By the margin alone, b' if not_graded else 'B'}{build}{holds}.{self.why(design)}"
+        alone = "" if stood(design) else "By the margin alone, "
+        first = f"{not_graded} {alone}" if not_graded else ""
+        return f"{first}{'b' if first.endswith(', ') else 'B'}{build}{holds}.{self.why(design)}"
 
     def why(self, design: Design) -> str:
         """Return why it is this boulder, as a sentence that follows another."""
@@ -297,6 +305,8 @@ class _Words:
         margin = self.need.least_margin
         if design.grade == "robust":
             return f", and with {percent(margin)} {MODELS}" if margin and self.need.robust else f", and stands {MODELS}"
+        if stood(design):
+            return ", and no second opinion overturns it"
         return ", but a second opinion overturns it (sensitive)" if design.grade == "sensitive" else ""
 
     def not_graded(self, design: Design) -> str:
@@ -307,7 +317,9 @@ class _Words:
         outside = [BY_FLAG[name].meaning for name in Design(rows).flags if name in UNSTUDIED]
         if not can_be_asked(self.need.sweep):
             return f"Not graded: {MEANINGS['open']}."
-        if not outside:
+        if not self.need.sweep.model.ground.is_usual:
+            outside.insert(0, "soil with layers, water, cohesion or slope")
+        if all(row["stands_under"] is None for row in rows):
             return f"Not graded: {NOT_ASKED}."
         some = f" in {len(rows)} of {len(design.rows)} cases" if len(rows) < len(design.rows) else ""
         return f"Not graded{some}: no study of second opinions covers {listed(tuple(outside))}."

@@ -275,7 +275,7 @@ class Evaluation:
         table = with_soil(PLAIN_DESIGN, model.resistance, model.ground, shape=model.shape)
         self.simulate(table, self.readings, self.control._replace(horizon=self.control.h))
         if self.second_opinion:
-            second_opinions(PLAIN_DESIGN, HeaveControl(self.limits.rotation, self.control.h))
+            second_opinions(table, HeaveControl(self.limits.rotation, self.control.h))
 
 
 PLAIN_DESIGN = DesignTable(

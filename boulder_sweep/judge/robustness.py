@@ -55,12 +55,12 @@ SENSITIVE_IN_WORDS = (
 MEANINGS = {
     "robust": IN_WORDS,
     "sensitive": SENSITIVE_IN_WORDS,
-    "open": "second opinions know boxes of rock of given density, dry, level, uniform soil and corrected readings only",
+    "open": "second opinions know boxes of rock of given density and corrected readings only",
 }
 """What a grade means of a pass of which second opinions were asked, if they could be."""
 UNSTUDIED_IN_WORDS = (
-    "stands under the second opinions that were asked, but outside the ranges of their study, as its flags say "
-    f"({', '.join(UNSTUDIED)})"
+    "stands under the second opinions that were asked, but outside their study: in soil with layers, water, cohesion "
+    f"or slope, or beyond its ranges, as flags say ({', '.join(UNSTUDIED)})"
 )
 """Explanation of the grade ``open`` where second opinions were asked."""
 GIVES_WAY = (

@@ -10,7 +10,7 @@ import pytest
 
 import boulder_sweep
 from boulder_kernels import Status
-from boulder_kernels.heave import FINEST
+from boulder_kernels.heave import FINEST, Base
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_sweep.columns import GRADES, STANDINGS
 from boulder_sweep.judge import robustness
@@ -200,13 +200,40 @@ def test_other_outcomes_do_not_change() -> None:
             assert np.array_equal(values, asked[name], equal_nan=values.dtype.kind == "f"), name
 
 
-@pytest.mark.parametrize("override", ["model.readings=as_printed", "soil.water_table=0.5 m", "soil.cohesion=5 kPa"])
+@pytest.mark.parametrize("override", ["model.readings=as_printed", "boulder.taper=0.8"])
 def test_where_second_opinions_know_nothing_a_pass_is_open(override: str) -> None:
     sweep = load("configs/rwg.yaml", ["model.second_opinion=[broms, width_capped]", override])
     assert not robustness.can_be_asked(sweep)
     evaluation = evaluation_of(sweep, accuracy_of(sweep))
     assert evaluation.second_opinion == ()
     assert not evaluation.limits.studied
+
+
+@pytest.mark.parametrize(
+    "override", ["soil.water_table=1.2 m", "soil.water_table=0 m", "soil.cohesion=2 kPa", "soil.slope=5 deg"]
+)
+def test_in_soil_that_no_study_covers_a_pass_stands_or_is_sensitive(override: str) -> None:
+    """As second opinions of the kernels say, with water and slope under the foot, too; none is robust."""
+    sweep = load("configs/m30_sizing.yaml", [override, "boulder.width=1.8 m"])
+    _, judged = evaluated(sweep, *SECOND_OPINIONS)
+    evaluation, decided = evaluated(sweep, DECISIVE)
+    passing = np.flatnonzero(judged.verdict == PASS)
+    ground = sweep.model.ground
+    base = Base(water=ground.water_table_m if ground.water_table_m is not None else math.inf)
+    base = base._replace(slope=math.radians(ground.slope_deg))
+    how = HeaveControl(evaluation.limits.rotation, evaluation.longest_s, 1e-6, 2)
+    under = np.zeros(len(passing), dtype=int)
+    for bit, law in enumerate(SECOND_OPINIONS):
+        model = replace(sweep.model, resistance=law)
+        table = designs_of(sweep.block(0, sweep.n_designs), model=model).rows(passing).table
+        under += (second_opinions(table, how, base=base).status == Status.BELOW_LIMIT) << bit
+    assert np.mean(judged["stands_under"][passing] == under) > 0.98  # but for those next to the limit
+    grades = {GRADES[code] for code in judged["robustness"][passing]}
+    assert grades == {"sensitive", "open"}
+    assert np.array_equal(judged["robustness"], decided["robustness"])
+    assert np.array_equal(standing(decided)[passing], judged["stands_under"][passing] == 3)
+    row = judged.row(int(passing[judged["stands_under"][passing] == 3][0]))
+    assert robustness.meaning_of(row) == robustness.UNSTUDIED_IN_WORDS
 
 
 def test_another_law_of_the_file_keeps_its_second_opinions() -> None:
