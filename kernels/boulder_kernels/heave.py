@@ -155,7 +155,7 @@ def bearing_capacity_factor(phi: float) -> float:
 
 @kernel
 def falling_ground_factor(slope: float) -> float:
-    """Bearing capacity beside ground that falls by a slope [rad] over that of level ground, after Vesic (Eq 148)."""
+    """Bearing capacity where the ground falls by a slope [rad] over its value where it is level, by Vesic (Eq 148)."""
     return max(1.0 - math.tan(slope), 0.0) ** 2
 
 
@@ -309,6 +309,10 @@ def edge_of(n: int, count: int, parts: np.ndarray) -> float:
 def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces, f: HeaveConstants) -> None:
     """Write the parts of a soil in pieces into a workspace that `prepare` has filled (Eqs 148, 149).
 
+    Strength and stiffness of a part at alpha follow a rise or fall of the face to the depth z as 1 + f (z - alpha)/alpha,
+    where f is the largest number from 0 to 1 by which they nowhere down to the foot exceed the soil there. Uniform soil
+    has f = 1. Cohesion gives no friction. The boulder's buoyancy and the soil below the foot are left out.
+
     Parameters
     ----------
     work
@@ -426,7 +430,7 @@ class Part(NamedTuple):
     w: float
     inverse_w: float
     slope_w: float
-    """See `Parts`."""
+    """What `Parts` says of the parts of a uniform soil, for this one."""
     stiffness: float
     """Stiffness of its springs per depth [N/m^2]."""
     x_yield: float
@@ -434,7 +438,7 @@ class Part(NamedTuple):
     drag: float
     """Its drag at a velocity of 1 m/s [N s^2/m^2]."""
     inverse_cover: float
-    """See `Parts`."""
+    """What its depth is multiplied by for the share of its drag, see `Parts` [1/m]."""
     stays: float
     """Share of a rise or fall of the face that the depth of the part does not follow, 0 ... 1 (Eq 149)."""
     roughness: float
