@@ -309,9 +309,9 @@ def edge_of(n: int, count: int, parts: np.ndarray) -> float:
 def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces, f: HeaveConstants) -> None:
     """Write the parts of a soil in pieces into a workspace that `prepare` has filled (Eqs 148, 149).
 
-    Strength and stiffness of a part at alpha follow a rise or fall of the face to the depth z as 1 + f (z - alpha)/alpha,
-    where f is the largest number from 0 to 1 by which they nowhere down to the foot exceed the soil there. Uniform soil
-    has f = 1. Cohesion gives no friction. The boulder's buoyancy and the soil below the foot are left out.
+    Strength and stiffness of a part at alpha follow a rise or fall of the face to the depth z as
+    1 + f (z - alpha)/alpha, where f is the largest number from 0 to 1 by which they nowhere down to the foot exceed the
+    soil there. Uniform soil has f = 1. Cohesion gives no friction. The boulder's buoyancy and the soil below the foot are left out.
 
     Parameters
     ----------
@@ -442,7 +442,7 @@ class Part(NamedTuple):
     stays: float
     """Share of a rise or fall of the face that the depth of the part does not follow, 0 ... 1 (Eq 149)."""
     roughness: float
-    """Coefficient of its friction over that of the soil at the foot [-]."""
+    """Coefficient of its friction over the foot's [-]."""
 
 
 def part_of_soil(n: int, work: np.ndarray, p: Parts, f: HeaveConstants) -> Part:
@@ -553,7 +553,7 @@ class Element(NamedTuple):
     energy: float
     """Energy in its springs [J]."""
     roughness: float
-    """Coefficient of its friction over that of the soil at the foot [-]."""
+    """Coefficient of its friction over the foot's [-]."""
 
 
 @inlined
