@@ -311,7 +311,8 @@ def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces,
 
     Strength and stiffness of a part at alpha follow a rise or fall of the face to the depth z as
     1 + f (z - alpha)/alpha, where f is the largest number from 0 to 1 by which they nowhere down to the foot exceed the
-    soil there. Uniform soil has f = 1. Cohesion gives no friction. The boulder's buoyancy and the soil below the foot are left out.
+    soil there. Uniform soil has f = 1. Cohesion gives no friction. The boulder's buoyancy and the soil below the foot
+    are left out.
 
     Parameters
     ----------

@@ -501,8 +501,9 @@ def second_opinions(
     """
     if not 1 <= control.fineness <= FINEST:
         raise ValueError(f"the fineness is 1 to {FINEST}, not {control.fineness}")
-    layers, outlines = getattr(table, "layers", None), getattr(table, "outlines", None)
-    soil = None if layers is None else empty_soil(layers.shape[1], outlines.shape[1], 0)
+    layers: np.ndarray | None = getattr(table, "layers", None)
+    outlines: np.ndarray | None = getattr(table, "outlines", None)
+    soil = None if layers is None or outlines is None else empty_soil(layers.shape[1], outlines.shape[1], 0)
     designs = np.stack(table[: len(DesignTable._fields)])
     out = np.full((len(HeaveOutcome._fields), designs.shape[1]), np.nan)
     work, kept = np.empty(WORKSPACE), record or no_heave_record()
