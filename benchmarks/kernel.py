@@ -12,14 +12,13 @@ import numba
 import numpy as np
 
 import boulder_kernels as bk
-from boulder_kernels import Constants, lanes
-from boulder_kernels.design import design_at
+from boulder_kernels import Constants
+from boulder_kernels.design import HEIGHT, design_at
 from boulder_kernels.outcomes import empty_outcomes
-from boulder_kernels.outline import HEIGHT
 from boulder_kernels.pieces import COUNTS, TO, given_pieces, uniform_layers
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_kernels.soil import Kinematics, Reaction, closed_form, element_sums
-from boulder_kernels.table import LaneDesigns, some_rows
+from boulder_kernels.table import LaneDesigns, simulate_lanes, some_rows
 from boulder_sweep.judge.accuracy import LONGEST_HORIZON
 from boulder_sweep.settings.model import SECOND_OPINIONS
 from boulder_sweep.soils import with_law
@@ -89,7 +88,7 @@ def measure() -> Table:
 
     def in_lanes(given: LaneDesigns) -> Callable[[], object]:
         out = empty_outcomes(given.designs.shape[1])
-        return partial(lanes.simulate_lanes, *given, readings, control, bk.no_record(), out)
+        return partial(simulate_lanes, *given, readings, control, bk.no_record(), out)
 
     work: dict[str, Callable[[], object]] = {
         "box": in_lanes(LaneDesigns(stacked)),

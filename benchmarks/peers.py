@@ -2,7 +2,7 @@
 
 The other solvers get the model as a plain reading of the equations suggests, with its switches inside the right-hand
 side: contact, seat and the direction of the weight's couple are decided in every evaluation. The kernels do not do
-this (see `boulder_kernels.modes`). The others get an advantage over the kernels: each design ends at the time at which
+this (see `boulder_kernels.events`). The others get an advantage over the kernels: each design ends at the time at which
 the kernels stopped, so that no solver simulates more than it needs to, and the peak is taken from the states at some
 output times afterwards, untimed. numbalsoda is best installed into a separate environment
 (``benchmarks/requirements-peers.txt``), whose interpreter then runs this; the table says what is missing.
@@ -37,11 +37,11 @@ from boulder_kernels.dynamics import (
     contact_displacement,
     contact_lever,
     holding_moment,
+    soil_reaction,
     spring_compression,
 )
 from boulder_kernels.numerics import sine_versine
 from boulder_kernels.soil import soil_kinematics
-from boulder_kernels.soil_laws import soil_reaction
 
 from .designs import DESIGNS, HORIZON, ROTATION_LIMIT, first, sample
 from .report import Table, significant, write_between_markers

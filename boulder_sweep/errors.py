@@ -121,7 +121,7 @@ class Interrupted(KeyboardInterrupt):
         name = signal.Signals(signum).name
         text = f"interrupted by {name}"
         if resume_command:
-            text += f"; {safe_words(rows_done, rows)}. Resume with: {resume_command}"
+            text += f"; {safe_words(rows_done, rows)}. Resume with:\n  {resume_command}"
         super().__init__(text)
 
     @property

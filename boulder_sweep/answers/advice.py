@@ -38,12 +38,6 @@ ROUNDED = 0.01
 """Share by which rounding may make a side smaller than the usual one."""
 
 
-def stood(design: Design) -> bool:
-    """Return whether a design that no study covers stands under the second opinion that decides, in all its cases."""
-    asked = [row["stands_under"] or "" for row in design.rows if row["robustness"] == "open"]
-    return design.grade == "open" and all(DECISIVE in names for names in asked)
-
-
 class Again(NamedTuple):
     """How a question was asked on the command line, so that the next one can be suggested as a whole command.
 
@@ -227,6 +221,13 @@ class _Words:
             return f" in {every} soils"
         return f" before {every} vehicles" if sections == {"vehicle"} else f" in {every} cases of soil and vehicle"
 
+    def taken(self) -> str:
+        """Return at which values uncertain inputs are taken; empty where there are none, or a probability is asked."""
+        at = next(iter(self.need.sweep.taken_at.values()), "").partition(" ")[0]
+        if not at:
+            return ""
+        return f" at the {'means' if at == 'mean' else f'{at[1:]}{NO_BREAK_SPACE}% ends'} of its uncertain inputs"
+
     def here(self, row: Mapping[str, Any]) -> str:
         """Return in which soil and before which vehicle a row is; empty where there is one of each."""
         labels = [row[name] for name in self.need.sweep.plan.labels]
@@ -273,7 +274,8 @@ class _Words:
     def recommendation(self, design: Design) -> str:
         """Return what to build, and why it is this one."""
         row, margin = design.rows[0], self.need.least_margin
-        build = f"ury {self.boulder(row)} ({self.mass(row)}) {self.depth(design)}: it passes{self.everywhere()}"
+        build = f"ury {self.boulder(row)} ({self.mass(row)}) {self.depth(design)}: it passes"
+        build += self.everywhere() + self.taken()
         if design.chance is not None:
             chance = design.chance_robust if self.need.robust and design.chance_robust is not None else design.chance
             holds = f" {MODELS}" if self.need.robust else ""
@@ -281,10 +283,10 @@ class _Words:
             holds += f" and {percent(margin)} to spare" if margin else ""
         else:
             holds = f" with {percent(design.margin)} to spare{self.opinions(design)}"
-        not_graded = self.not_graded(design)
-        alone = "" if stood(design) else "By the margin alone, "
-        first = f"{not_graded} {alone}" if not_graded else ""
-        return f"{first}{'b' if first.endswith(', ') else 'B'}{build}{holds}.{self.why(design)}"
+        begin = "B"
+        if not_graded := self.not_graded(design):
+            begin = f"{not_graded} {'B' if self.stands(design) else 'By the margin alone, b'}"
+        return f"{begin}{build}{holds}.{self.why(design)}"
 
     def why(self, design: Design) -> str:
         """Return why it is this boulder, as a sentence that follows another."""
@@ -303,11 +305,13 @@ class _Words:
     def opinions(self, design: Design) -> str:
         """Return what second opinions say of a design."""
         margin = self.need.least_margin
-        if design.grade == "robust":
+        if design.grade == "robust" or self.stands(design):
             return f", and with {percent(margin)} {MODELS}" if margin and self.need.robust else f", and stands {MODELS}"
-        if stood(design):
-            return ", and no second opinion overturns it"
         return ", but a second opinion overturns it (sensitive)" if design.grade == "sensitive" else ""
+
+    def stands(self, design: Design) -> bool:
+        """Whether a design stands under the second opinion that decides, in every case."""
+        return all(DECISIVE in (row["stands_under"] or "").split(";") for row in design.rows)
 
     def not_graded(self, design: Design) -> str:
         """Return why a design has no grade; empty where it has one, or none is asked for."""
@@ -343,8 +347,13 @@ class _Words:
         none = found.boulders - found.qualified
         if not none:
             return []
+        at_no_depth = f"At no depth{self.terms().lstrip(',')}"
         if self.told_apart != [HEIGHT] or none > MOST_NAMED or self.rocks:
-            return [f"At no depth: {none:,} of {found.boulders:,} boulders."] if found.qualified > 1 else []
+            failing = [row for row in self.need.arrow.to_pylist() if row["passes_at"] is None]
+            names = [self.label(row).removesuffix(", ") for row in failing]
+            if all(names) and none <= MOST_NAMED:
+                return [f"{at_no_depth}: {', '.join(names)}."]
+            return [f"{at_no_depth}: {none:,} of {found.boulders:,} boulders."] if found.qualified > 1 else []
         never: dict[float, list[dict[str, Any]]] = {}
         for row in self.need.arrow.to_pylist():
             if row["passes_at"] is None:
@@ -354,7 +363,7 @@ class _Words:
             some = f" in {len(rows)} of {found.conditions} cases" if len(rows) > 1 else self.here(rows[0])
             where.setdefault("" if len(rows) == found.conditions else some, []).append(self.length(height))
         parts = (f"{', '.join(heights)}{place}" for place, heights in sorted(where.items()))
-        return [f"At no depth: {'; '.join(parts)}."]
+        return [f"{at_no_depth}: {'; '.join(parts)}."]
 
     def tested(self, design: Design) -> str:
         """Return in what a design lies outside the crash tests."""

@@ -44,15 +44,7 @@ MOST_CAUSES = 16
 
 
 class Points:
-    """Scrambled Sobol points as standard normal numbers, made as they are needed.
-
-    Parameters
-    ----------
-    dimensions
-        Dimensions of a point.
-    seed
-        The same seed gives the same points.
-    """
+    """Scrambled Sobol points as standard normal numbers, made as needed; the same seed gives the same points."""
 
     def __init__(self, dimensions: int, seed: int) -> None:
         seeds = np.random.SeedSequence(seed).spawn(SCRAMBLINGS)
@@ -127,29 +119,18 @@ def chance(
     most: int = 1 << 16,
     first: int = FIRST,
 ) -> Estimates:
-    """Estimate the probability of an event in n rows.
+    """Estimate the probability of an event in n rows, which all use the same points so that they can be compared.
 
     Parameters
     ----------
     event
         Returns whether it occurs.
-    rows
-        Number of rows; all use the same points, so that they can be compared.
-    points
-        The points.
     half_width
-        Largest half-width of the interval that is accepted.
+        Largest half-width of the interval that is accepted; wider only where `most` points are not enough.
     confidence
         Confidence level of the interval.
-    most
-        Most points used for a row.
-    first
-        Initial points of each scrambling.
-
-    Returns
-    -------
-    Estimates
-        If `most` points are not enough, the interval is wider than requested.
+    most, first
+        Most points used for a row, and initial points of each scrambling.
     """
     happened, possible = np.zeros((rows, SCRAMBLINGS)), np.zeros((rows, SCRAMBLINGS))
     causes = np.zeros((rows, MOST_CAUSES), dtype=np.int64)
@@ -180,7 +161,7 @@ def chance(
 
 
 def interval(happened: np.ndarray, count: np.ndarray | int, confidence: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the confidence interval of a probability from several scramblings.
+    """Return the confidence interval (low, high) of a probability from several scramblings, shape (n,).
 
     Parameters
     ----------
@@ -188,13 +169,6 @@ def interval(happened: np.ndarray, count: np.ndarray | int, confidence: float) -
         Number of occurrences, shape (n, SCRAMBLINGS).
     count
         Points of each scrambling, shape (n,) or one number.
-    confidence
-        Confidence level of the interval.
-
-    Returns
-    -------
-    low, high : ndarray, shape (n,)
-        Its ends.
 
     Notes
     -----

@@ -36,12 +36,6 @@ class Draws:
     ----------
     rows
         Inputs of n rows, with means for the uncertain ones.
-    spread
-        The uncertain inputs.
-    judges
-        How designs are judged.
-    parallel
-        Threads or workers.
     """
 
     rows: InputRows
@@ -52,6 +46,8 @@ class Draws:
     def distance(self, index: np.ndarray, z: np.ndarray, **inputs: np.ndarray) -> np.ndarray:
         """Return the distance of designs from failing, positive where they pass, shape (m,).
 
+        If a design stands, it is its margin beyond the requested one; if it overturns, the earlier, the more negative.
+
         Parameters
         ----------
         index
@@ -60,11 +56,6 @@ class Draws:
             Standard normal numbers, shape (m, d).
         **inputs
             Inputs to set, shape (m,) each; for uncertain ones, their means.
-
-        Notes
-        -----
-        For a design that stands, the distance is its margin beyond the requested one; for one that overturns, the
-        earlier, the more negative.
         """
         return self.drawn(index, z, **inputs)[0]
 

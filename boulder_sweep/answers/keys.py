@@ -45,15 +45,7 @@ STRONGEST = ("friction_angle_deg", "embedment_depth_m", "embedment_ratio")
 
 @dataclass(frozen=True)
 class Key:
-    """The input that is asked for.
-
-    Parameters
-    ----------
-    field
-        The input.
-    most
-        Whether its largest value is wanted instead of its smallest.
-    """
+    """The input that is asked for, its smallest value or its largest (`most`)."""
 
     field: fields.Field
     most: bool
@@ -96,14 +88,7 @@ class Key:
 
 
 def key_of(word: str, *, most: bool = False) -> Key:
-    """Return the input that a word names.
-
-    Parameters
-    ----------
-    word
-        Path, key or column of the input; ``mass`` is the boulder's.
-    most
-        Whether its largest value is wanted.
+    """Return the input that a path, key or column names; ``mass`` is the boulder's.
 
     Raises
     ------
@@ -152,13 +137,7 @@ def margin_asked(text: str | float) -> float:
 
 
 def bound(text: str | float, field: fields.Field) -> float:
-    """Return one end of the search range, which must be an admitted value.
-
-    Raises
-    ------
-    QuestionError
-        It is not.
-    """
+    """Return one end of the search range, or refuse one that is not admitted by a `QuestionError`."""
     option = "--between"
     if not isinstance(text, str):
         problem = outside(float(text), field)
@@ -180,26 +159,14 @@ def sweep_ranges(sweep: Sweep) -> dict[str, tuple[float, float]]:
 def range_of(sweep: Sweep, key: Key, given: Mapping[str, np.ndarray], between: Ends) -> tuple[np.ndarray, np.ndarray]:
     """Return the search range of the input, row by row.
 
-    Parameters
-    ----------
-    sweep
-        The sweep. Where the input is an axis of its grid, the axis is the range; for the largest speed
-        or mass of the vehicle it begins as `MILDEST` says all the same.
-    key
-        The input.
-    given
-        The other inputs of n rows.
-    between
-        Ends given by the user, which take precedence.
+    Where the input is an axis of the grid, the axis is the range; for the largest speed or mass of the vehicle it
+    begins as `MILDEST` says all the same. Ends that the user gave take precedence. If the input has a distribution,
+    its mean is searched, where the distribution is within the admitted range.
 
     Returns
     -------
     low, high : ndarray, shape (n,)
         Ends in the unit of the table.
-
-    Notes
-    -----
-    If the input has a distribution, its mean is searched, where the distribution is within the admitted range.
 
     Raises
     ------
@@ -256,27 +223,11 @@ def _mildest(key: Key, low: float) -> float:
 
 
 def refuse_narrow(sweep: Sweep, key: Key, pieces: Iterable[Mapping[str, np.ndarray]], between: Ends) -> None:
-    """Refuse ranges of `range_of` in which there is nothing to search.
+    """Refuse ranges of `range_of` in which there is nothing to search, by a `QuestionError`.
 
     A range may be as narrow as it likes where it ends because the truck goes over the boulder beyond. Otherwise a
     multiple of the step must lie within it. Where the user chose the range, at least one must hold two, a value that
-    passes and the next.
-
-    Parameters
-    ----------
-    sweep
-        The sweep.
-    key
-        The input.
-    between
-        Ends given by the user, which take precedence.
-    pieces
-        The other inputs of all rows, in pieces.
-
-    Raises
-    ------
-    QuestionError
-        A range is too narrow.
+    passes and the next. `pieces` are the other inputs of all rows.
     """
     most, widest = 0, (0.0, 0.0)
     for given in pieces:
@@ -296,21 +247,9 @@ def refuse_narrow(sweep: Sweep, key: Key, pieces: Iterable[Mapping[str, np.ndarr
 
 
 def refuse_deep(sweep: Sweep, foot_m: float, ranged: str) -> None:
-    """Refuse a search that reaches deeper than the readings of the soil that count.
+    """Refuse a search whose deepest foot is below readings of the soil that were left out, by a `QuestionError`.
 
-    Parameters
-    ----------
-    sweep
-        The sweep.
-    foot_m
-        The deepest foot of the search [m].
-    ranged
-        What the file must give so that deeper readings count.
-
-    Raises
-    ------
-    QuestionError
-        Readings were left out that count for such a foot.
+    `ranged` is what the file must give so that deeper readings count.
     """
     covered = covered_depth(sweep.derived)
     if foot_m < covered:

@@ -163,10 +163,6 @@ class Boulders:
 
     Parameters
     ----------
-    asked
-        The question.
-    rows
-        The other inputs.
     side
         The side that is searched for, given the others and the depth, or `SCALE`.
     final

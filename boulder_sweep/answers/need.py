@@ -25,7 +25,6 @@ from boulder_sweep.answers.result import (
     joined_tables,
     rows_table,
     to_build,
-    write_parquet,
 )
 from boulder_sweep.answers.search import BLOCKED, WORDS
 from boulder_sweep.answers.trials import NO_FACE, Judges, judges_of, ranges
@@ -35,7 +34,6 @@ from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.judge.robustness import can_be_asked
-from boulder_sweep.locations import Location
 from boulder_sweep.runner.pool import Pool, call
 from boulder_sweep.settings.fields import EMBEDMENT
 from boulder_sweep.settings.loader import sweep_of
@@ -49,7 +47,7 @@ if TYPE_CHECKING:
     from boulder_sweep.settings.loader import Settings
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Need(Result):
     """Answers to a question, one row for every combination of the other inputs. Made by `need`.
 
@@ -118,16 +116,6 @@ class Need(Result):
             "recommendation": None if self.recommendation is None else self.recommendation.to_dict(),
             "rows": self.arrow.to_pylist(),
         }
-
-    def write(self, path: str | Location) -> Location:
-        """Write the answers to a Parquet file.
-
-        Raises
-        ------
-        QuestionError
-            The name has another ending, its folder does not exist, or it cannot be written.
-        """
-        return write_parquet(self.arrow, path)
 
     def plot(self, path: str | Path, *, units: str = "si") -> None:
         """Draw a design chart in ``si`` or ``us`` units: the answer over the size of the boulder, one curve a soil.

@@ -137,7 +137,7 @@ class AnswerFile:
         if self.kind and len(self.table) > designs:
             what = f"it has {len(self.table):,} rows for {counted(designs, 'design')}"
             raise self._refusal(f"{self.path} is damaged: {what}")
-        if self.kind and (wrong := next(self._wrong_columns(self.table), "")):
+        if self.kind and (wrong := next(self._wrong_columns(self.table, designs=self.kind != NEED), "")):
             raise self._refusal(f"{self.path} is damaged: {wrong}; write it again with `sweep {self.kind}`")
         try:
             if self.kind in _QUESTIONS:
@@ -147,13 +147,15 @@ class AnswerFile:
         except ValueError as problem:
             raise self._refusal(f"{self.path} is damaged ({problem}); write it again") from None
 
-    def _wrong_columns(self, table: pa.Table) -> Iterator[str]:
-        """Yield what is wrong with the columns by which answers are described: inputs, and words of a known list."""
+    def _wrong_columns(self, table: pa.Table, *, designs: bool) -> Iterator[str]:
+        """Yield what is wrong with the columns by which answers, or designs, are described: numbers and known words."""
         for name in table.column_names:
             column, admitted = table[name], _ADMITTED.get(name)
-            needed = name == DESIGN_ID.name or (self.kind != NEED and (admitted or name == "verdict"))
+            needed = name == DESIGN_ID.name or (designs and (admitted or name == "verdict"))
             if needed and column.null_count:
                 yield f"column {name} has empty cells"
+            if pa.types.is_floating(column.type) and not np.isfinite(column.drop_null().to_numpy()).all():
+                yield f"column {name} holds what is no number"
             if admitted:
                 values = column.drop_null().to_numpy()
                 if len(outside := values[~((values >= admitted.low) & (values <= admitted.high))]):
@@ -212,7 +214,10 @@ class AnswerFile:
         """Return what was recommended; None where nothing was."""
         try:
             entries = json.loads(self._recommended)
-            return None if entries is None else Recommendation.of_dict(entries, self._rows_of)
+            found = None if entries is None else Recommendation.of_dict(entries, self._rows_of)
+            if found is not None and not found.conditions <= self.rows <= found.boulders * found.conditions:
+                raise ValueError("it counts other boulders, soils and vehicles than there are")
+            return found
         except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError) as problem:
             what = f"{self.path} is damaged; write it again with `sweep {self.kind}`"
             raise self._refusal(f"{what} (its recommendation: {shorten(str(problem))})") from None
@@ -224,7 +229,7 @@ class AnswerFile:
             if fields.keys() - row.keys() - {self.question["asked"], *ANSWER} or row.keys() - fields.keys():
                 raise ValueError("it has other columns than the answers")
         table = pa.Table.from_pylist(rows, pa.schema([fields[name] for name in rows[0]]))
-        if wrong := next(self._wrong_columns(table), ""):
+        if wrong := next(self._wrong_columns(table, designs=True), ""):
             raise ValueError(wrong)
         return table.to_pylist()
 
@@ -244,13 +249,6 @@ class AnswerFile:
 def _identified(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[pa.Table, dict[str, Any], str]:
     """Read a Parquet file that a command wrote, and warn where other rules judged it.
 
-    Parameters
-    ----------
-    path
-        The file.
-    refusal
-        The error to raise.
-
     Returns
     -------
     table : Table
@@ -263,7 +261,7 @@ def _identified(path: str | Path, refusal: type[BoulderSweepError]) -> tuple[pa.
     Raises
     ------
     BoulderSweepError
-        It cannot be read, is damaged, of another version, or no command wrote it.
+        `refusal`: it cannot be read, is damaged, of another version, or no command wrote it.
     """
     if advice := settings_file(path):
         raise refusal(advice)
@@ -352,12 +350,7 @@ def kind_of(result: FinishedRows | AnswerFile) -> str:
 def asked_sweep(identity: Mapping[str, Any], table: pa.Table) -> Sweep:
     """Return the sweep that was asked about, as far as answers are shown by it: not its distributions.
 
-    Parameters
-    ----------
-    identity
-        Of the file, see `boulder_sweep.store.provenance.identity`.
-    table
-        The answers, which hold the values of axes and lists that are too long for the settings.
+    The answers hold the values of axes and lists that are too long for the settings.
     """
     settings = identity["settings"]
     given, order, labels = settings["inputs"], settings["order"], settings.get("labels", {})

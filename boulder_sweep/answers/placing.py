@@ -138,12 +138,10 @@ def placed(
     margin: str | float = 0.0,
     progress: ProgressCallback | None = None,
 ) -> Placing:
-    """Find the least depth of every way in which a stone can stand.
+    """Find the least depth of every way in which a boulder can stand.
 
     Parameters
     ----------
-    stone
-        The stone.
     site
         Gives the settings of the site with a boulder, which it takes as `boulder_block` returns it.
     standings

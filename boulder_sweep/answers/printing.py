@@ -6,10 +6,10 @@ import math
 import textwrap
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from boulder_sweep.answers.advice import MODELS, Again, advice, next_questions
-from boulder_sweep.answers.recommendation import OF_A_DESIGN, PREFERENCES
+from boulder_sweep.answers.recommendation import OF_A_DESIGN, PREFERENCES, Design
 from boulder_sweep.answers.search import ALWAYS, BLOCKED, NEVER, NOT_MONOTONE, UNKNOWN, WORDS
 from boulder_sweep.columns import BY_NAME as COLUMNS
 from boulder_sweep.columns import GRADES, WAY_OUT
@@ -73,18 +73,36 @@ WITHSTOOD = {
 """What the kinds of answers mean to a design that withstands something."""
 MOST_IN_ALL = 1000
 """Most lines of a table of all answers."""
+MARK = "→"
+"""What stands before the boulder that is recommended."""
+WRITTEN = "-o writes them all"
 NEAR_M = 1.5e-3
 """How near to an end of a range a side or depth is at it: both are whole millimetres [m]."""
 NOTES = {
     "always": "≤, ≥: passes throughout the searched range, up to this end of it",
     "never": "never: passes nowhere in the searched range",
     "not_monotone": "*: {}; column passes_within (-o) lists all passing ranges",
-    "blocked_by_overlap": "blocked: does not pass up to where the truck would pass or ride over the boulder",
+    "blocked_by_overlap": "blocked: does not pass by what was asked, up to where the truck would pass or ride over the "
+    "boulder",
     "undecided": "undecided: no value is known to pass, and the one tried last would if it were decided",
 }
 Row = Mapping[str, Any]
 Cell = Callable[[Row], str]
 Column = tuple[tuple[str, str], Cell]
+
+
+class Screen(NamedTuple):
+    """A table as the terminal and the first sheet of a spreadsheet show it."""
+
+    columns: list[Column]
+    rows: Sequence[Row]
+    part: str = ""
+    """Which rows these are, where there are more."""
+
+    def lines(self, rest: str) -> list[str]:
+        """Return the table as lines, and where the rest is if there is more."""
+        lines = table_lines(self.columns, self.rows)
+        return [*lines, f"({self.part}; {rest})"] if self.part else lines
 
 
 GRADE: Column = (("second", "opinion"), lambda row: row["robustness"] or "-")
@@ -178,21 +196,16 @@ def wrapped(texts: Iterable[str]) -> list[str]:
     return [line.replace(NO_BREAK_SPACE, " ") for line in lines]
 
 
-def _rows_lines(result: Result, columns: Sequence[Column], units: str) -> tuple[list[str], list[Row]]:
-    """Return designs as lines, and those shown: their varying inputs and these columns, of all or evenly spaced ones.
-
-    Columns that do not fit are left out, the least important first.
-    """
+def _rows_screen(result: Result, columns: Sequence[Column], units: str) -> Screen:
+    """Return designs with their varying inputs and these columns: all, or evenly spaced ones."""
     count = len(result)
     indices: Sequence[int] = range(count)
     if count > MOST_LINES:
         indices = [k * (count - 1) // (MOST_LINES - 1) for k in range(MOST_LINES)]
     rows = rows_of(result.arrow.take(list(indices)), units)
     names = [name for name in HEADS if name in result.sweep.plan.given]
-    lines = table_lines([*leading(result.sweep, result.arrow, names, units), *columns], rows)
-    if count > MOST_LINES:
-        lines.append(f"({MOST_LINES} of {count:,} rows, evenly spaced; -o writes them all)")
-    return lines, rows
+    part = f"{MOST_LINES} of {count:,} rows, evenly spaced" if count > MOST_LINES else ""
+    return Screen([*leading(result.sweep, result.arrow, names, units), *columns], rows, part)
 
 
 def uncertainty_lines(result: Uncertainty, units: str = "si") -> list[str]:
@@ -210,6 +223,12 @@ def uncertainty_lines(result: Uncertainty, units: str = "si") -> list[str]:
     list of str
         Header, one line for each row, and a legend.
     """
+    lines = uncertainty_screen(result, units).lines(WRITTEN)
+    return [*lines, *undecided_lines(result.arrow), *foot_lines(result.sweep.model, reasons_in(result.arrow), units)]
+
+
+def uncertainty_screen(result: Uncertainty, units: str = "si") -> Screen:
+    """Return the table of `uncertainty_lines`."""
     columns: list[Column] = [
         (("at the", "means"), lambda row: str(row["verdict"])),
         (("P(pass)", ""), lambda row: f"{row['p_pass']:.4f}"),
@@ -220,8 +239,7 @@ def uncertainty_lines(result: Uncertainty, units: str = "si") -> list[str]:
         (("decided", "by"), lambda row: row["p_pass_driver"] or "-"),
         (("designs", "drawn"), lambda row: f"{row['p_pass_designs']:,}"),
     ]
-    lines, _ = _rows_lines(result, columns, units)
-    return [*lines, *undecided_lines(result.arrow), *foot_lines(result.sweep.model, reasons_in(result.arrow), units)]
+    return _rows_screen(result, columns, units)
 
 
 def reserve_lines(result: Reserves, units: str = "si") -> list[str]:
@@ -231,15 +249,23 @@ def reserve_lines(result: Reserves, units: str = "si") -> list[str]:
     """
     from boulder_sweep.answers.reserves import RESERVES
 
+    screen = reserve_screen(result, units)
+    lines = screen.lines(WRITTEN)
+    lines += volume_lines(lines[0])
+    kinds = {row[f"{reserve.word}_found"] for row in screen.rows for reserve in RESERVES}
+    lines += wrapped(words for kind, words in WITHSTOOD.items() if kind in kinds)
+    return [*lines, *grade_lines(screen.rows), *foot_lines(result.sweep.model, reasons_in(result.arrow), units)]
+
+
+def reserve_screen(result: Reserves, units: str = "si") -> Screen:
+    """Return the table of `reserve_lines`."""
+    from boulder_sweep.answers.reserves import RESERVES
+
     columns: list[Column] = [(("verdict", ""), lambda row: str(row["verdict"])), GRADE]
     for key, column, word, _ in RESERVES:
         columns.append((head_of(key.name, units), _format_withstood(key, column, f"{word}_found", units)))
     columns.append((("class,", "simulated"), lambda row: row["simulated_class"] or row["simulated_iso_speed"] or "-"))
-    lines, rows = _rows_lines(result, [*columns, *volume_columns(units)], units)
-    lines += volume_lines(lines[0])
-    kinds = {row[f"{reserve.word}_found"] for row in rows for reserve in RESERVES}
-    lines += wrapped(words for kind, words in WITHSTOOD.items() if kind in kinds)
-    return [*lines, *grade_lines(rows), *foot_lines(result.sweep.model, reasons_in(result.arrow), units)]
+    return _rows_screen(result, [*columns, *volume_columns(units)], units)
 
 
 def _format_withstood(key: Key, column: str, found: str, units: str) -> Cell:
@@ -356,7 +382,7 @@ def need_lines(
     list of str
         Lines of 80 columns, but for commands. Columns that do not fit are left out, the least important first.
     """
-    lines = wrapped(advice(need, units) or [_title(need)])
+    lines = wrapped(advice(need, units) or [title(need)])
     if again is not None:
         for words, command in next_questions(need, again, units):
             lines += [f"next, {words}:", f"  {command}"]
@@ -377,7 +403,7 @@ def need_lines(
     return [*lines, *wrapped(remarks), *more]
 
 
-def _title(need: Need) -> str:
+def title(need: Need) -> str:
     """Return what is asked, where no design is named."""
     key, chance = need.key, need.probability
     asked = "" if chance is None else f" with a probability of {100.0 * chance:.4g} %"
@@ -404,6 +430,11 @@ def _every_answer(need: Need, units: str) -> list[str]:
 
 
 def screen_lines(need: Need, units: str = "si") -> list[str]:
+    """Return `need_screen` as lines."""
+    return need_screen(need, units).lines("--table has all answers")
+
+
+def need_screen(need: Need, units: str = "si") -> Screen:
     """Return a table of at most a screen: a line for each boulder, or else for each answer.
 
     Of more than fit, those come first that pass under the most conditions, and of these the ones that are preferred.
@@ -420,11 +451,9 @@ def screen_lines(need: Need, units: str = "si") -> list[str]:
     elif count > MOST_SHOWN and found is not None:
         least = PREFERENCES[found.prefer]
         lines.sort(key=lambda row: (row.get("failing", row["passes_at"] is None), row[least]))
-    shown = table_lines([*([_marker(need, units)] if count > 1 else []), *columns], lines[:MOST_SHOWN])
-    if count > MOST_SHOWN:
-        best = ", the shallowest first" if is_yard(need) else ", the best first" if found else ""
-        shown.append(f"({MOST_SHOWN} of {count:,}{best}; --table has all answers)")
-    return shown
+    best = ", the shallowest first" if is_yard(need) else ", the best first" if found else ""
+    part = f"{MOST_SHOWN} of {count:,}{best}" if count > MOST_SHOWN else ""
+    return Screen([*([_marker(need, units)] if count > 1 else []), *columns], lines[:MOST_SHOWN], part)
 
 
 def is_yard(need: Need) -> bool:
@@ -450,7 +479,7 @@ def _by_boulder(need: Need, rows: Sequence[Row], units: str) -> tuple[list[Row],
 
     Whoever builds chooses the boulder and its embedment; the other inputs are conditions.
     """
-    key, labels, given = need.key, need.sweep.plan.labels, need.sweep.plan.given
+    key = need.key
     names = [name for name in HEADS if name not in (key.name, *need.derived, BOULDER_MASS.name)]
     names = [name for name in names if varies(need.sweep, need.arrow, name)]
     chosen = [name for name in names if name in OF_A_DESIGN]
@@ -467,18 +496,62 @@ def _by_boulder(need: Need, rows: Sequence[Row], units: str) -> tuple[list[Row],
     edge += [] if key.name.startswith("boulder_") else [_mass(units)]
     count = len(boulders[0]["rows"])
     edge.append((("all", head_of(key.name, units)[1]), lambda row: "-" if row["failing"] else answer(row)))
-    above: list[Column] = [(("", ""), word_of(name)) for name in labels]
+    wide = _across(need, names, boulders[0]["rows"], answer, units)
+    if len(table_lines([*edge, *wide], boulders, math.inf)[2]) <= WIDTH:
+        return boulders, [*edge, *wide]
+    return boulders, [*edge, (("passes", f"in, of {count}"), lambda row: str(count - row["failing"]))]
+
+
+def _across(need: Need, names: Sequence[str], rows: Sequence[Row], cell: Cell, units: str) -> list[Column]:
+    """Return a column for each row of a boulder, with what differs of its soil and vehicle as the head."""
+    labels, given = need.sweep.plan.labels, need.sweep.plan.given
+    different = [name for name in labels if len({row[name] for row in rows}) > 1]
+    above: list[Column] = [(("", ""), word_of(name)) for name in different]
     for name in names:
         if name not in OF_A_DESIGN and not (BY_NAME[name].section in labels and name in given):
             above.append((head_of(name, units), number_of(name, units)))
     wide: list[Column] = []
-    for number, row in enumerate(boulders[0]["rows"]):
-        words = [(f"{head[0]} {cell(row)}".strip(), head[1]) for head, cell in above]
+    for number, row in enumerate(rows):
+        words = [(f"{head[0]} {text(row)}".strip(), head[1]) for head, text in above] or [("", "")]
         head = words[0] if len(words) == 1 else (words[0][0], ", ".join(word for word, _ in words[1:]))
-        wide.append((head, _in_row(number, answer)))
-    if len(table_lines([*edge, *wide], boulders, math.inf)[2]) <= WIDTH:
-        return boulders, [*edge, *wide]
-    return boulders, [*edge, (("passes", f"in, of {count}"), lambda row: str(count - row["failing"]))]
+        wide.append((head, _in_row(number, cell)))
+    return wide
+
+
+def designs_screen(need: Need, units: str = "si") -> Screen:
+    """Return the designs that the recommendation of a run names, or the nearest: least margin, then each soil's."""
+    import pyarrow as pa
+
+    found, named = need.recommendation, list[Design]()
+    if found is not None and found.design is not None:
+        named = [found.design, *found.others.values()]
+    elif found is not None and found.nearest is not None:
+        named = [Design(found.nearest.rows)]
+    boulders: list[Row] = []
+    for design in {tuple(one.sizes.values()): one for one in named}.values():
+        rows = [_in_units(row, units) for row in design.rows]
+        worst = min(rows, key=lambda row: -1.0 if row["margin"] is None else row["margin"])
+        most = {spec.name: max(row[spec.name] for row in rows) for spec in (EXCAVATED, BACKFILLED)}
+        boulders.append({**worst, **most, "robustness": design.grade, "rows": rows})
+    if found is None or not boulders:
+        return Screen([], [])
+    columns: list[Column] = [(("", ""), lambda row: MARK if found.design and row is boulders[0] else "")]
+    columns += [(("design", ""), word_of("design_id"))] if need.sweep.table is not None else []
+    columns += [(head_of(name, units), number_of(name, units)) for name in SIDES]
+    columns += [(head_of(DEPTH, units), _length(DEPTH)), _mass(units), (("least", "margin"), _margin), GRADE]
+    columns += volume_columns(units)
+    first = boulders[0]["rows"]
+    table = pa.Table.from_pylist(first)
+    names = [name for name in HEADS if varies(need.sweep, table, name)]
+    if need.sweep.table is None and 1 < len(first) <= MOST_SHOWN:
+        columns += _across(need, names, first, _margin, units)
+    return Screen(columns, boulders)
+
+
+def _in_units(row: Row, units: str) -> Row:
+    """Return a row of a run in some units."""
+    sizes = {name: shown_unit(COLUMNS[name].unit, units).size for name in row if name in COLUMNS}
+    return {name: value / sizes.get(name, 1.0) if isinstance(value, float) else value for name, value in row.items()}
 
 
 def _in_row(number: int, cell: Cell) -> Cell:
@@ -491,7 +564,7 @@ def _marker(need: Need, units: str) -> Column:
     found, metre = need.recommendation, 1.0 if units == "si" else shown_unit("m", units).size
     design = None if found is None else found.design
     sizes = {} if design is None else {n: design.sizes[n] / metre for n in SIDES if n != need.key.name}
-    return ("", ""), lambda row: "→" if sizes and all(row[name] == size for name, size in sizes.items()) else ""
+    return ("", ""), lambda row: MARK if sizes and all(row[name] == size for name, size in sizes.items()) else ""
 
 
 def _legend(need: Need) -> list[str]:

@@ -58,17 +58,6 @@ class Sampling:
     """Designs drawn with some inputs set, of which enough must pass, or be robust if the judges ask for it.
 
     All rows and values use the same points, so that the share that passes depends on the inputs alone.
-
-    Parameters
-    ----------
-    spread
-        The uncertain inputs.
-    judges
-        How designs are judged.
-    probability
-        The required probability of passing.
-    seed
-        Seed of the points.
     """
 
     def __init__(self, spread: Spread, judges: Judges, probability: float, seed: int) -> None:
@@ -83,20 +72,9 @@ class Sampling:
         return Draws(rows, self.spread, self.judges, Pool(1))
 
     def codes(self, draws: Draws, index: np.ndarray, inputs: InputRows, points: np.ndarray) -> np.ndarray:
-        """Return the predicate of `search` for designs, by some of the points, shape (m,).
+        """Return the predicate of `search` for designs by some of the points, shape (m,).
 
         It holds where they pass often enough; where the truck goes over too many of them there is nothing to try.
-
-        Parameters
-        ----------
-        draws
-            What draws them.
-        index
-            Their rows, shape (m,).
-        inputs
-            Inputs to set, shape (m,) each.
-        points
-            The points.
         """
         codes = np.empty(len(index), dtype=np.int8)
         for start, stop in ranges(len(index), AT_ONCE // len(points)):
@@ -125,15 +103,6 @@ class Sampling:
 
 class ProbabilityQuestion(Question):
     """The smallest, or the largest, value of one input that passes with a given probability, when others are uncertain.
-
-    Parameters
-    ----------
-    sweep, key, between, judges
-        See `Question`.
-    probability
-        The required probability of passing.
-    seed
-        Seed of the points.
 
     Raises
     ------
@@ -206,15 +175,6 @@ class ProbabilityTrial(Trial):
 
 class LikelyLightestQuestion(LightestQuestion):
     """The least boulder mass that passes with a given probability.
-
-    Parameters
-    ----------
-    sweep, key, judges
-        See `LightestQuestion`.
-    probability
-        The required probability of passing.
-    seed
-        Seed of the points.
 
     Raises
     ------

@@ -90,12 +90,10 @@ class Brackets:
 
 @dataclass(frozen=True, eq=False)
 class Answers(Brackets):
-    """Answers of n rows.
+    """Answers of n rows, with their brackets.
 
     Attributes
     ----------
-    block, kind, fails, passes
-        See `Brackets`.
     judged : Judged
         Outcomes and verdicts of the designs.
     stretches : list of str or None, of length n
@@ -113,17 +111,7 @@ class Answers(Brackets):
 
 
 class ValueSearch:
-    """Searches designs for the smallest, or the largest, value of one input that passes.
-
-    Parameters
-    ----------
-    sweep
-        The sweep asked about.
-    key
-        The input.
-    judges
-        How designs are judged.
-    """
+    """Searches designs for the smallest, or the largest, value of one input that passes."""
 
     cells = CELLS
     """Number of cells into which the scan divides a range."""
@@ -212,18 +200,7 @@ class ValueSearch:
 
 
 class Question(ValueSearch):
-    """The smallest, or the largest, value of one input that passes.
-
-    Parameters
-    ----------
-    sweep
-        The sweep asked about.
-    key
-        The input.
-    between
-        Ends of the range given by the user.
-    judges
-        How designs are judged.
+    """The smallest, or the largest, value of one input that passes, between ends that the user may give.
 
     Raises
     ------
@@ -247,13 +224,7 @@ class Question(ValueSearch):
             self._refuse_deep()
 
     def _refuse_deep(self) -> None:
-        """Refuse a range in which a foot is deeper than the readings of the soil that count.
-
-        Raises
-        ------
-        QuestionError
-            There is such a foot.
-        """
+        """Refuse a range in which a foot is deeper than the readings of the soil that count, by a `QuestionError`."""
         low, high, foot = math.inf, 0.0, 0.0
         for start, stop in ranges(self.count, CHECKED_AT_ONCE):
             rows = self.open.rows(start, stop)
@@ -318,10 +289,6 @@ class Trial:
 
     Parameters
     ----------
-    key
-        The input.
-    judges
-        How designs are judged.
     rows
         The other inputs; with `SHARE` in place of the depth, which then follows from the height.
     least_overlap_m

@@ -219,8 +219,10 @@ class Recommendation:
         nearest = None
         if near is not None:
             built = None if near["design"] is None else design(near["design"])
-            margin, robust = float(near["margin"]), bool(near["robust"])
-            nearest = Nearest(checked(near["rows"]), built, margin, robust, by_name(near["changes"], CHANGES))
+            rows, margin, robust = checked(near["rows"]), float(near["margin"]), bool(near["robust"])
+            if "passes_at" not in rows[0] or not 0.0 <= margin <= 1.0:
+                raise ValueError("what comes nearest has no answer, or a margin that none has")
+            nearest = Nearest(rows, built, margin, robust, by_name(near["changes"], CHANGES))
         boulders, qualified, alike, conditions = (
             int(entries[name]) for name in ("boulders", "qualified", "alike", "conditions")
         )
@@ -232,21 +234,9 @@ class Recommendation:
 
 
 def recommended(asked: Question | LightestQuestion, table: pa.Table, prefer: str) -> Recommendation | None:
-    """Return the design to build by the answers to a question.
+    """Return the design to build by the answers to a question, the least by `prefer`, a key of `PREFERENCES`.
 
-    Parameters
-    ----------
-    asked
-        The question.
-    table
-        Its answers.
-    prefer
-        What is to be least among designs that qualify, a key of `PREFERENCES`.
-
-    Returns
-    -------
-    Recommendation or None
-        None where the question is not about a least size, mass or embedment of boulders.
+    None where the question is not about a least size, mass or embedment of boulders.
     """
     if asked.key.most or asked.key.name not in OF_A_DESIGN:
         return None
@@ -266,15 +256,7 @@ def recommended(asked: Question | LightestQuestion, table: pa.Table, prefer: str
 
 
 class _Boulders:
-    """The boulders of a question, each with its rows: one for every soil and vehicle.
-
-    Parameters
-    ----------
-    asked
-        The question.
-    table
-        Its answers.
-    """
+    """The boulders of a question, each with its rows: one for every soil and vehicle."""
 
     def __init__(self, asked: Question | LightestQuestion, table: pa.Table) -> None:
         self.asked, self.table = asked, table

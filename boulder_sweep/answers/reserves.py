@@ -21,13 +21,11 @@ from boulder_sweep.answers.result import (
     joined_tables,
     rows_table,
     to_build,
-    write_parquet,
 )
 from boulder_sweep.answers.search import WORDS
 from boulder_sweep.answers.trials import Judges, judges_of, ranges
 from boulder_sweep.designs import block_of
 from boulder_sweep.judge.quantiles import at_values
-from boulder_sweep.locations import Location
 from boulder_sweep.runner.pool import Pool, call
 from boulder_sweep.settings.loader import sweep_of
 from boulder_sweep.text import ProgressCallback
@@ -69,23 +67,13 @@ RESERVES = (
 )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Reserves(Result):
     """What the designs of a sweep withstand: inputs, outcome and withstood values of each. Made by `capacity`."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data."""
         return {"name": self.sweep.name, "rows": self.arrow.to_pylist()}
-
-    def write(self, path: str | Location) -> Location:
-        """Write the table to a Parquet file.
-
-        Raises
-        ------
-        QuestionError
-            It cannot be written.
-        """
-        return write_parquet(self.arrow, path)
 
 
 def capacity(sweep: Settings, *, jobs: int | None = None, progress: ProgressCallback | None = None) -> Reserves:

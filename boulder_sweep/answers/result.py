@@ -38,7 +38,7 @@ TableColumn = tuple[str, str, str, Any]
 """Name, unit, meaning, and n values: numbers, NaN for none; words, None for none; or an array of Arrow."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """Answers to a question about a sweep.
 
@@ -56,9 +56,22 @@ class Result:
     def __len__(self) -> int:
         return len(self.arrow)
 
+    def __repr__(self) -> str:
+        return str(draw("notebook", "text_of", self))
+
     def _repr_html_(self) -> str:
         """Return what the command prints, as a notebook shows it."""
         return str(draw("notebook", "html_of", self))
+
+    def write(self, path: str | Location) -> list[Location]:
+        """Write the answers to a Parquet file; return the paths of all that is written.
+
+        Raises
+        ------
+        QuestionError
+            The name has another ending, its folder does not exist, or it cannot be written.
+        """
+        return [write_parquet(self.arrow, path)]
 
     @property
     def frame(self) -> pd.DataFrame:
@@ -99,18 +112,14 @@ def chance_columns(chances: Chances, where: str = "") -> list[TableColumn]:
 def rows_table(
     start: int, block: DesignBlock, judged: Judged, columns: Sequence[TableColumn], at: int | None = None
 ) -> pa.Table:
-    """Return designs and their outcomes as a table with columns of an answer.
+    """Return n designs and their outcomes as a table with columns of an answer.
 
     Parameters
     ----------
     start
         Number of the first row.
-    block, judged
-        n designs and their outcomes.
-    columns
-        The further columns.
     at
-        Index of the first of them; behind all others by default.
+        Index of the first of the further columns; behind all others by default.
     """
     import pyarrow as pa
 
@@ -165,10 +174,6 @@ def joined_tables(
 
     Parameters
     ----------
-    tables
-        The tables.
-    sweep, judges
-        The sweep, and how its designs were judged.
     repeat
         Function that answers the same again.
     question

@@ -29,24 +29,15 @@ TRUNCATED = ("normal", "lognormal")
 
 
 class Spread:
-    """The uncertain inputs of a sweep.
+    """The uncertain inputs of a sweep, one of whose means may be searched.
 
-    Parameters
-    ----------
-    sweep
-        The sweep.
-    searched
-        Column (or ``embedment_ratio``) of the input whose mean is searched, if any.
+    Friction angle and subgrade reaction are correlated by a Gaussian copula: the normal of the second is ``rho z_1 +
+    sqrt(1 - rho^2) z_2``.
 
     Raises
     ------
     QuestionError
         No input has a distribution, or the one of the input searched moves with its mean in a way that is not known.
-
-    Notes
-    -----
-    Friction angle and subgrade reaction are correlated by a Gaussian copula: the normal of the second is ``rho z_1 +
-    sqrt(1 - rho^2) z_2``.
     """
 
     def __init__(self, sweep: Sweep, searched: str | None = None) -> None:
@@ -109,14 +100,7 @@ def _draw_values(
 
 
 class Moving:
-    """The distribution of the input that is searched.
-
-    Parameters
-    ----------
-    sweep
-        The sweep.
-    name
-        Column (or ``embedment_ratio``) of the input; it has a distribution.
+    """The distribution of the input that is searched, named by its column (or ``embedment_ratio``).
 
     Raises
     ------
@@ -142,20 +126,7 @@ class Moving:
             )
 
     def ends(self, spread: Distribution, mean: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the ends of a distribution that has moved.
-
-        Parameters
-        ----------
-        spread
-            The distribution in the file, or in one of its sets.
-        mean
-            Means, in the unit of the column, shape (n,).
-
-        Returns
-        -------
-        low, high : ndarray, shape (n,)
-            Its ends, within the admitted range.
-        """
+        """Return the ends of a distribution of the file with other means, within the admitted range, shape (n,)."""
         old = next(at for one, at in self._each if one is spread)
         moved = (end + (mean - old) if spread.cov is None else end * (mean / old) for end in (spread.low, spread.high))
         low, high = (np.clip(end, *self._admitted[:2]) for end in moved)
@@ -167,10 +138,7 @@ class Moving:
     def means(self, least: float) -> tuple[float, float]:
         """Return the smallest and the largest mean at which the distribution is within the admitted range.
 
-        Parameters
-        ----------
-        least
-            Smallest mean for which a spread that is a share of the mean makes sense, in the unit of the column.
+        A spread that is a share of the mean makes sense from a mean of `least` on, in the unit of the column.
         """
         first, last = self._admitted.low, self._admitted.high
         for spread, mean in self._each:
@@ -211,8 +179,6 @@ def narrowed(
 
     Parameters
     ----------
-    sweep
-        The sweep.
     name
         Column (or ``embedment_ratio``) of the input; without a distribution it keeps its ranges.
     low, high

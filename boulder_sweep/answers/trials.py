@@ -50,12 +50,7 @@ InputRows = dict[str, np.ndarray]
 class Open:
     """A sweep with some inputs left open.
 
-    Parameters
-    ----------
-    sweep
-        The sweep.
-    names
-        Inputs to leave open. Opening the embedment depth opens the embedment ratio too, and the reverse.
+    Opening the embedment depth opens the embedment ratio too, and the reverse.
     """
 
     def __init__(self, sweep: Sweep, names: tuple[str, ...]) -> None:
@@ -173,19 +168,9 @@ def millimetres(lengths: np.ndarray) -> np.ndarray:
 
 
 class Remembered:
-    """Judges designs as an evaluation does, each only once: an answer asks again and again for the ends of its bracket.
+    """Judges designs as an evaluation does, each only once: searches ask often for the ends of brackets.
 
-    It keeps what it has judged, so every block of rows has one of its own.
-
-    Parameters
-    ----------
-    evaluation
-        The evaluation.
-
-    Attributes
-    ----------
-    count : int
-        Designs judged so far.
+    It keeps what it has judged, so every block of rows has one of its own; `count` designs were judged so far.
     """
 
     def __init__(self, evaluation: Evaluation) -> None:
@@ -208,17 +193,7 @@ class Remembered:
 
 
 def judges_of(sweep: Sweep, least_margin: float = 0.0, *, robust: bool = False) -> Judges:
-    """Return the evaluations of a sweep.
-
-    Parameters
-    ----------
-    sweep
-        The sweep.
-    least_margin
-        Margin that a design must have to count as passing.
-    robust
-        Whether only a pass counts that stands under the second opinion that decides.
-    """
+    """Return the evaluations of a sweep; arguments: see `Judges`."""
     accuracy = accuracy_of(sweep)
     final = dataclasses.replace(evaluation_of(sweep, accuracy), least_margin=least_margin)
     final = dataclasses.replace(final, askable=final.askable and bool(sweep.model.second_opinion))

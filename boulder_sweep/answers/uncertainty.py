@@ -16,7 +16,6 @@ from boulder_sweep.answers.result import (
     Result,
     TableColumn,
     chance_columns,
-    checked_parquet,
     collected,
     joined_tables,
     rows_table,
@@ -49,7 +48,7 @@ SAMPLES = 4096
 """Samples kept of each row for plots and inspection."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Uncertainty(Result):
     """Probabilities of the designs of a sweep. Made by `uncertainty`.
 
@@ -74,20 +73,13 @@ class Uncertainty(Result):
         return {"name": self.sweep.name, "seed": self.seed, "rows": self.arrow.to_pylist()}
 
     def write(self, path: str | Location) -> list[Location]:
-        """Write the table to a Parquet file, with the samples next to it; return the paths.
-
-        Raises
-        ------
-        QuestionError
-            A file cannot be written.
-        """
-        target = checked_parquet(path)
-        files = [write_parquet(self.arrow, target)]
+        """Write the answers, with the samples next to them; see `Result.write`."""
+        files = super().write(path)
         if len(self.samples):
             metadata = self.arrow.schema.metadata.items()
             identity = {key: value for key, value in metadata if key.startswith(PREFIX.encode())}
             samples = self.samples.replace_schema_metadata(identity)
-            files.append(write_parquet(samples, target.with_suffix(".samples.parquet")))
+            files.append(write_parquet(samples, files[0].with_suffix(".samples.parquet")))
         return files
 
     def plot(self, path: str | Path, design_id: int = 0, *, units: str = "si") -> None:
@@ -235,7 +227,9 @@ def _rows(asked: _Arguments, points: Points, parallel: Pool, start: int, stop: i
 
 
 def drivers(z: np.ndarray, output: np.ndarray) -> np.ndarray:
-    """Return the most influential input of each row, from the means of an output over strata of each input.
+    """Return the most influential input of each row; -1 where the output does not vary, int64, shape (n,).
+
+    The means of the output are compared over strata of each input.
 
     Parameters
     ----------
@@ -243,11 +237,6 @@ def drivers(z: np.ndarray, output: np.ndarray) -> np.ndarray:
         Standard normal numbers, shape (m, d), the same for all rows.
     output
         An output at these points, shape (n, m).
-
-    Returns
-    -------
-    ndarray of int64, shape (n,)
-        Index of the input; -1 where the output does not vary.
     """
     shares = np.empty((len(output), z.shape[1]))
     for k in range(z.shape[1]):

@@ -30,7 +30,7 @@ def doctor() -> int:
 
 def _packages() -> list[tuple[str, str]]:
     """Return a row for this package, Python, what every command needs, and each extra."""
-    from boulder_kernels._cache import target
+    from boulder_kernels._jit import target
     from boulder_sweep.text import install
 
     wanted: dict[str, list[str]] = {"": []}
@@ -71,7 +71,7 @@ def _browser() -> str:
 
 def _kernels() -> str:
     """Return where compiled kernels are kept, and whether some are there."""
-    from boulder_kernels._cache import CACHE_FOLDER
+    from boulder_kernels._jit import CACHE_FOLDER
     from boulder_sweep.text import size_text
 
     if CACHE_FOLDER is None:

@@ -155,18 +155,7 @@ def _have_home() -> None:
 
 
 def execute(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Words behind ``sweep``; by default what this process was called with.
-
-    Returns
-    -------
-    int
-        Exit code, as ``sweep --help`` lists them.
-    """
+    """Run the command line, by default with the words of this process; return one of the codes of ``sweep --help``."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     completion = os.environ.get(COMPLETION)
     if completion:

@@ -80,15 +80,10 @@ def wrap(text: str, width: int = 80) -> list[str]:
 def announced(say_so: Callable[[str], None], resume: Callable[[], None]) -> Iterator[None]:
     """Say, once, that kernels are compiled, if any are.
 
-    Parameters
-    ----------
-    say_so
-        Shows a line; called before the first kernel is compiled.
-    resume
-        Called whenever one has been compiled.
+    `say_so` shows a line before the first kernel is compiled; `resume` is called whenever one has been compiled.
     """
     from boulder_kernels import _jit
-    from boulder_kernels._cache import CACHE_FOLDER
+    from boulder_kernels._jit import CACHE_FOLDER
 
     said = False
 
@@ -114,14 +109,7 @@ def announced(say_so: Callable[[str], None], resume: Callable[[], None]) -> Iter
 def working(quiet: bool, doing: str = "simulating", of: str = "designs") -> Iterator[Callable[[int, int], None] | None]:
     """Give a function that shows how many of how many are done, called with 0 once the kernels are compiled.
 
-    It is None where nothing is to be shown.
-
-    Parameters
-    ----------
-    quiet
-        Show nothing.
-    doing, of
-        Word beside the bar, and what is counted.
+    It is None where nothing is to be shown (`quiet`). `doing` stands beside the bar, and `of` is what is counted.
     """
     with progress(quiet, Notes(), doing, of) as shown:
         if shown is None:
@@ -147,18 +135,10 @@ def working(quiet: bool, doing: str = "simulating", of: str = "designs") -> Iter
 def progress(
     quiet: bool, notes: Notes, doing: str = "simulating", of: str = "designs"
 ) -> Iterator[Callable[[Progress], None] | None]:
-    """Give a function that shows progress and notes: a bar on a terminal, occasional lines elsewhere.
+    """Give a function that shows progress and notes: a bar on a terminal, occasional lines elsewhere; None if quiet.
 
     Nothing is compiled here: commands refuse what they must before they compile, and act on signals while they do.
-
-    Parameters
-    ----------
-    quiet
-        Show nothing.
-    notes
-        What was shown already.
-    doing, of
-        See `working`.
+    `notes` were shown already; `doing` and `of`: see `working`.
     """
     if quiet:
         yield None

@@ -93,7 +93,7 @@ def _lines_to_fill_in(file: Path, vehicle: str, units: int) -> list[str]:
     """Return which entries of a vehicle have no published values, and how to measure them."""
     from boulder_sweep.settings.starter import CATEGORIES, CLASSES
 
-    mass = CATEGORIES[CLASSES[vehicle][0]].mass[units]
+    mass = CATEGORIES[CLASSES[vehicle][0]][0][units]
     return [
         f"{file}: fill in three entries; no values are published for {vehicle}.",
         "  vehicle.spring, vehicle.damper: from a crash against a rigid wall. Measure the",

@@ -270,8 +270,8 @@ def export(out: str, file: str, units: str | None) -> int:
     """Write the result in OUT as one table for colleagues, in SI or US customary units.
 
     OUT is the folder of a run, or a file that -o of `sweep need`, `capacity` or `uncertainty`, or --trajectory wrote.
-    The names of the columns end in their units. A spreadsheet has a second sheet with units, meanings, settings,
-    versions and hashes.
+    The names of the columns end in their units. A spreadsheet has the recommendation on a sheet before the rows, and
+    units, meanings, settings, versions and hashes on one behind them.
     """
     from boulder_sweep.report.export import export as write
 

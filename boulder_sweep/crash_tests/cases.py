@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -71,13 +71,7 @@ elements then decides the result, not the step, down to some 1e-8 deg."""
 
 
 def crash_test(name: str) -> Sweep:
-    """Return a crash test as a sweep of one design.
-
-    Parameters
-    ----------
-    name
-        ``abg`` or ``rwg``.
-    """
+    """Return a crash test, ``abg`` or ``rwg``, as a sweep of one design."""
     solver = SolverSettings(accuracy=None, step_s=STEP_S, horizon_s=HORIZON_S)
     return Sweep(name=name, path=None, axes=(), constants={**_BOTH, **_BY_TEST[name]}, solver=solver)
 
@@ -151,13 +145,7 @@ class Convergence:
 
 
 def convergence(elements: Sequence[int] = ELEMENTS) -> Convergence:
-    """Simulate both crash tests under both presets with ever more soil elements, and in closed form.
-
-    Parameters
-    ----------
-    elements
-        Numbers of elements.
-    """
+    """Simulate both crash tests under both presets with ever more soil elements, and in closed form."""
     rotation, reached = {}, {}
     for test in NAMES:
         sweep = crash_test(test)
@@ -179,28 +167,13 @@ NO_CHANGE_DEG = 0.01
 
 @dataclass(frozen=True)
 class Statement:
-    """One statement of the paper.
-
-    Attributes
-    ----------
-    section : str
-        Where it stands.
-    says : str
-        What it says, in short.
-    model_gives : str
-        What the model gives, under both presets.
-    holds : bool or None
-        Whether that agrees; None where the text gives nothing to check it by.
-    """
+    """One statement of the paper: section, what it says in short, and what the model gives under both presets."""
 
     section: str
     says: str
     model_gives: str
     holds: bool | None
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain data."""
-        return asdict(self)
+    """Whether that agrees; None where the text gives nothing to check it by."""
 
 
 def statement_table(rows: list[Statement]) -> Table:
@@ -213,17 +186,7 @@ def statement_table(rows: list[Statement]) -> Table:
 
 
 def statements(trajectories: Trajectories, study: Convergence, wall: RigidWall) -> list[Statement]:
-    """Compare every statement of the paper with the model.
-
-    Parameters
-    ----------
-    trajectories
-        By test and preset.
-    study
-        Element sums against the closed form.
-    wall
-        The paper's truck against a rigid wall.
-    """
+    """Compare every statement of the paper with the model, by test and preset."""
     presets = list(dict.fromkeys(preset for _, preset in trajectories))
     abg = {preset: trajectories["abg", preset] for preset in presets}
     rwg = {preset: trajectories["rwg", preset] for preset in presets}

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from boulder_sweep.crash_tests.measured import FEWEST_SAMPLES, PULSE_UNITS, Pulse
+from boulder_sweep.crash_tests.measured import FEWEST_SAMPLES, PULSE_UNITS, TimeHistory
 from boulder_sweep.crash_tests.rigid_wall import RigidWall
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import FitError
@@ -62,8 +62,6 @@ class VehicleFit:
 
     Attributes
     ----------
-    pulse : Pulse
-        What was fitted.
     wall : RigidWall
         The fitted vehicle: mass, speed, spring, damper.
     touch_s : float
@@ -80,7 +78,7 @@ class VehicleFit:
         What the user of the fit should know before trusting it.
     """
 
-    pulse: Pulse
+    pulse: TimeHistory
     wall: RigidWall
     touch_s: float
     offset_m_s2: float | None
@@ -124,13 +122,7 @@ class VehicleFit:
         return {name: values[name] + (self.offset_m_s2 or 0.0) * (name == "acceleration") for name in self.misfits}
 
     def plot(self, path: str | Path) -> None:
-        """Draw pulse, fit and residuals.
-
-        Raises
-        ------
-        PictureError
-            The picture cannot be written, or matplotlib is not installed.
-        """
+        """Draw pulse, fit and residuals, or raise a `PictureError`."""
         draw("crash_curves", "draw_fit", self, path)
 
 
@@ -140,7 +132,7 @@ class _Problem:
     The response is linear in speed and zero offset, so both follow from these three, where they are not given.
     """
 
-    def __init__(self, pulse: Pulse, mass_kg: float, speed_m_s: float | None) -> None:
+    def __init__(self, pulse: TimeHistory, mass_kg: float, speed_m_s: float | None) -> None:
         self.pulse, self.mass_kg, self.speed_m_s = pulse, mass_kg, speed_m_s
         self.has_offset = False
         self.kept = np.full(len(pulse.time_s), True)
@@ -194,7 +186,9 @@ class _Problem:
         """
         time, signals = self.pulse.time_s, self.pulse.signals
         every = max(1, len(time) // ROWS_AT_START)
-        few = Pulse("", time[::every], {name: values[::every] for name, values in signals.items()})
+        few = replace(
+            self.pulse, time_s=time[::every], signals={name: values[::every] for name, values in signals.items()}
+        )
         if any(np.isfinite(values).sum() < FEWEST_SAMPLES for values in few.signals.values()):
             few = self.pulse
         thin = _Problem(few, self.mass_kg, self.speed_m_s)
@@ -249,21 +243,8 @@ class _Problem:
         return [b for part, n in zip(parts, counts, strict=True) for b in np.array_split(part, n) if len(b)]
 
 
-def fit_pulse(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) -> VehicleFit:
-    """Fit spring and damper of a Maxwell element to a rigid-wall crash pulse.
-
-    Parameters
-    ----------
-    pulse
-        One or more signals over time.
-    mass_kg
-        Mass of the vehicle.
-    speed_m_s
-        Speed of impact; fitted too where it is not given.
-
-    Returns
-    -------
-    VehicleFit
+def fit_pulse(pulse: TimeHistory, mass_kg: float, *, speed_m_s: float | None = None) -> VehicleFit:
+    """Fit spring and damper of a Maxwell element to a rigid-wall crash pulse; the speed too where it is not given.
 
     Raises
     ------
@@ -282,7 +263,7 @@ def fit_pulse(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) -
         apart = abs(record - speed_m_s) > SURE * error + GAUGE_SHARE * record
         if apart and not _far_out("impact_speed_m_s", record):  # else the record ends too early to say
             raise FitError(
-                f"{pulse.name}: the record says {record:.1f} ± {max(error, 0.05):.1f} m/s, "
+                f"{pulse.path}: the record says {record:.1f} ± {max(error, 0.05):.1f} m/s, "
                 f"--speed {speed_m_s:.1f} m/s; check the speed, and the units and the zero offset of the record"
             )
         fit = _fit(pulse, float(mass_kg), float(speed_m_s))
@@ -290,7 +271,7 @@ def fit_pulse(pulse: Pulse, mass_kg: float, *, speed_m_s: float | None = None) -
     return replace(fit, warnings=tuple(_warnings(fit)))
 
 
-def _fit(pulse: Pulse, mass_kg: float, speed_m_s: float | None) -> VehicleFit:
+def _fit(pulse: TimeHistory, mass_kg: float, speed_m_s: float | None) -> VehicleFit:
     """Fit a pulse, whatever comes out."""
     problem = _Problem(pulse, mass_kg, speed_m_s)
     unknowns = problem.best()
@@ -354,7 +335,7 @@ def _refuse(fit: VehicleFit) -> None:
         if wall.max_displacement_m > MOST_CRUSH_M:
             reasons.append(f"the fitted vehicle is crushed by {wall.max_displacement_m:,.0f} m, more than it is long")
     if reasons:
-        raise FitError(f"{fit.pulse.name}: {'; '.join(reasons)}. {_what_to_do(fit)}")
+        raise FitError(f"{fit.pulse.path}: {'; '.join(reasons)}. {_what_to_do(fit)}")
 
 
 def _what_to_do(fit: VehicleFit) -> str:
@@ -407,7 +388,7 @@ def _warnings(fit: VehicleFit) -> Iterator[str]:
         )
 
 
-def _onset(pulse: Pulse) -> float:
+def _onset(pulse: TimeHistory) -> float:
     """Return the first time at which a signal has changed by a third of its change [s]."""
     times = []
     for name, values in pulse.signals.items():

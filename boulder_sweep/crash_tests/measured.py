@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -67,8 +67,6 @@ class TimeHistory:
 
     Attributes
     ----------
-    path : Path
-        The file.
     time_s : ndarray, shape (n,)
         Times, ascending [s].
     signals : dict of str to ndarray, shape (n,)
@@ -81,14 +79,7 @@ class TimeHistory:
 
 
 def read_history(path: str | Path, wanted: Sequence[Signal]) -> TimeHistory:
-    """Read a CSV file of measurements over time.
-
-    Parameters
-    ----------
-    path
-        See `boulder_sweep.settings.text_table.open_text`; the units may stand in the names, or below them.
-    wanted
-        Quantities it may hold; time among them.
+    """Read a CSV file of measurements over time; `wanted` are the quantities it may hold, time among them.
 
     Returns
     -------
@@ -134,13 +125,7 @@ class _Column(NamedTuple):
 
 
 def _columns(table: TextTable, wanted: Sequence[Signal], problems: ProblemList) -> list[_Column]:
-    """Return what the columns are.
-
-    Raises
-    ------
-    SettingsError
-        A name or a unit is not known, or time or all else is missing.
-    """
+    """Return what the columns are; refuse unknown names and units, and a file without time or all else."""
     names = _with_units(table, wanted)
     found = [_column(name, at, wanted, problems) for name, at in zip(names, table.positions, strict=True)]
     columns = [column for column in found if column is not None]
@@ -218,26 +203,7 @@ SIZES = (1e-9, 1e9)
 """Least and greatest peak of a signal that is accepted, in its unit: far beyond any impact."""
 
 
-@dataclass(frozen=True, eq=False)
-class Pulse:
-    """A rigid-wall crash pulse.
-
-    Attributes
-    ----------
-    name : str
-        Where it comes from.
-    time_s : ndarray, shape (n,)
-        Times [s], ascending. Zero need not be first touch exactly, and rows before it are of use.
-    signals : dict of str to ndarray, shape (n,)
-        ``displacement`` [m], ``velocity`` [m/s], ``acceleration`` [m/s^2], one or more; NaN in gaps.
-    """
-
-    name: str
-    time_s: np.ndarray
-    signals: dict[str, np.ndarray]
-
-
-def read_pulse(path: str | Path) -> Pulse:
+def read_pulse(path: str | Path) -> TimeHistory:
     """Read a crash pulse from a CSV file; see `boulder_sweep.crash_tests.measured` for its header.
 
     Raises
@@ -250,8 +216,11 @@ def read_pulse(path: str | Path) -> Pulse:
     return pulse_of(read_history(path, PULSE_SIGNALS))
 
 
-def pulse_of(history: TimeHistory) -> Pulse:
+def pulse_of(history: TimeHistory) -> TimeHistory:
     """Return a measured history as a crash pulse; a deceleration becomes an acceleration.
+
+    It has one or more of ``displacement`` [m], ``velocity`` [m/s] and ``acceleration`` [m/s^2]. Zero need not be first
+    touch exactly, and rows before it are of use.
 
     Raises
     ------
@@ -283,7 +252,7 @@ def pulse_of(history: TimeHistory) -> Pulse:
         moved = known - known[0] if name == "displacement" else known
         if moved[np.abs(moved) >= 0.25 * np.abs(moved).max()][0] < 0.0:
             raise FitError(f"{history.path}: the {name} is negative at first; it counts as positive towards the wall")
-    return Pulse(str(history.path), history.time_s, signals)
+    return replace(history, signals=signals)
 
 
 def _check_size(label: str, values: np.ndarray, name: str) -> None:

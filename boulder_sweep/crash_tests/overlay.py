@@ -33,20 +33,9 @@ DIGITS = {"deg": 2, "m/s^2": 1, "m": 4}
 
 @dataclass(frozen=True)
 class Peak:
-    """Values of the largest magnitude of one signal, with their signs.
+    """Values of the largest magnitude of one signal up to a time, with their signs, by one preset of readings.
 
-    Attributes
-    ----------
-    signal, unit : str
-        What was measured.
-    readings : str
-        Preset of the simulation.
-    until_s : float
-        End of the time that is looked at [s].
-    measured, simulated : float
-        The values.
-    error : float or None
-        By how much the simulated one is larger, as a share of the measured one; None where their signs differ.
+    `error` is by how much the simulated one is larger, as a share of the measured one; None where their signs differ.
     """
 
     signal: str
@@ -60,20 +49,9 @@ class Peak:
 
 @dataclass(frozen=True, eq=False)
 class Overlay:
-    """A test and its simulations.
+    """A test and its simulations: trajectories by preset, the peaks of every signal, and notes.
 
-    Attributes
-    ----------
-    name : str
-        Of the design.
-    measured : TimeHistory
-        What was measured.
-    trajectories : dict of str to Trajectory
-        By preset.
-    peaks : list of Peak
-        Of every signal under every preset.
-    notes : list of str
-        What to say of signals that run against every simulation.
+    The notes name signals that run against every simulation.
     """
 
     name: str

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Iterator, Sequence
+import io
 from dataclasses import dataclass, field
-from itertools import zip_longest
 
 WIDTH = 80
 """Columns of a terminal."""
@@ -13,15 +11,7 @@ WIDTH = 80
 
 @dataclass
 class Table:
-    """A table of texts, numbers already rounded.
-
-    Attributes
-    ----------
-    head : tuple of str
-        Names of the columns.
-    rows : list of tuple of str
-        Lines.
-    """
+    """A table of texts, numbers already rounded: names of the columns, and lines."""
 
     head: tuple[str, ...]
     rows: list[tuple[str, ...]] = field(default_factory=list)
@@ -37,44 +27,31 @@ class Table:
         lines = [self.head, tuple("---" for _ in self.head), *self.rows]
         return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
 
-    def text(self, width: int = WIDTH) -> str:
-        """Return the table for a terminal, numbers to the right, no line longer than `width`.
+    def turned(self) -> Table:
+        """Return the table with rows and columns changed, for one that is too wide for a terminal."""
+        head, *rows = zip(self.head, *self.rows, strict=True)
+        return Table(head, rows)
 
-        Words are wrapped where a column must be narrower; if that is not enough, rows and columns change places.
-        """
-        lines = [self.head, *self.rows]
-        right = [all(_is_number(row[k]) for row in self.rows) for k in range(len(self.head))]
-        if (widths := _widths(lines, width)) is None:
-            lines = list(zip(*lines, strict=True))
-            right = [False] + [True] * len(self.rows)
-            widths = _widths(lines, width) or [max(map(len, column)) for column in zip(*lines, strict=True)]
-        return "\n".join(text for line in lines for text in _lines(line, widths, right))
+    def text(self) -> str:
+        """Return the table for a terminal, columns of numbers to the right, words wrapped where lines are too long."""
+        from rich.console import Console  # only terminals need it
+        from rich.table import Table as Grid
+        from rich.text import Text
+
+        grid = Grid(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+        for index, name in enumerate(self.head):
+            numbers = sum(_is_number(row[index]) for row in self.rows)
+            grid.add_column(Text(name), justify="right" if 2 * numbers > len(self.rows) else "left")
+        for row in self.rows:
+            grid.add_row(*map(Text, row))
+        shown = io.StringIO()
+        Console(file=shown, width=WIDTH, force_terminal=False).print(grid)
+        return "\n".join(line.rstrip() for line in shown.getvalue().splitlines())
 
 
 def number(value: float, digits: int, none: str = "-") -> str:
     """Return a number with so many decimals; `none` for NaN."""
     return none if value != value else f"{value:.{digits}f}"
-
-
-def _widths(lines: Sequence[Sequence[str]], width: int) -> list[int] | None:
-    """Return the widths of columns, the widest ones narrowed until all fit; None where their words are too long."""
-    columns = list(zip(*lines, strict=True))
-    widths = [max(map(len, column)) for column in columns]
-    least = [max(len(word) for cell in column for word in [*cell.split(), ""]) for column in columns]
-    while sum(widths) + 2 * (len(widths) - 1) > width:
-        spare = [full - word for full, word in zip(widths, least, strict=True)]
-        if not any(spare):
-            return None
-        widths[max(range(len(widths)), key=lambda k: (spare[k] > 0, widths[k]))] -= 1
-    return widths
-
-
-def _lines(cells: Sequence[str], widths: Sequence[int], right: Sequence[bool]) -> Iterator[str]:
-    """Yield the lines of a row, its cells wrapped."""
-    wrapped = (textwrap.wrap(cell, w, break_on_hyphens=False) for cell, w in zip(cells, widths, strict=True))
-    for parts in zip_longest(*wrapped, fillvalue=""):
-        padded = [part.rjust(w) if r else part.ljust(w) for part, w, r in zip(parts, widths, right, strict=True)]
-        yield "  ".join(padded).rstrip()
 
 
 def _is_number(cell: str) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -46,8 +46,6 @@ class Validation:
         The paper's truck against a rigid wall.
     convergence : Convergence
         Element sums against the closed form.
-    statements : list of Statement
-        What the paper says, and what the model gives.
     files : list of Path
         What was written.
     """
@@ -93,15 +91,17 @@ class Validation:
         moving = any(row["vehicle_still_moving"] for row in self.rows().values())
         footnote = ["* still moving at the end of the simulated time"] if moving else []
         tables = [statement_table(self.statements), self.convergence.table()]
-        return "\n".join([self.table().text(), *footnote, *(f"\n{table.text()}" for table in tables)])
+        return "\n".join([self.table().turned().text(), *footnote, *(f"\n{table.text()}" for table in tables)])
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything but the time histories as plain data."""
         return {
             "crash_tests": [
-                {"test": test, "preset": preset, **_json(row)} for (test, preset), row in self.rows().items()
+                {"test": test, "preset": preset}
+                | {key: None if isinstance(value, float) and math.isnan(value) else value for key, value in row.items()}
+                for (test, preset), row in self.rows().items()
             ],
-            "statements": [statement.to_dict() for statement in self.statements],
+            "statements": [asdict(statement) for statement in self.statements],
             "convergence": self.convergence.to_dict(),
             "rigid_wall": wall_figures(self.wall),
             "not_compared": NOT_COMPARED,
@@ -116,10 +116,6 @@ def validate(out: str | Path | None = None) -> Validation:
     ----------
     out
         Folder for pictures and Parquet files; nothing is written without one.
-
-    Returns
-    -------
-    Validation
 
     Raises
     ------
@@ -171,8 +167,3 @@ def _row(trajectory: Trajectory) -> dict[str, Any]:
     row["rotation_at_0.1_s_deg"] = math.degrees(trajectory.rotation_rad[early])
     row["boulder_centre_displacement_at_0.1_s_m"] = float(trajectory.boulder_centre_displacement_m[early])
     return row
-
-
-def _json(row: dict[str, Any]) -> dict[str, Any]:
-    """Return a row with None in place of NaN."""
-    return {key: None if isinstance(value, float) and math.isnan(value) else value for key, value in row.items()}

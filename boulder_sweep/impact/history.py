@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from boulder_kernels import Constants, Control, Design, Outcome, Readings, Record
-from boulder_kernels.design import Body
+from boulder_kernels.design import Body, body_with
 from boulder_kernels.dynamics import (
+    BOX,
     FREE,
     HELD,
     LIMITED_BACK,
@@ -19,11 +20,9 @@ from boulder_kernels.dynamics import (
     TURNING_FORWARD,
     Acceleration,
 )
-from boulder_kernels.outline import body_with
+from boulder_kernels.outcomes import StoredEnergies, evaluate_samples
 from boulder_kernels.pieces import ManyPieces, Piece
 from boulder_kernels.soil import drag_force, soil_kinematics, spring_force
-from boulder_kernels.soil_laws import BOX
-from boulder_kernels.time_history import StoredEnergies, evaluate_samples
 
 MODE_NAMES = {
     SEATED: "seated",
@@ -51,7 +50,7 @@ class Motion:
     """Outcome of the whole recorded motion, beyond the limit."""
 
     given_outline: np.ndarray = field(default_factory=lambda: BOX)
-    """Outline of the boulder, shape (P, 4), see `boulder_kernels.outline`; P = 0 of a box."""
+    """Outline of the boulder, shape (P, 4), see `boulder_kernels.design`; P = 0 of a box."""
 
     @property
     def body(self) -> Body:
@@ -60,7 +59,7 @@ class Motion:
 
     @property
     def outline(self) -> np.ndarray:
-        """Outline of the boulder, shape (P, 4), see `boulder_kernels.outline`; a box has its own."""
+        """Outline of the boulder, shape (P, 4), see `boulder_kernels.design`; a box has its own."""
         if len(self.given_outline):
             return self.given_outline
         half = 0.5 * self.design.L
@@ -71,25 +70,10 @@ class Motion:
 class EnergyLedger:
     """Where the vehicle's energy is at every sample [J], arrays of shape (n,).
 
-    Attributes
-    ----------
-    time_s : ndarray
-        Times of the samples [s].
-    vehicle_kinetic_J : ndarray
-        Kinetic energy of the vehicle.
-    crush_spring_J, crush_damper_J : ndarray
-        Stored in the spring of its front, and dissipated in the damper.
-    boulder_linear_J, boulder_angular_J : ndarray
-        Kinetic energy of boulder and lumped soil.
-    soil_elastic_J, soil_drag_J : ndarray
-        Stored in the springs of the soil, and dissipated by its drag.
-    gravity_J : ndarray
-        Done against the weight. Under the gravity reading a potential energy; as printed the work done against
-        the restoring moment, which has no potential (and is negative where it drives the boulder on).
-    pull_J : ndarray
-        Printed separation only: minus the work of the pull on the vehicle that nothing on the boulder answers.
-    residual_J : ndarray
-        What the ledger fails to account for: the sum of all parts minus the energy at first touch.
+    `boulder_sweep.impact.trajectory.ENERGY` says what each is. Under the gravity reading `gravity_J` is a potential
+    energy; as printed it is the work done against the restoring moment, which has no potential (negative where it
+    drives the boulder on). `pull_J` is, with the printed separation only, minus the work of the pull on the vehicle
+    that nothing on the boulder answers.
     """
 
     time_s: np.ndarray
@@ -119,18 +103,7 @@ class EnergyLedger:
 
 
 def forces_along(motion: Motion) -> dict[str, np.ndarray]:
-    """Evaluate the forces at the samples of a record.
-
-    Parameters
-    ----------
-    motion
-        The recorded motion, n samples.
-
-    Returns
-    -------
-    dict of str to ndarray
-        Arrays of shape (n,) by the names of the trajectory's columns.
-    """
+    """Return the forces at the n samples of a record, arrays of shape (n,) by the names of the trajectory's columns."""
     (a_b, alpha_b, a_v, M), _ = _evaluated(motion)
     c, theta = motion.constants, motion.record.states[:, 2]
     # As printed the truck is pulled back by a force that the boulder does not feel: only contact counts here.
@@ -147,18 +120,7 @@ def forces_along(motion: Motion) -> dict[str, np.ndarray]:
 
 
 def ledger_of(motion: Motion) -> EnergyLedger:
-    """Draw up the energy ledger at the samples of a record.
-
-    Parameters
-    ----------
-    motion
-        The recorded motion, n samples, with the energies exchanged.
-
-    Returns
-    -------
-    EnergyLedger
-        Arrays of shape (n,).
-    """
+    """Draw up the energy ledger at the n samples of a record that has the energies exchanged."""
     _, stored = _evaluated(motion)
     truck, linear, angular, elastic, spring, potential = stored
     drag, damper, restoring, pull = motion.record.exchanged.T
@@ -201,14 +163,7 @@ class SoilForces:
 def soil_profile(motion: Motion, sample: int, slices: int) -> SoilForces:
     """Cut the soil along the buried face into slices of equal height at one sample.
 
-    Parameters
-    ----------
-    motion
-        The recorded motion.
-    sample
-        Which sample.
-    slices
-        How many slices; each stands for the soil element in its middle.
+    Each slice stands for the soil element in its middle.
     """
     c = motion.constants
     x_b, v_b, theta, omega, _, _ = (float(value) for value in motion.record.states[sample])

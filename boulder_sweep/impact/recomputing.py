@@ -97,11 +97,6 @@ def recompute(out: str | Location, design_id: int) -> Recomputation:
     design_id
         Number of the row.
 
-    Returns
-    -------
-    Recomputation
-        The row as stored and as recomputed, and its time history.
-
     Raises
     ------
     StoreError
@@ -181,7 +176,7 @@ def _in_case(case: dict[str, Any], given: dict[str, Any], inputs: dict[str, floa
     case
         What was taken in the case, and the values of these inputs by column name: a number, or a list.
     given, inputs
-        The same of the table, for all inputs, and the inputs of the row.
+        All inputs of the table by the same names, and the inputs of the row.
     """
     height = inputs["boulder_height_m"]
     own = inputs | {"embedment_ratio": inputs["embedment_depth_m"]}  # of a list of ratios the depths are compared

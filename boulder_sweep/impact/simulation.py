@@ -14,8 +14,8 @@ from boulder_kernels import Control, Outcome, Readings, Record, no_record
 from boulder_kernels import simulate as simulate_impact
 from boulder_kernels._jit import plain
 from boulder_kernels.control import control_for
+from boulder_kernels.dynamics import BOX, constants_in
 from boulder_kernels.outcomes import FINER, NONE_NEEDED
-from boulder_kernels.soil_laws import BOX, constants_in
 from boulder_kernels.table import is_layered, is_paired, problem_at, step_of_solution
 from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS, SHAPES
 from boulder_sweep.impact.history import Motion

@@ -88,39 +88,21 @@ _BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in (*HISTORY, *ENERG
 class Trajectory:
     """One impact: its row of a table, and how it goes over time. Made by `boulder_sweep.simulate`.
 
-    Arrays have the shape (n,), one value per sample, in SI units and radians; n is 0 where nothing moved because
-    the truck passes over the boulder, or where the design could not be computed.
+    Arrays have the shape (n,), one value per sample, in SI units and radians; `HISTORY` says what each is. n is 0 where
+    nothing moved because the truck passes over the boulder, or where the design could not be computed.
 
     Attributes
     ----------
-    name : str
-        Name of the sweep the design belongs to.
-    design_id : int
-        Its number there.
+    name, design_id
+        Name of the sweep the design belongs to, and its number there.
     inputs : dict of str to float
         The design by the names and units of the table's input columns.
     settings : dict
         The resolved settings of the sweep.
-    time_s : ndarray
-        Time since the first touch.
-    boulder_displacement_m, boulder_velocity_m_s : ndarray
-        Displacement x_b and velocity of the common centre of mass of boulder and lumped soil.
     boulder_centre_displacement_m : ndarray
         Displacement of the boulder's own centre of mass, what a camera tracks:
         x_b + (L/2 - c_x)(cos theta - 1) + (H/2 - c_y) sin theta (Eqs 53 to 55, with bracket and sign of Eq 55
         corrected, and the value at rest subtracted).
-    rotation_rad, angular_velocity_rad_s : ndarray
-        Rotation theta_b of the boulder, positive with its top away from the vehicle, and its rate.
-    vehicle_displacement_m, vehicle_velocity_m_s, vehicle_acceleration_m_s2 : ndarray
-        Motion of the vehicle.
-    contact_force_N, contact_moment_N_m : ndarray
-        Force F_v of the vehicle on the boulder (Eq 47), and its moment about the common centre of mass (Eq 48).
-    soil_force_N, soil_moment_N_m : ndarray
-        Sums of the soil's forces and moments (Eqs 19, 20).
-    restoring_moment_N_m : ndarray
-        Restoring moment M_R of the boulder's weight (Eqs 37 to 39).
-    rotation_mode, in_contact : ndarray of str
-        Modes of the motion in words, see `boulder_sweep.impact.history.MODE_NAMES`; ``touching`` or ``coasting``.
     judged : Judged
         The outcome columns of its row of a table; `row` as plain data.
     decided : Outcome
@@ -219,14 +201,10 @@ class Trajectory:
         return ledger_of(self.motion)
 
     def summary(self) -> dict[str, Any]:
-        """Return the row of the table in its names and units, with the times of the maxima.
+        """Return the row of the table as plain data in its names and units, with the times of the maxima.
 
-        Returns
-        -------
-        dict
-            Plain data; None where there is no value. ``energy_residual`` is what the energy ledger fails to account
-            for, at most, as a share of the energy at first touch: a check of this very simulation. The readings and
-            the representation of the soil close it.
+        ``energy_residual`` is what the energy ledger fails to account for, at most, as a share of the energy at first
+        touch: a check of this very simulation. The readings and the representation of the soil close it.
         """
         result: dict[str, Any] = {"name": self.name, "design_id": self.design_id}
         for name, value in self.row.items():
@@ -272,14 +250,7 @@ class Trajectory:
         )
 
     def to_parquet(self, path: str | Path, *, energy: bool = False) -> None:
-        """Write the time history to a Parquet file.
-
-        Parameters
-        ----------
-        path
-            The file; replaced where it exists.
-        energy
-            Also write the energy ledger.
+        """Write the time history to a Parquet file, with the energy ledger where asked for.
 
         Raises
         ------
@@ -297,14 +268,7 @@ class Trajectory:
             raise HistoryFileError(f"{path} cannot be written: {why(problem)}") from problem
 
     def plot(self, path: str | Path, *, units: str = "si") -> None:
-        """Draw rotation, displacements and force over time.
-
-        Parameters
-        ----------
-        path
-            Picture to write, its kind by its ending (.png, .svg, .pdf).
-        units
-            ``si`` or ``us``.
+        """Draw rotation, displacements and force over time, in ``si`` or ``us`` units (.png, .svg, .pdf).
 
         Raises
         ------
@@ -322,15 +286,7 @@ class Trajectory:
         draw("side_view", "draw_still", self, path, time_s=time_s)
 
     def animate(self, path: str | Path, progress: Callable[[int, int], None] | None = None) -> None:
-        """Draw a moving side view (.gif); see `plot`.
-
-        Parameters
-        ----------
-        path
-            File to write.
-        progress
-            Told how many frames of how many are drawn.
-        """
+        """Draw a moving side view (.gif); `progress` is told how many frames of how many are drawn; see `plot`."""
         draw("side_view", "animate", self, path, progress)
 
 
@@ -341,12 +297,9 @@ def _plain(value: Any) -> float | None:
 
 
 def checked_history(path: str | Path) -> Path:
-    """Return the path of a time history if it can be written there.
+    """Return the path of a time history, or refuse one that cannot be written by a `HistoryFileError`.
 
-    Raises
-    ------
-    HistoryFileError
-        The name has another ending, its folder does not exist or holds the result of a run, or it cannot be written.
+    It has another ending, its folder does not exist or holds the result of a run, or it cannot be written.
     """
     target = Path(path)
     if target.suffix.lower() != ".parquet":

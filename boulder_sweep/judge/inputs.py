@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from boulder_kernels import DesignTable
-from boulder_kernels.outline import FAR, HEIGHT, NEAR
+from boulder_kernels.design import FAR, HEIGHT, NEAR
 from boulder_sweep.columns import BOULDER_MASS, SHAPES
 from boulder_sweep.designs import LEAST_SOLIDITY, LEAST_TAPED, solidity_of
 from boulder_sweep.settings.model import Model

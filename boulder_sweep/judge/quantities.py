@@ -44,14 +44,16 @@ def quantities(rows: Mapping[str, Any], shape: Shape, ground: Ground) -> dict[st
         Layers below the uppermost; the wedge follows the one of those above the base that makes it the longest.
     """
     L, W, H, density, d, phi = (np.asarray(rows[name], dtype=np.float64) for name in NEEDED)
-    box = L * W * H
-    weighed = rows.get(BOULDER_MASS)
+    box, weighed = L * W * H, rows.get(BOULDER_MASS)
     mass = density * box * shape.filled if weighed is None else np.asarray(weighed, dtype=np.float64)
+    buried = box * buried_share(shape, d / H)
+    if weighed is not None and shape.is_box:  # what fills less than its box fills less of the pit
+        buried = buried * np.minimum(mass / (density * box), 1.0)
     slope = wedge_slope(phi)
     for layer in ground.layers:
         slope = np.where(layer.from_m < d, np.maximum(slope, wedge_slope(np.asarray(layer.friction_angle_deg))), slope)
     excavated = W * d * (L + d * slope)
-    values = (mass, H - d, excavated, excavated - box * buried_share(shape, d / H))
+    values = (mass, H - d, excavated, excavated - buried)
     return {spec.name: value for spec, value in zip(QUANTITIES, np.broadcast_arrays(*values), strict=True)}
 
 

@@ -44,7 +44,7 @@ ROBUST, SENSITIVE, OPEN = range(len(GRADES))
 DECISIVE = "width_capped"
 """The law that decides: it resists least, but for slender boulders in dense soil, which are asked of others, too."""
 IN_WORDS = (
-    "stands with friction and vertical motion under the weakest of three soil models; not tested: soil on one side "
+    "stands with friction and vertical motion under the weakest of three soil models; not modelled: soil on one side "
     "only, rounded boulders"
 )
 """Explanation of the grade ``robust``."""

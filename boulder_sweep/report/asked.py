@@ -24,7 +24,7 @@ MOST_LINES = 200
 """Most answers in the table of the page."""
 NOTHING = {
     WORDS[NEVER]: "not pass anywhere in the searched range",
-    WORDS[BLOCKED]: "not pass up to where the truck would pass or ride over the boulder; another boulder is needed",
+    WORDS[BLOCKED]: "not pass by what was asked, up to where the truck would pass or ride over the boulder",
     WORDS[UNKNOWN]: "not pass for certain: the last value tried is undecided",
     WORDS[NOT_MONOTONE]: "not pass but in places, between values that fail",
 }

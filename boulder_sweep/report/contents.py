@@ -35,7 +35,7 @@ from boulder_sweep.settings.checks import (
     SLIDES,
     uppermost_is_wet,
 )
-from boulder_sweep.settings.choices import LAYER_FIELDS
+from boulder_sweep.settings.entries import LAYER_FIELDS
 from boulder_sweep.settings.fields import BY_NAME, fields_of
 from boulder_sweep.settings.model import FEET, RESISTANCES, WATER_KG_M3, Ground
 from boulder_sweep.settings.shape import Shape

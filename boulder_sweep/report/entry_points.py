@@ -15,10 +15,22 @@ from boulder_kernels import Control, Design, Outcome, Problem, Readings, Record
 from boulder_kernels._jit import inlined, kernel
 from boulder_kernels.control import STEP_RATIO, control_for, control_in
 from boulder_kernels.design import design_in
-from boulder_kernels.error_estimates import safety_of, step_errors, take_second
+from boulder_kernels.dynamics import constants_in
 from boulder_kernels.ground import Ground, put_soil
 from boulder_kernels.impact import simulate_alone, simulate_last_resort
-from boulder_kernels.outcomes import NONE_NEEDED, PAIR, SECOND, STEP, outcome_in, write_outcome
+from boulder_kernels.outcomes import (
+    NONE_NEEDED,
+    PAIR,
+    SECOND,
+    STEP,
+    outcome_in,
+    safety_of,
+    sample_of,
+    state_of,
+    step_errors,
+    take_second,
+    write_outcome,
+)
 from boulder_kernels.pieces import ManyPieces, SoilProfile
 from boulder_kernels.rules import (
     SLOWER_SPEEDS,
@@ -28,8 +40,6 @@ from boulder_kernels.rules import (
     flags_of,
     rule_by_slower,
 )
-from boulder_kernels.soil_laws import constants_in
-from boulder_kernels.time_history import sample_of, state_of
 from boulder_sweep.report.page_records import (
     BELOW,
     COURSE,
@@ -256,7 +266,7 @@ def rows(
         Room for the layers of their soil, shape (n, m, 6), see `boulder_kernels.pieces`; none for a uniform soil
         beside boxes.
     outlines_at
-        Room for the outlines of the boulders, shape (n, points, 4), see `boulder_kernels.outline`.
+        Room for the outlines of the boulders, shape (n, points, 4), see `boulder_kernels.design`.
     soil_at
         Room for the soil of one design: SUMS_ROOM numbers and PIECE_ROOM for each of its pieces, or for N soil elements
         ELEMENT_ROOM N.

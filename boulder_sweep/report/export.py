@@ -3,16 +3,33 @@
 from __future__ import annotations
 
 import csv
+import re
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from io import TextIOWrapper
+from datetime import datetime
+from functools import cache, lru_cache, partial
+from io import BytesIO, TextIOWrapper
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
 
 from boulder_sweep.answers.advice import advice
 from boulder_sweep.answers.need import Need
-from boulder_sweep.answers.outputs import NEED, AnswerFile, result_of
-from boulder_sweep.columns import BOULDER_MASS, BY_NAME
+from boulder_sweep.answers.outputs import CAPACITY, NEED, UNCERTAINTY, AnswerFile, kind_of, result_of
+from boulder_sweep.answers.printing import (
+    MARK,
+    Screen,
+    designs_screen,
+    need_screen,
+    reserve_screen,
+    title,
+    uncertainty_screen,
+    wrapped,
+    yard_lines,
+)
+from boulder_sweep.columns import BOULDER_MASS, BY_NAME, DESIGN_ID
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.quantities import NEEDED, QUANTITIES, quantities_by
 from boulder_sweep.locations import Location, location_of, replacing
@@ -34,15 +51,23 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 Exportable = FinishedRows | AnswerFile
+Writer = Callable[[BinaryIO, Exportable, str], int]
 KINDS = (".xlsx", ".csv", ".parquet")
 MOST_SHEET_ROWS = 1_048_575
 """Most rows of a spreadsheet, without the header."""
 PIECE = 10_000
 """Rows that become cells at once."""
-LEAST_WIDTH, ABOUT_WIDTHS = 14, {"A": 44, "B": 12, "C": 90}
+LEAST_WIDTH, ABOUT_WIDTHS = 14, (44, 12, 90)
 """Widths of columns, in characters."""
+CREATED = datetime(1980, 1, 1)
+"""Date in every spreadsheet, so that the same rows give the same file."""
+ANSWERS = ("least_", "most_", "found", "p_", "withstands_", "simulated_", "verdict", "reason", "margin", "robustness")
+"""What names of columns begin with that are the answer, in the order in which a spreadsheet has them."""
 FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
 """First characters of text that a spreadsheet takes for a formula."""
+RAW = ("{=", "<r>")
+"""What XlsxWriter takes for an array formula, and for XML."""
+_NUMBER = re.compile(r"-?[0-9][0-9,]*(?:\.([0-9]+))?(%?)", re.ASCII)
 
 
 def export(out: str | Location, file: str | Path, *, units: str | None = None) -> int:
@@ -54,7 +79,8 @@ def export(out: str | Location, file: str | Path, *, units: str | None = None) -
         Folder that a sweep wrote, perhaps with a run still writing into it, or a file of `need`, `uncertainty`,
         `reserves` or of a time history.
     file
-        The table: ``.xlsx``, with a second sheet of units, settings and versions, ``.csv`` or ``.parquet``.
+        The table: ``.xlsx``, with the answer on a sheet before it and units, settings and versions on one behind it,
+        ``.csv`` or ``.parquet``.
     units
         ``si`` for the table as it is, ``us`` for US customary units, by default as in the settings file; column
         names end in the unit.
@@ -68,7 +94,7 @@ def export(out: str | Location, file: str | Path, *, units: str | None = None) -
     ------
     ReportError
         The kind is unknown, the folder of the table does not exist or is the result of a run, a sheet cannot hold so
-        many rows, the table cannot be written, or openpyxl, an extra, is not installed.
+        many rows, the table cannot be written, or XlsxWriter, an extra, is not installed.
     StoreError
         There is no result in the folder, or it is damaged.
     ValueError
@@ -76,7 +102,8 @@ def export(out: str | Location, file: str | Path, *, units: str | None = None) -
     """
     if units is not None:
         check_system(units)
-    target, finished = Path(file), result_of(location_of(out), ReportError, histories=True)
+    target, location = Path(file), location_of(out)
+    finished = result_of(location, ReportError, histories=True)
     units = units or units_in(finished.identity["settings"])
     kind = target.suffix.lower()
     if kind not in KINDS:
@@ -86,10 +113,10 @@ def export(out: str | Location, file: str | Path, *, units: str | None = None) -
         raise ReportError(
             f"a sheet holds {MOST_SHEET_ROWS:,} rows, not {finished.rows_done:,}: choose .csv or .parquet"
         )
-    writer: Callable[[BinaryIO, Exportable, str], int] = {".xlsx": _sheet, ".csv": _csv, ".parquet": _parquet}[kind]
+    writers: dict[str, Writer] = {".xlsx": partial(_sheets, location), ".csv": _csv, ".parquet": _parquet}
     try:
         with replacing(target) as passing:
-            return writer(passing, finished, units)
+            return writers[kind](passing, finished, units)
     except OSError as problem:
         raise ReportError(f"{file} cannot be written: {why(problem)}") from problem
 
@@ -216,7 +243,20 @@ def _rows(table: pa.Table) -> Iterator[tuple[Any, ...]]:
     """Yield the rows as cells; not all are in memory at once."""
     for first in range(0, len(table), PIECE):
         columns = table.slice(first, PIECE).columns
-        yield from zip(*(_cells(column.to_pylist()) for column in columns), strict=True)
+        yield from zip(*map(_values, columns), strict=True)
+
+
+def _values(column: pa.ChunkedArray) -> list[Any]:
+    """Return the cells of a column; what is no number is empty."""
+    import pyarrow as pa
+
+    if pa.types.is_floating(column.type):
+        numbers = column.to_numpy()
+        numbers = np.where(np.isfinite(numbers), numbers.astype(object), np.array(None))
+        return list(numbers)
+    if pa.types.is_dictionary(column.type):
+        column = column.cast(pa.string())  # reading its words one by one takes 20 times as long
+    return _cells(column.to_pylist())
 
 
 def _cells(values: Iterable[Any]) -> list[Any]:
@@ -224,10 +264,11 @@ def _cells(values: Iterable[Any]) -> list[Any]:
     return [_cell(value) if isinstance(value, str) else value for value in values]
 
 
+@lru_cache(1000)
 def _cell(text: str) -> str:
     shown = printable(text)
     first = unicodedata.normalize("NFKC", shown[:1])  # some programs take a full-width sign for the plain one
-    return f"'{shown}" if first.startswith(FORMULA_SIGNS) else shown
+    return f"'{shown}" if first.startswith(FORMULA_SIGNS) or shown.startswith(RAW) else shown
 
 
 def _parquet(target: BinaryIO, finished: Exportable, units: str) -> int:
@@ -254,32 +295,110 @@ def _parquet(target: BinaryIO, finished: Exportable, units: str) -> int:
     return rows
 
 
-def _sheet(target: BinaryIO, finished: Exportable, units: str) -> int:
-    """Write a spreadsheet: the designs, and what a reader must know about them."""
+def _sheets(location: Location, target: BinaryIO, finished: Exportable, units: str) -> int:
+    """Write a spreadsheet: the answer, the designs, and what a reader must know about them."""
     try:
-        from openpyxl import Workbook
-        from openpyxl.utils import get_column_letter
+        from xlsxwriter import Workbook
+        from xlsxwriter.exceptions import FileCreateError
     except ImportError as lacking:
-        raise ReportError(f"spreadsheets need openpyxl: {install('report')}") from lacking
+        raise ReportError(f"spreadsheets need XlsxWriter: {install('report')}") from lacking
 
-    rows, columns, book = 0, list[ShownColumn](), Workbook(write_only=True)
-    designs = book.create_sheet("designs")
-    designs.freeze_panes = "B2"
-    for columns, table in _tables(finished, units):
-        if rows == 0:  # widths come before the first row
-            for number, column in enumerate(columns, 1):
-                width = max(len(column.name) + 4, LEAST_WIDTH)
-                designs.column_dimensions[get_column_letter(number)].width = width
-            designs.append(_cells(column.name for column in columns))
-        for values in _rows(table):
-            designs.append(values)
-        rows += len(table)
-    if rows:
-        designs.auto_filter.ref = f"A1:{get_column_letter(len(columns))}{rows + 1}"
-    sheet = book.create_sheet("about")
-    for letter, width in ABOUT_WIDTHS.items():
-        sheet.column_dimensions[letter].width = width
-    for line in about(finished, columns, units):
-        sheet.append(_cells(line))
-    book.save(target)
+    rows, columns, whole = 0, _ordered(finished, units), BytesIO()  # a ZipFile on a full disk ends with a traceback
+    names = [column.name for column in columns]
+    plain = {"strings_to_formulas": False, "strings_to_urls": False, "strings_to_numbers": False}
+    with TemporaryDirectory() as place:  # the library leaves files behind where it fails
+        book = Workbook(whole, {"constant_memory": True, "tmpdir": place, "use_zip64": True, **plain})
+        book.set_properties({"created": CREATED})
+        _write_answer(book, *_answer(location, finished, units))
+        designs = book.add_worksheet("designs")
+        designs.freeze_panes(1, 1)
+        designs.write_row(0, 0, _cells(names))
+        for _, table in _tables(finished, units):
+            for values in _rows(table.select(names)):
+                rows += 1
+                designs.write_row(rows, 0, values)
+        for number, name in enumerate(names):  # widths that are known before make each cell slower
+            designs.set_column(number, number, max(len(name) + 4, LEAST_WIDTH))
+        if rows:
+            designs.autofilter(0, 0, rows, len(names) - 1)
+        sheet = book.add_worksheet("about")
+        for number, width in enumerate(ABOUT_WIDTHS):
+            sheet.set_column(number, number, width)
+        for number, line in enumerate(about(finished, columns, units)):
+            sheet.write_row(number, 0, _cells(line))
+        try:
+            book.close()
+        except FileCreateError as problem:
+            raise problem.args[0] from None
+    target.write(whole.getbuffer())
     return rows
+
+
+def _ordered(finished: Exportable, units: str) -> list[ShownColumn]:
+    """Return the columns as a spreadsheet has them: number and answer first, what is the same in all rows last."""
+    columns, held = list[ShownColumn](), dict[str, set[Any]]()
+    for columns, table in _tables(finished, units):
+        for column, values in zip(columns, table.columns, strict=True):
+            some = held.setdefault(column.name, set())
+            if len(some) < 2:
+                some.update(values.unique()[:2].to_pylist())
+    kind = kind_of(finished)
+    # In rows without an answer, verdict and reason are of the last value tried.
+    first = [begin for begin in ANSWERS if kind != NEED or begin not in ("verdict", "reason")]
+
+    def place(column: ShownColumn) -> int:
+        if column.name == DESIGN_ID.name or not kind:
+            return -1  # a time history stays as it is
+        ranks = (rank for rank, begin in enumerate(first) if column.name.startswith(begin))
+        return next(ranks, len(first) + (len(held[column.name]) < 2))
+
+    return sorted(columns, key=place)
+
+
+def _answer(location: Location, finished: Exportable, units: str) -> tuple[list[str], Screen]:
+    """Return what the terminal says of answers, or the page of a run; nothing of a time history."""
+    if isinstance(finished, AnswerFile):
+        answers = finished.answers() if finished.kind else None
+        if isinstance(answers, Need):
+            return [*(advice(answers, units) or [title(answers)]), *yard_lines(answers)], need_screen(answers, units)
+        screens: dict[str, Callable[..., Screen]] = {UNCERTAINTY: uncertainty_screen, CAPACITY: reserve_screen}
+        return [], Screen([], []) if answers is None else screens[finished.kind](answers, units)
+    if not finished.rows_done:
+        return ["No design is computed yet."], Screen([], [])
+    from boulder_sweep.report.answers import answer_of  # loads the kernels
+    from boulder_sweep.report.rows import read_rows
+
+    answer = answer_of(read_rows(location, finished))
+    counts = ["".join(map(str, sentence)) for sentence in answer.sentences]
+    return [*advice(answer.need, units), *counts], designs_screen(answer.need, units)
+
+
+def _write_answer(book: Any, sentences: list[str], shown: Screen) -> None:
+    """Write the first sheet: sentences, and below them a table with numbers as they are shown, one row in bold."""
+    if not sentences and not shown.columns:
+        return
+    sheet, top = book.add_worksheet("answer"), 0
+    style = cache(lambda kind, bold: book.add_format({"num_format": kind, "bold": bold, "align": "right"}))
+    for top, line in enumerate(_cells(wrapped(sentences)), 2):
+        sheet.write_row(top - 2, 0, [line])
+    lines = [*zip(*(head for head, _ in shown.columns), strict=True)]
+    lines += [tuple(cell(row) for _, cell in shown.columns) for row in shown.rows]
+    for number, texts in enumerate(zip(*lines, strict=True)):
+        sheet.set_column(number, number, 2 + max(map(len, texts)))
+    for number, line in enumerate(lines):
+        for place, text in enumerate(line):
+            value, kind = _number(text)
+            sheet.write(top + number, place, value, style(kind, number < 2 or line[0] == MARK))
+    if shown.part:
+        sheet.write_row(top + len(lines), 0, [f"({shown.part}; all are on the sheet designs)"])
+
+
+def _number(text: str) -> tuple[str | float | None, str]:
+    """Return the number that a text is, and the format in which a spreadsheet shows it so; or the text as a cell."""
+    match = _NUMBER.fullmatch(text)
+    if match is None:
+        return "–" if text == "-" else _cell(text) or None, "General"
+    decimals, percent = match.groups("")
+    kind = ("#,##0" if "," in text else "0") + ("." + "0" * len(decimals) if decimals else "") + percent
+    value = float(text.replace(",", "").removesuffix("%"))
+    return round(value / 100.0, len(decimals) + 2) if percent else value, kind

@@ -9,7 +9,7 @@ page's script finds figures and sources by name and sets their data.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ from bokeh.models.annotations import BoxAnnotation, Legend
 from bokeh.plotting import figure
 
 from boulder_sweep.settings.model import Ground
-from boulder_sweep.settings.shape import BOX, Shape
+from boulder_sweep.settings.shape import BOX, ProfilePoint, Shape
 from boulder_sweep.views.pictures import VERDICTS
 
 COLOURS = {**VERDICTS, "none": "#BBBBBB"}
@@ -210,7 +210,9 @@ class Sketch(NamedTuple):
     bar: tuple[float, str]
 
 
-def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any], units: str = "si") -> Sketch:
+def sketch_of(
+    inputs: Mapping[str, float], settings: Mapping[str, Any], units: str = "si", profile: Sequence[ProfilePoint] = ()
+) -> Sketch:
     """Return elevation and plan of a design.
 
     Parameters
@@ -221,6 +223,8 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any], units: s
         Resolved settings of its sweep, which say how the soil lies.
     units
         ``si`` or ``us``, of the scale bar.
+    profile
+        Shape of this boulder, where the settings name none.
     """
     length, width, height = (inputs[f"boulder_{side}_m"] for side in ("length", "width", "height"))
     depth = inputs["embedment_depth_m"]
@@ -228,7 +232,7 @@ def sketch_of(inputs: Mapping[str, float], settings: Mapping[str, Any], units: s
     ground = Ground.of_dict(settings["model"].get("ground", {}))
     above, roof = height - depth, hood + CAB_M
     bottom = -depth - BELOW
-    points = Shape.of_model(settings["model"]).points or BOX
+    points = profile or Shape.of_model(settings["model"]).points or BOX
     shares = np.array([(point.height, point.near, point.far) for point in points])
     heights, near, far = (shares * (height, length, length)).T
     struck = float(np.interp(depth + inputs["impact_height_m"], heights, near))

@@ -100,6 +100,8 @@ def assembled(
         kept = thinned(rows)
         table = {**table_data(rows, kept), "held": held_at(rows, kept, chosen[0]["number"])}
     mapped = table is not None and table["mapped"]
+    # The simulator of the page knows one profile for all designs, and none of those that a weighed boulder may have.
+    chosen = [one for one in chosen if one.get("shape") is None]
     panels = ["live", *(f"chosen{k}" for k in range(len(chosen)))]
     document = Document()
     curved = [plot for panel in panels for plot in curves(panel)]
@@ -112,6 +114,8 @@ def assembled(
     data["bokeh"] = {"docs": docs, "items": [{**item.to_json(), "roots": elements} for item in items]}
     known = dict(facts)
     origin = (f"boulder-sweep {known['version of boulder-sweep']}", f"settings {known['hash of the settings'][:12]}")
+    revision = f"revision {heading['revision']}" if "revision" in heading else ""
+    footer = (heading.get("project"), data["title"], revision, heading.get("date"), *origin)
     script = "\n".join((ASSETS / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS)
     library = "\n".join(INLINE.clone(components=["bokeh"]).js_raw)
     environment = jinja2.Environment(
@@ -124,7 +128,7 @@ def assembled(
     return environment.get_template("page.html").render(
         title=data["title"],
         units=units,
-        footer=_css_text(" · ".join(filter(None, (heading.get("project"), data["title"], *origin)))),
+        footer=_css_text(" · ".join(filter(None, footer))),
         sheet=sheet,
         sentences=sentences,
         answers=answers,

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from boulder_kernels import Control, Design, DesignTable, OutcomeTable, Readings
-from boulder_kernels._jit import inlined
+from boulder_kernels._jit import inlined, taken
 from boulder_kernels.ground import Ground
 from boulder_kernels.numerics import record_type
 from boulder_kernels.pieces import Piece, SoilElements, SoilSums
@@ -52,7 +52,8 @@ BELOW = 5
 @inlined
 def readings_from(s: np.ndarray) -> Readings:
     """Return the first numbers of an array as readings."""
-    return Readings(s[0] > 0.0, s[1] > 0.0, s[2] > 0.0, s[3] > 0.0, s[4] > 0.0)
+    readings: Readings = taken(s, 0, 0, Readings)
+    return readings
 
 
 @inlined

@@ -279,8 +279,8 @@ class ResultRows:
         return next(self.finished.tables(["p_pass"])).column("p_pass").to_numpy()
 
 
-def read_rows(folder: Location) -> ResultRows:
-    """Read what the page needs of a result.
+def read_rows(folder: Location, finished: FinishedRows | AnswerFile | None = None) -> ResultRows:
+    """Read what the page needs of a result, which may be open already.
 
     Raises
     ------
@@ -289,7 +289,7 @@ def read_rows(folder: Location) -> ResultRows:
     ReportError
         The file is not one of answers, or rows of it are missing or in another order.
     """
-    finished = result_of(folder, ReportError)
+    finished = finished or result_of(folder, ReportError)
     settings = finished.identity["settings"]
     order, given = settings["order"], settings["inputs"]
     if isinstance(finished, AnswerFile):

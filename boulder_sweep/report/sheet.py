@@ -8,11 +8,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from boulder_kernels.rules import ISLAND_RATIO, ISLAND_SLIDE
 from boulder_sweep.answers.advice import advice, question
 from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.recommendation import Design
-from boulder_sweep.columns import BOULDER_MASS, TO_BUILD
+from boulder_sweep.columns import BOULDER_MASS, SHAPES, TO_BUILD
 from boulder_sweep.judge.robustness import meaning_of
 from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
 from boulder_sweep.report.answers import Answer
@@ -20,7 +22,9 @@ from boulder_sweep.report.asked import AnswerTable, Measure
 from boulder_sweep.report.figures import Sketch, sketch_of
 from boulder_sweep.report.rows import DEPTH, ResultRows, inputs_of, label_of
 from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.settings.shape import ProfilePoint
 from boulder_sweep.settings.shown_units import SYSTEMS, quantity_text
+from boulder_sweep.stones.taped import taped_profiles
 from boulder_sweep.views.wording import ground_words
 
 SOIL = {
@@ -74,7 +78,7 @@ class Sheet(NamedTuple):
     title: str
     sketch: Sketch
     checks: tuple[tuple[str, Cell, Cell, str], ...]
-    """Name, computed, allowed, and how much of it is used."""
+    """Name, computed, limit, and how much of it is used."""
     build: tuple[tuple[str, Cell], ...]
     soil: tuple[tuple[str, Cell, str], ...]
     """Name, value and source of each input."""
@@ -104,17 +108,20 @@ def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
     named = [name for name in answer.need.sweep.plan.labels if name in row]
     grade = design.grade
     worst = next(one for one in design.rows if one["robustness"] == grade)
-    means = OPEN_IN_WORDS if grade == "open" else meaning_of(worst) or ""
+    such = sum(one["robustness"] == grade for one in design.rows)
+    some = f" in {such:,} of {len(design.rows):,} cases" if such < len(design.rows) else ""
+    means = meaning_of(worst) or "" if grade != "open" or worst["stands_under"] else OPEN_IN_WORDS
+    opinion = f"{grade or ''}{some}", means
     return Sheet(
         words={system: _words(answer, design, named or several, settings, system) for system in SYSTEMS},
         qualifies=qualifies,
         title=answer.named.title,
-        sketch=sketch_of(inputs_of(row), settings, units),
+        sketch=sketch_of(inputs_of(row), settings, units, _profile(row)),
         checks=_checks(row, settings["criterion"], answer.need),
-        build=_build(rows, row),
+        build=_build(rows, row, design),
         soil=_inputs(design.rows, SOIL, settings),
         vehicle=_inputs(design.rows, VEHICLE, settings),
-        grade=(grade or "", means) if "p_pass" not in row else DRAWN if row.get("p_robust") is not None else NOT_ASKED,
+        grade=opinion if "p_pass" not in row else DRAWN if row.get("p_robust") is not None else NOT_ASKED,
         cases=_cases(design.rows, [*named, *several]) if len(design.rows) > 1 else None,
     )
 
@@ -124,7 +131,7 @@ def _words(answer: Answer, design: Design, names: Sequence[str], settings: Mappi
     found, said, asked = answer.need.recommendation, advice(answer.need, units), question(answer.need, units)
     ground = ground_words(settings, units) or "dry, level, the same at every depth, without cohesion"
     case = ", ".join(_named(name, answer.row[name], units) for name in names)
-    governs = f"in the worst of {len(design.rows):,} cases: {case}" if case else ""
+    governs = f"in the worst of {len(design.rows):,} cases: {case}" if case and len(design.rows) > 1 else ""
     if found is None:  # the worst answer, or why there is none
         said = ["".join(p if isinstance(p, str) else _measured(p, units) for p in answer.sentences[0])]
     if found is None or found.design is None:
@@ -156,7 +163,7 @@ def _checks(
         (f"penetration of cargo bed, {criterion['rating']}", "penetration_m", "m", limit),
         ("overlap, at least", "overlap_m", "m", overlap),
         ("peak force of the truck", "peak_force_kN", "kN", None),
-        ("acting at a height of", "impact_height_m", "m", None),
+        ("acting above ground at", "impact_height_m", "m", None),
     ]
     lines: list[tuple[str, Cell, Cell, str]] = []
     for words, name, unit, allowed in of:
@@ -166,6 +173,8 @@ def _checks(
             used = f"{100.0 * max(allowed / value if name == 'overlap_m' else value / allowed, 0.0):.0f} %"
         none = "no limit" if name == "max_displacement_m" else "–"
         computed: Cell = "–" if value is None else Measure(value, unit)
+        if name == "penetration_m" and value is not None and value <= 0.0:
+            computed = "none"
         lines.append((words, computed, none if allowed is None else Measure(allowed, unit), used))
     if "p_pass" in row:
         least = "–" if need.probability is None else f"≥ {100.0 * need.probability:.4g} %"
@@ -176,15 +185,34 @@ def _checks(
     return tuple(lines)
 
 
-def _build(rows: ResultRows, row: Mapping[str, Any]) -> tuple[tuple[str, Cell], ...]:
-    """Return what the drawing does not say of the boulder, and what it takes to build."""
+def _build(rows: ResultRows, row: Mapping[str, Any], design: Design) -> tuple[tuple[str, Cell], ...]:
+    """Return what the drawing does not say of the boulder, and what it takes to build in the soil that needs most."""
     built = zip(("excavation", "backfill"), TO_BUILD[1:], strict=True)
     mass = row.get(BOULDER_MASS) or float(rows.mass().flat[0])
-    return (
+    lines: list[tuple[str, Cell]] = [
         ("mass", Measure(float(mass), "kg")),
         ("density of rock", Measure(row["boulder_density_kg_m3"], "kg/m^3")),
-        *((words, Measure(float(row[spec.name]), spec.unit)) for words, spec in built if spec.name in row),
-    )
+    ]
+    if _is_taped(row):
+        lines.append(("fills of its box", f"{row['solidity']:.0%}"))
+        lines.append(("drawn: worst of its shapes", row["shape"].replace("_", " ")))
+    for words, spec in built:
+        if spec.name in row:
+            lines.append((words, Measure(max(float(one[spec.name]) for one in design.rows), spec.unit)))
+    return tuple(lines)
+
+
+def _is_taped(row: Mapping[str, Any]) -> bool:
+    """Whether a family of shapes stands for a boulder; a stored row may say anything."""
+    return row["shape"] in SHAPES and isinstance(row["solidity"], float)
+
+
+def _profile(row: Mapping[str, Any]) -> tuple[ProfilePoint, ...]:
+    """Return the shape that decides the verdict of a boulder that is taped and weighed; none of another."""
+    if not _is_taped(row):
+        return ()
+    points = taped_profiles(row["shape"], np.array([row["solidity"]]))[0]
+    return tuple(ProfilePoint(*map(float, point)) for point in points)
 
 
 def _inputs(
@@ -210,13 +238,13 @@ def _source(name: str, values: Sequence[float], settings: Mapping[str, Any]) -> 
     of_soil = {read.get(key, key) for data in derived.get("soil", []) for key in data}
     spread = settings.get("distributions", {}).get(name)
     if name in of_soil:
-        source = "field readings"
+        source = "from field readings"
     elif name == "impact_speed_m_s" and "approach" in derived:
         source = "approach"
     elif BY_NAME[name].default is not None and values == [BY_NAME[name].default]:
         source = "default"
     else:
-        source = "given"
+        source = "settings"
     return source if spread is None else f"{source}; {_spread(spread)}"
 
 

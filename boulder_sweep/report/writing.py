@@ -239,7 +239,7 @@ def _page_maker() -> Callable[..., str]:
 
 def _shown(one: NamedDesign, row: Mapping[str, Any]) -> dict[str, Any]:
     """Return a row as the page shows it."""
-    return {"title": one.title, "number": one.number, "inputs": inputs_of(row)}
+    return {"title": one.title, "number": one.number, "inputs": inputs_of(row), "shape": row.get("shape")}
 
 
 def _notes_on_rules(judged_by: str) -> list[str]:

@@ -183,7 +183,7 @@ def run(
             raise Interrupted(stop.signum, whole.rows_safe, sweep.n_designs, again) from None
         except (ClusterLostError, ComputationError, failures.WriteError) as problem:
             safe = safe_words(whole.rows_safe, sweep.n_designs)
-            raise type(problem)(f"{problem}. {safe}. Resume with: {again}") from problem
+            raise type(problem)(f"{problem}. {safe}. Resume with:\n  {again}") from problem
     parts: list[PartSummary | PartReport] = [*plan.there.intact.values(), *whole.written]
     reasons = sum((Counter(part.verdicts) for part in parts), Counter[str]())
     model = plan.identity["settings"]["model"]

@@ -20,7 +20,6 @@ from boulder_sweep.settings.entries import Entries
 from boulder_sweep.settings.fields import BY_NAME, Field
 from boulder_sweep.settings.model import WATER_KG_M3, Layer, Model, SolverSettings
 from boulder_sweep.settings.problems import Position, Problem
-from boulder_sweep.settings.shape import Shape
 from boulder_sweep.settings.sweep import Sweep
 from boulder_sweep.settings.values import is_unusual, range_words
 from boulder_sweep.stones.rock import ROCK_KG_M3
@@ -148,11 +147,6 @@ def _check_impact_height(entries: Entries, bumper: float | None) -> None:
         entries.problems.add(entries.leaves["impact_height_m"].position, "site.impact_height", message)
 
 
-def shape_in(entries: Entries) -> Shape:
-    """Return the shape of the boulders, as far as it can be read."""
-    return Model(**{name: entries.settings[name] for name in ("profile", "taper") if name in entries.settings}).shape
-
-
 def _check_mass(entries: Entries) -> None:
     """Report boulders that are all heavier than solid boxes of their size."""
     density = entries.values("boulder_density_kg_m3")
@@ -162,7 +156,7 @@ def _check_mass(entries: Entries) -> None:
         return
     assumed = "" if len(density) else " assumed for it (give boulder.density)"
     rock = float(density.max()) if len(density) else ROCK_KG_M3
-    shape = shape_in(entries)
+    shape = Model(**{name: entries.settings[name] for name in ("profile", "taper") if name in entries.settings}).shape
     box = rock * math.prod(float(side.max()) for side in sides) * shape.filled
     solid = "a solid box of this size" if shape.is_box else "solid rock of this profile"
     if mass.min() > MOST_SOLIDITY * box:
@@ -270,7 +264,7 @@ def _remarks(sweep: Sweep, written: Mapping[str, str]) -> Iterator[tuple[str, st
         yield "criterion.max_rotation", f"{limit:g} deg is large: {usual.remark}"
     if sweep.partial_factor != 1.0:
         angles = values["friction_angle_deg"]
-        ends = f"{angles.min():.4g}" if angles.min() == angles.max() else f"{angles.min():.4g} to {angles.max():.4g}"
+        ends = " to ".join(dict.fromkeys((f"{angles.min():.4g}", f"{angles.max():.4g}")))
         message = f"tan(friction angle) is divided by {sweep.partial_factor:g}: simulated and listed as {ends} deg"
         yield "partial_factor.friction_angle", message
     angle, reaction = _pairs(values, groups, "friction_angle_deg", "subgrade_reaction_MN_m3")
@@ -282,7 +276,8 @@ def _on_mass(sweep: Sweep) -> str:
     if BOULDER_MASS not in sweep.plan.given:
         return ""
     low, high = sweep.solidity
-    words = [f"by its mass a boulder fills {describe_share(low, high)} of the box of its length, width and height"]
+    share = " to ".join(dict.fromkeys((f"{low:.0%}", f"{high:.0%}")))
+    words = [f"by its mass a boulder fills {share} of the box of its length, width and height"]
     if sweep.model.rock_assumed:
         words[0] += f" if its rock has {ROCK_KG_M3:g} kg/m^3, which is assumed: give boulder.density. No pass is robust"
     if sweep.is_taped:
@@ -293,12 +288,6 @@ def _on_mass(sweep: Sweep) -> str:
     if high > 1.0 and sweep.model.shape.is_box:
         words.append("more than 100 % is the rounding of the tape: the boulder is a box of the mass as weighed")
     return "; ".join(words) if len(words) > 1 or sweep.model.rock_assumed else ""
-
-
-def describe_share(low: float, high: float) -> str:
-    """Return a range of shares in per cent."""
-    ends = f"{low:.0%}", f"{high:.0%}"
-    return ends[0] if ends[0] == ends[1] else " to ".join(ends)
 
 
 def _pairs(

@@ -167,18 +167,8 @@ def read_input(node: Node, field: Field) -> Input:
 def _read_distribution(node: Mapping, field: Field) -> Input:
     """Return an uncertain input: its mean, or the axis of its means, and its distribution.
 
-    Parameters
-    ----------
-    node : Mapping
-        ``{mean: 38 deg, sd: 3 deg}``, ``{distribution: lognormal, mean: [36, 38] deg, cov: 8 %}``,
-        ``{characteristic: 36 deg, cov: 8 %}``, ``{distribution: uniform, low: 36 deg, high: 40 deg}`` and the like.
-    field : Field
-        What it is about.
-
-    Raises
-    ------
-    LeafError
-        With every mistake of this entry.
+    It is ``{mean: 38 deg, sd: 3 deg}``, ``{distribution: lognormal, mean: [36, 38] deg, cov: 8 %}``,
+    ``{characteristic: 36 deg, cov: 8 %}``, ``{distribution: uniform, low: 36 deg, high: 40 deg}`` and the like.
     """
     kind = _kind(node)
     _check_keys(node, kind)
@@ -266,24 +256,6 @@ def _positive(node: Node, unit: str) -> float:
 def _means(node: Mapping, kind: str, fractile: np.ndarray, sd: float | None, cov: float | None) -> np.ndarray:
     """Return the means of normal or lognormal distributions whose 5 % fractiles are given, their characteristic values.
 
-    Parameters
-    ----------
-    node : Mapping
-        The distribution.
-    kind : str
-        ``normal``, or ``lognormal`` (which needs `cov`).
-    fractile : ndarray of float64
-        Values that 5 % fall short of.
-    sd, cov : float or None
-        Standard deviation, or coefficient of variation.
-
-    Raises
-    ------
-    LeafError
-        A lognormal distribution without `cov`, or a normal one so wide that this fractile is not positive.
-
-    Notes
-    -----
     Normal: x_k = m - 1.645 s. Lognormal: x_k = m exp(-s_ln**2 / 2 - 1.645 s_ln) with s_ln**2 = ln(1 + cov**2).
     """
     if kind == "lognormal":

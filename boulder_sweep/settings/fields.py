@@ -17,15 +17,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from boulder_sweep import columns
-from boulder_sweep.settings.model import (
-    Bound,
-    Criterion,
-    Field,
-    Model,
-    SolverSettings,
-    Usual,
-    entries_of,
-)
+from boulder_sweep.settings.model import Bound, Criterion, Field, Model, SolverSettings, Usual, entries_of
 from boulder_sweep.settings.problems import did_you_mean, shorten
 
 

@@ -45,12 +45,8 @@ DENSITY = "boulder_density_kg_m3"
 MAX_BYTES = 500_000
 """Largest settings file; real ones have a few kilobytes. Long lists of designs belong in a table."""
 
-_BYTE_ORDER_MARKS = (
-    (b"\xff\xfe\x00\x00", "UTF-32"),
-    (b"\x00\x00\xfe\xff", "UTF-32"),
-    (b"\xff\xfe", "UTF-16"),
-    (b"\xfe\xff", "UTF-16"),
-)
+_WIDE = re.compile(rb"(?P<UTF_32>\xff\xfe\x00\x00|\x00\x00\xfe\xff)|(?P<UTF_16>\xff\xfe|\xfe\xff)")
+"""Marks at the beginning of a text in UTF-32 or UTF-16."""
 _ALTERNATIVES = {
     "site.embedment_ratio": "embedment_depth",
     "site.embedment_depth": "embedment_ratio",
@@ -181,9 +177,8 @@ def decode(data: bytes, label: str) -> str:
     SettingsError
         UTF-16 or UTF-32, zero bytes, or bytes that are not UTF-8.
     """
-    for mark, encoding in _BYTE_ORDER_MARKS:
-        if data.startswith(mark):
-            raise refuse(label, f"is {encoding} text; save it as UTF-8")
+    if wide := _WIDE.match(data):
+        raise refuse(label, f"is {str(wide.lastgroup).replace('_', '-')} text; save it as UTF-8")
     if b"\x00" in data:
         raise refuse(label, "is not a text file (it contains zero bytes); a YAML file in UTF-8 is needed")
     try:
@@ -276,18 +271,13 @@ def _put(root: Mapping, path: list[str], value: Node, position: Position) -> Non
             if path[: depth + 1] == ["model", "readings"] and isinstance(inner, Scalar):
                 # `readings: corrected` with one switch on top of it: the preset stays.
                 opened.entries["preset"] = Entry("preset", inner.position, inner)
-            _store(block, key, opened, position)
+            block.entries[key] = Entry(key, position, opened)
             inner = opened
         block = inner
     other = _ALTERNATIVES.get(".".join(path))
     if other in block.entries and block.entries[other].position.file not in ("--set", *OPTIONS):
         del block.entries[other]
-    _store(block, path[-1], value, position)
-
-
-def _store(block: Mapping, key: str, value: Node, position: Position) -> None:
-    """Replace an entry where it stands, so that axes keep their order, or append it."""
-    block.entries[key] = Entry(key, position, value)
+    block.entries[path[-1]] = Entry(path[-1], position, value)  # where it stands, so that axes keep their order
 
 
 def _read_name(entries: Entries) -> str:
@@ -408,7 +398,8 @@ def _axes(entries: Entries) -> tuple[Axis, ...]:
             continue
         if section.key in entries.sets:
             labels = entries.sets[section.key]
-            columns = {field.name: entries.leaves[field.name].values for field in entries.inputs_of_sets(section.key)}
+            names = [field.name for field in fields.fields_of(section.key) if field.name in entries.leaves]
+            columns = {name: entries.leaves[name].values for name in names}
             axes.append(Axis(section.key, np.arange(float(len(labels))), columns, labels))
             count *= len(labels)
         if not isinstance(section.value, Mapping):

@@ -16,7 +16,6 @@ from xml.etree import ElementTree
 
 from boulder_sweep.locations import Location, LocationError, opened
 from boulder_sweep.settings.design_list import located, open_table
-from boulder_sweep.settings.log_layers import CONE, Log, LogReading
 from boulder_sweep.settings.problems import (
     LeafError,
     Mistake,
@@ -30,7 +29,7 @@ from boulder_sweep.settings.problems import (
     unknown_word,
     wrong,
 )
-from boulder_sweep.settings.soil_readings import READING_FIELDS, REFUSAL_BLOWS
+from boulder_sweep.settings.soil_readings import CONE, READING_FIELDS, REFUSAL_BLOWS, Log, LogReading
 from boulder_sweep.settings.tree import Scalar
 from boulder_sweep.settings.units import UnitError, factor, suffix_unit
 from boulder_sweep.settings.values import outside

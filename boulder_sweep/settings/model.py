@@ -201,7 +201,7 @@ class ReadingChoice:
 
     def as_dict(self) -> dict[str, str]:
         """Return switch: value, in order."""
-        return {name: getattr(self, name) for name in SWITCHES}
+        return asdict(self)
 
 
 @dataclass(frozen=True, slots=True)

@@ -126,6 +126,10 @@ class Mistakes(list[Mistake]):
         if self:
             raise LeafError(*self)
 
+    def raise_unlike(self) -> None:
+        """Raise LeafError if there is a mistake; the same one in many values is reported once, where it comes first."""
+        Mistakes({mistake.message: mistake for mistake in self[::-1]}.values()).raise_if_any()
+
 
 def wrong(position: Position, message: str) -> LeafError:
     """Return the error for an entry with one mistake."""

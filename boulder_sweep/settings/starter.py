@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from boulder_sweep.settings.fields import EMBEDMENT, INPUTS, SECTIONS, TO_BE_FOUND, Field, fields_of
 from boulder_sweep.settings.shown_units import SYSTEMS, shown_unit
@@ -20,25 +20,17 @@ def default_text(field: Field, units: str = "si") -> str:
     return describe(value, unit) if size == 1.0 else f"{value / size:.5g} {unit}"
 
 
-class Category(NamedTuple):
-    """A vehicle of ASTM F2656; ``docs/site.md`` lists the classes."""
-
-    mass: tuple[str, str]
-    """In SI and US units."""
-    speeds_mph: tuple[int, ...]
-    """Nominal speeds in miles per hour."""
-
-
-CATEGORIES = {
-    "M": Category(("6800 kg", "15000 lb"), (30, 40, 50)),
-    "SC": Category(("1100 kg", "2430 lb"), (30, 40, 50, 60)),
-    "FS": Category(("2100 kg", "4630 lb"), (30, 40, 50, 60)),
-    "PU": Category(("2300 kg", "5070 lb"), (30, 40, 50, 60)),
-    "C7": Category(("7200 kg", "15873 lb"), (30, 40, 50)),
-    "H": Category(("29500 kg", "65000 lb"), (30, 40, 50)),
+CATEGORIES: dict[str, tuple[tuple[str, str], tuple[int, ...]]] = {
+    "M": (("6800 kg", "15000 lb"), (30, 40, 50)),
+    "SC": (("1100 kg", "2430 lb"), (30, 40, 50, 60)),
+    "FS": (("2100 kg", "4630 lb"), (30, 40, 50, 60)),
+    "PU": (("2300 kg", "5070 lb"), (30, 40, 50, 60)),
+    "C7": (("7200 kg", "15873 lb"), (30, 40, 50)),
+    "H": (("29500 kg", "65000 lb"), (30, 40, 50)),
 }
-"""Small car, sedan, pick-up, class 7 and heavy truck, after the medium-duty truck of the paper's tests."""
-CLASSES = {f"{code}{mph}": (code, mph) for code, category in CATEGORIES.items() for mph in category.speeds_mph}
+"""Mass in SI and US units and nominal speeds [mph] of each category of ASTM F2656 (``docs/site.md``): small car, sedan,
+pick-up, class 7 and heavy truck, after the medium-duty truck of the paper's tests."""
+CLASSES = {f"{code}{mph}": (code, mph) for code, (_, speeds) in CATEGORIES.items() for mph in speeds}
 """Category and speed by designation."""
 UNPUBLISHED = ("vehicle.spring", "vehicle.damper", "vehicle.bed_offset")
 """Entries without a published value but for the first category: left empty, so that a file is refused without them."""
@@ -122,7 +114,7 @@ def _line(field: Field, vehicle: str, units: int) -> str:
     """Return one entry with its meaning, commented out where a file may do without it."""
     code, mph = CLASSES[vehicle]
     speed = f"{mph} mph" if units else f"{mph * KM_PER_MILE:.4g} km/h"
-    of_class = {"vehicle.mass": CATEGORIES[code].mass[units], "vehicle.speed": speed}
+    of_class = {"vehicle.mass": CATEGORIES[code][0][units], "vehicle.speed": speed}
     if not is_published(vehicle):
         of_class |= dict.fromkeys(UNPUBLISHED, "")
     path = field.path

@@ -398,20 +398,22 @@ def allowed_in(settings: dict[str, Any]) -> tuple[str, ...]:
 
 
 def _listed(values: np.ndarray) -> Any:
-    """Return values as a list, or as their number and hash where there are very many."""
-    if len(values) <= MAX_LISTED:
-        return [float(value) for value in values]
-    digest = hashlib.sha256(np.ascontiguousarray(values, dtype="<f8").tobytes()).hexdigest()
-    return {"count": len(values), "first": float(values[0]), "last": float(values[-1]), "sha256": digest}
+    """Return values as a list; see `_or_hash`."""
+    return _or_hash(values.tolist(), np.ascontiguousarray(values, dtype="<f8").tobytes())
 
 
 def _texts_listed(label: Label) -> Any:
-    """Return the texts of a label as a list, or their number and hash where there are very many."""
+    """Return the texts of a label as a list; see `_or_hash`."""
     texts = [label.words[code] for code in label.codes]
-    if len(texts) <= MAX_LISTED:
-        return texts
-    digest = hashlib.sha256("\x00".join(texts).encode(errors="surrogatepass")).hexdigest()
-    return {"count": len(texts), "first": texts[0], "last": texts[-1], "sha256": digest}
+    return _or_hash(texts, "\x00".join(texts).encode(errors="surrogatepass"))
+
+
+def _or_hash(values: list[Any], data: bytes) -> Any:
+    """Return values, or their number, ends and hash where there are very many."""
+    if len(values) <= MAX_LISTED:
+        return values
+    digest = hashlib.sha256(data).hexdigest()
+    return {"count": len(values), "first": values[0], "last": values[-1], "sha256": digest}
 
 
 def derived_words(derived: dict[str, Any], units: str = "si") -> list[str]:

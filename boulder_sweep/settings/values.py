@@ -18,7 +18,6 @@ import numpy as np
 from boulder_sweep.settings.fields import FAR, Field
 from boulder_sweep.settings.problems import (
     LeafError,
-    Mistake,
     Mistakes,
     Position,
     did_you_mean,
@@ -272,10 +271,7 @@ def _read_all(items: list[Node], field: Field, unit: Scalar | None) -> list[Quan
         bare = next(item for item, quantity in zip(items, quantities, strict=True) if not quantity.written)
         message = f"{quoted(bare)} has no unit while the others have one; give all of them a unit, or none"
         mistakes.add(bare.position, message)
-    unlike: dict[str, Mistake] = {}  # the same mistake in many values is reported once
-    for mistake in mistakes:
-        unlike.setdefault(mistake.message, mistake)
-    Mistakes(unlike.values()).raise_if_any()
+    mistakes.raise_unlike()
     return quantities
 
 

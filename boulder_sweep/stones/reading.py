@@ -132,7 +132,7 @@ def _placed(parts: list[Part]) -> tuple[np.ndarray, np.ndarray, float]:
             raise ScanError("is damaged: it has coordinates that are no finite numbers")
         vertices.append(placed)
         faces.append(before + numbers.reshape(-1, 3)[:, :: -1 if mirrored else 1])
-        step = max(step, _spacing(points) * float(np.linalg.norm(turn, axis=0).max()))
+        step = max(step, max(part.step, _spacing(points)) * float(np.linalg.norm(turn, axis=0).max()))
         before += len(used)
         check_count(before, 3)
     if not before:
@@ -141,12 +141,7 @@ def _placed(parts: list[Part]) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def _spacing(points: np.ndarray) -> float:
-    """Return the distance between neighbouring numbers at the largest coordinate, in the type that holds all.
-
-    Coordinates in double precision or as text that are all numbers of single precision were so before.
-    """
-    if points.dtype.kind != "f":
-        return 1.0
+    """Return the distance between neighbouring numbers at the largest coordinate, in the least type that holds all."""
     largest = np.abs(points).max()
     with np.errstate(over="ignore"):
         single = points.astype(np.float32)

@@ -236,7 +236,7 @@ def file_metadata(identity_: Mapping[str, Any], **more: Any) -> dict[bytes, byte
 @cache
 def versions() -> dict[str, str]:
     """Versions of Python, of the packages that compute and write rows, and of the instructions that compute them."""
-    from boulder_kernels._cache import target
+    from boulder_kernels._jit import target
 
     return {"python": platform.python_version(), "target": target()} | {name: _version(name) for name in _PACKAGES}
 

@@ -133,7 +133,7 @@ def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS) -
     Parameters
     ----------
     sweep
-        The sweep. Its readings, criterion and horizon count; both presets are measured anyway.
+        Its readings, criterion and horizon count; both presets are measured anyway.
     designs
         Size of the sample. The sample depends on the sweep alone, and so do the errors; the times do not.
     seconds

@@ -80,22 +80,7 @@ LEAST_RANGE = 0.01
 
 
 def draw_design_chart(need: Need, path: str | Path, *, units: str = "si") -> None:
-    """Draw the answers to a question.
-
-    Parameters
-    ----------
-    need
-        The answers.
-    path
-        Picture to write.
-    units
-        ``si`` or ``us``.
-
-    Raises
-    ------
-    PictureError
-        Nothing varies, or there is no answer to draw, or the picture cannot be written.
-    """
+    """Draw the answers to a question; refused where nothing varies, or there is no answer to draw."""
     frame, sets, across, over, held = _shown(need.sweep, need.frame, (need.key.name, *need.derived))
     if frame[need.key.answer].isna().all():
         raise PictureError("there is nothing to draw: nothing passes in the range that was searched")
@@ -112,21 +97,9 @@ def draw_design_chart(need: Need, path: str | Path, *, units: str = "si") -> Non
 
 
 def draw_answers(answers: Reserves | Uncertainty, path: str | Path, *, units: str = "si") -> None:
-    """Draw the answers for several designs: what each withstands, or its probability of passing with the interval.
+    """Draw what several designs withstand, or their probabilities of passing with the intervals.
 
-    Parameters
-    ----------
-    answers
-        The answers.
-    path
-        Picture to write.
-    units
-        ``si`` or ``us``.
-
-    Raises
-    ------
-    PictureError
-        Nothing varies, or the picture cannot be written.
+    Refused where nothing varies.
     """
     names = {name: spec for name, spec in ANSWERS.items() if name in answers.arrow.column_names}
     given, listed = answers.sweep.plan.given, answers.sweep.table is not None
@@ -277,24 +250,7 @@ def _caption(need: Need, held: Mapping[str, float | str], units: str) -> str:
 
 
 def draw_uncertainty(result: Uncertainty, path: str | Path, *, design_id: int = 0, units: str = "si") -> None:
-    """Draw one design of a result.
-
-    Parameters
-    ----------
-    result
-        The result.
-    path
-        Picture to write.
-    design_id
-        The design.
-    units
-        ``si`` or ``us``.
-
-    Raises
-    ------
-    PictureError
-        No samples are kept of this design, or the picture cannot be written.
-    """
+    """Draw one design of a result; refused where no samples are kept of it."""
     samples = result.samples.to_pandas()
     samples = samples[samples.design_id == design_id]
     if samples.empty:

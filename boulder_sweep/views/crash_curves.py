@@ -43,25 +43,7 @@ FIGURES = {"abg": ("12 to 14", "figures_12_to_14_abg.png"), "rwg": ("16 to 18", 
 
 
 def write_validation(result: Validation, folder: Path) -> list[Path]:
-    """Write pictures and Parquet files.
-
-    Parameters
-    ----------
-    result
-        What `validate` result.
-    folder
-        Where to; made if it does not exist.
-
-    Returns
-    -------
-    list of Path
-        The files written.
-
-    Raises
-    ------
-    PictureError
-        The folder cannot be made or written, or matplotlib is not installed.
-    """
+    """Write pictures and Parquet files of `validate` into a folder, which is made, and return the files."""
     pictures.require_matplotlib()
     pictures.make_folder(folder)
     written = [folder / "figure_10_rigid_wall.png"]
@@ -217,20 +199,7 @@ POINTS = 400
 
 
 def draw_fit(fit: VehicleFit, path: str | Path) -> None:
-    """Draw every signal of a pulse with the fitted response, and the residuals below it.
-
-    Parameters
-    ----------
-    fit
-        The fit.
-    path
-        Picture to write (.png, .svg, .pdf).
-
-    Raises
-    ------
-    PictureError
-        The picture cannot be written, or matplotlib is not installed.
-    """
+    """Draw every signal of a pulse with the fitted response, and the residuals below it."""
     names = [name for name in ORDER if name in fit.pulse.signals]
     time = fit.pulse.time_s - fit.touch_s
     fine = np.linspace(float(time[0]), float(time[-1]), POINTS)

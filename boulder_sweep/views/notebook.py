@@ -14,12 +14,21 @@ if TYPE_CHECKING:
     from boulder_sweep.answers.reserves import Reserves
 
 
+def text_of(result: Need | Uncertainty | Reserves) -> str:
+    """Return what a command prints: the sentences of a recommendation, and a table of a screen."""
+    sentences, lines = _said(result)
+    return "\n".join([*sentences, *([""] if sentences else []), *lines])
+
+
 def html_of(result: Need | Uncertainty | Reserves) -> str:
-    """Return what a command prints as HTML: the sentences of a recommendation, and a table of a screen."""
-    units, sentences = result.sweep.units, ""
+    """Return what a command prints as HTML."""
+    sentences, lines = _said(result)
+    paragraphs = "".join(f"<p>{escape(words)}</p>" for words in sentences)
+    return "<div>{}<pre>{}</pre></div>".format(paragraphs, escape("\n".join(lines)))
+
+
+def _said(result: Need | Uncertainty | Reserves) -> tuple[list[str], list[str]]:
+    units = result.sweep.units
     if isinstance(result, Need):
-        sentences = "".join(f"<p>{escape(words)}</p>" for words in advice(result, units))
-        lines = screen_lines(result, units)
-    else:
-        lines = uncertainty_lines(result, units) if isinstance(result, Uncertainty) else reserve_lines(result, units)
-    return "<div>{}<pre>{}</pre></div>".format(sentences, escape("\n".join(lines)))
+        return advice(result, units), screen_lines(result, units)
+    return [], uncertainty_lines(result, units) if isinstance(result, Uncertainty) else reserve_lines(result, units)

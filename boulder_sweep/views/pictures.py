@@ -1,4 +1,8 @@
-"""Common to all pictures: making and saving figures, colours, fonts, error messages."""
+"""Common to all pictures: making and saving figures, colours, fonts, error messages.
+
+Every picture is written to a path (.png, .svg, .pdf), with units ``si`` or ``us`` where they differ, or refused by a
+`PictureError`: nothing to draw, an unknown kind, a path that cannot be written, or no matplotlib.
+"""
 
 from __future__ import annotations
 
@@ -60,13 +64,7 @@ MARGIN = 0.01
 
 
 def require_matplotlib() -> None:
-    """Check that matplotlib is installed.
-
-    Raises
-    ------
-    PictureError
-        matplotlib is not installed.
-    """
+    """Raise a `PictureError` where matplotlib is not installed."""
     from importlib.util import find_spec  # matplotlib is an extra: tables and verdicts do not need it
 
     if find_spec("matplotlib") is None:
@@ -89,13 +87,7 @@ def checked_kind(path: str | Path, kinds: tuple[str, ...] = KINDS) -> Path:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder for pictures.
-
-    Raises
-    ------
-    PictureError
-        It cannot be made.
-    """
+    """Make a folder for pictures, or raise a `PictureError`."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as problem:

@@ -25,20 +25,7 @@ ROOM_M = 0.25
 
 
 def draw_stone(scan: ScannedStone, path: str | Path) -> None:
-    """Draw a stone with each of its six ends up.
-
-    Parameters
-    ----------
-    scan
-        The stone.
-    path
-        Picture to write.
-
-    Raises
-    ------
-    PictureError
-        The picture cannot be written.
-    """
+    """Draw a boulder with each of its six ends up."""
     shown = [next(s for s in scan.standings if s.up == up) for up in dict.fromkeys(s.up for s in scan.standings)]
     with figure(path, 3 * PANEL_IN, 2 * PANEL_IN + 0.9) as fig:
         panels = list(fig.subplots(2, 3).flat)
@@ -57,20 +44,7 @@ def draw_stone(scan: ScannedStone, path: str | Path) -> None:
 
 
 def draw_placing(placing: Placing, path: str | Path) -> None:
-    """Draw the ways in which a stone passes at the least depth, in the ground.
-
-    Parameters
-    ----------
-    placing
-        The stone at its site.
-    path
-        Picture to write.
-
-    Raises
-    ------
-    PictureError
-        The picture cannot be written, or no way passes.
-    """
+    """Draw the ways in which a boulder passes at the least depth, in the ground; refused where no way passes."""
     best = placing.passing[: placing.shown]
     if not best:
         raise PictureError("no way to stand passes at any depth, so there is nothing to draw")

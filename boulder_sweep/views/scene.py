@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from boulder_kernels.design import G, wedge_slope
-from boulder_kernels.outline import FAR, HEIGHT, NEAR
+from boulder_kernels.design import FAR, HEIGHT, NEAR, G, wedge_slope
 from boulder_sweep.columns import SHAPES
 from boulder_sweep.impact.history import soil_profile
 from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M

@@ -29,22 +29,7 @@ HEAD_PT, HEAD_PT_PER_M = 9.0, 40.0
 
 
 def draw_still(trajectory: Trajectory, path: str | Path, *, time_s: float | None = None) -> None:
-    """Draw truck, boulder, soil wedge and forces to scale at one instant.
-
-    Parameters
-    ----------
-    trajectory
-        The impact.
-    path
-        Picture to write (.png, .svg, .pdf).
-    time_s
-        When [s]; by default when the contact force peaks.
-
-    Raises
-    ------
-    PictureError
-        There is nothing to draw, or the picture cannot be written.
-    """
+    """Draw truck, boulder, wedge and forces to scale at one instant [s], by default when the contact force peaks."""
     require_samples(trajectory)
     when = trajectory.decided.maxima.t_F_v if time_s is None else time_s
     sample = int(np.argmin(np.abs(trajectory.time_s - when)))
@@ -125,22 +110,7 @@ SWATCH = 40
 
 
 def animate(trajectory: Trajectory, path: str | Path, progress: ProgressCallback | None = None) -> None:
-    """Animate the side view: truck, boulder, soil wedge and forces to scale over time.
-
-    Parameters
-    ----------
-    trajectory
-        The impact.
-    path
-        File to write (.gif).
-    progress
-        Called with how many frames of how many are drawn.
-
-    Raises
-    ------
-    PictureError
-        There is nothing to draw, the kind is unknown, matplotlib is missing, or the file cannot be written.
-    """
+    """Animate the side view (.gif); `progress` is called with how many frames of how many are drawn."""
     target = pictures.checked_kind(path, KINDS)
     require_samples(trajectory)
     try:
@@ -151,13 +121,7 @@ def animate(trajectory: Trajectory, path: str | Path, progress: ProgressCallback
 
 
 def frames(trajectory: Trajectory, progress: ProgressCallback | None = None) -> Iterator[np.ndarray]:
-    """Draw the frames of an animation one by one; `progress` is called with how many of how many are drawn.
-
-    Yields
-    ------
-    ndarray of uint8, shape (height, width, 3)
-        One picture.
-    """
+    """Yield the frames of an animation, uint8 of shape (height, width, 3); `progress`: see `animate`."""
     pictures.require_matplotlib()
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg

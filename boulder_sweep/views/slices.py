@@ -62,13 +62,7 @@ def with_positions(pieces: Pieces, sets: Mapping[str, Sequence[str]]) -> Pieces:
 
 
 def finished_pieces(finished: FinishedRows) -> Pieces:
-    """Return a source of pieces of the finished rows of a result.
-
-    Parameters
-    ----------
-    finished
-        The rows; the first time they are compared with their checksums.
-    """
+    """Return a source of pieces of the finished rows of a result, which are first compared with their checksums."""
     verified = False
 
     def pieces(columns: Sequence[str]) -> Iterator[pd.DataFrame]:
@@ -96,17 +90,6 @@ class PictureRows:
         Inputs over small multiples; None where there is none.
     levels
         Different values of every input, ascending.
-
-    Attributes
-    ----------
-    count, passing : int
-        How many rows there are, and how many of them pass.
-    flags : Counter
-        How many of these have each flag of the column ``validity``; under ``""`` those without any.
-    grades : Counter
-        How many of these have each grade of the column ``robustness``.
-    thinned : bool
-        Whether only rows are left that can be told apart in a picture.
     """
 
     def __init__(self, across: str, up: str, over: Sequence[str | None], levels: Mapping[str, np.ndarray]):

@@ -35,22 +35,7 @@ BEYOND_LIMIT, AFTER_PEAK = "#F3E7DF", "#F0F0F0"
 
 
 def draw_trajectory(trajectory: Trajectory, path: str | Path, *, units: str = "si") -> None:
-    """Draw rotation, forces and displacements of one impact.
-
-    Parameters
-    ----------
-    trajectory
-        The impact.
-    path
-        Picture to write (.png, .svg, .pdf).
-    units
-        ``si`` or ``us``.
-
-    Raises
-    ------
-    PictureError
-        There is nothing to draw, or the picture cannot be written.
-    """
+    """Draw rotation, forces and displacements of one impact."""
     require_samples(trajectory)
     with pictures.figure(path, 9.0, 6.2) as fig:
         (rotation, force), (boulder, vehicle) = fig.subplots(2, 2, sharex=True)
@@ -77,14 +62,9 @@ def require_samples(trajectory: Trajectory) -> None:
 
 
 def unreliable_from(trajectory: Trajectory) -> tuple[float, str]:
-    """Return the time from which the motion is not to be relied on, and why.
+    """Return the time from which the motion is not to be relied on [s], and why.
 
-    Returns
-    -------
-    float
-        Time of the rotation limit; where it is not reached, of the last peak of rotation and displacement [s].
-    str
-        What makes the time after it unreliable.
+    The time of the rotation limit; where it is not reached, of the last peak of rotation and displacement.
     """
     maxima, reached = trajectory.decided.maxima, trajectory.row["time_to_limit_s"]
     if reached is not None:
@@ -198,20 +178,6 @@ LAYERS = (
 
 def draw_energy(trajectory: Trajectory, path: str | Path, *, units: str = "si") -> None:
     """Draw the energy ledger of one impact, stacked over time.
-
-    Parameters
-    ----------
-    trajectory
-        The impact.
-    path
-        Picture to write (.png, .svg, .pdf).
-    units
-        ``si`` or ``us``.
-
-    Raises
-    ------
-    PictureError
-        There is nothing to draw, or the picture cannot be written.
 
     Notes
     -----

@@ -66,15 +66,13 @@ def draw_verdict_map(
     sets: Mapping[str, Sequence[str]] | None = None,
     units: str = "si",
 ) -> Slice:
-    """Draw which designs of a table pass, over two of their inputs.
+    """Draw which designs of a table pass, over two of their inputs; return what was drawn.
 
     Parameters
     ----------
     table
         A result table, as `boulder_sweep.read` returns it; input columns, ``verdict`` and ``reason`` are used. Or what
         yields it piece by piece, see `boulder_sweep.views.slices`.
-    path
-        Picture to write (.png, .svg, .pdf).
     title
         Name of the study.
     terms
@@ -83,18 +81,6 @@ def draw_verdict_map(
         Which design is recommended, in sentences: the beginning of the caption.
     across, up, columns, rows, at, sets
         What is shown, see `boulder_sweep.views.slices.plane`.
-    units
-        ``si`` or ``us``.
-
-    Returns
-    -------
-    Slice
-        What was drawn.
-
-    Raises
-    ------
-    PictureError
-        Nothing can be drawn of this table, or the picture cannot be written.
     """
     shown = plane(table, across=across, up=up, columns=columns, rows=rows, at=at, sets=sets)
     if shown.count == 0:

@@ -12,27 +12,15 @@ if TYPE_CHECKING:
 
     from boulder_sweep.tradeoff.study import Point, Tradeoff
 
-FIRST_STEP_MS = 16.0
-"""Step whose name stands on the other side of its point, off the name of the next."""
 LEAST_DEG = 1e-11
 """Smaller errors are drawn here, because a logarithmic axis has no zero [deg]."""
 COLOURS = (ORANGE, AMBER, PURPLE, GREY, SKY)
 MARKERS = "^vDPX"
-NAMED_STEPS_MS = {False: (16.0, 8.0), True: (2.0, 1.0, 0.5)}
-"""Steps named beside their points, plain and located: where the lines do not cross."""
 WORDS = {"as_printed": "as printed", "corrected": "corrected", "mixed": "readings of the file"}
 
 
 def draw_tradeoff(result: Tradeoff, path: str | Path) -> None:
-    """Draw a panel for each reading.
-
-    Parameters
-    ----------
-    result
-        What was measured.
-    path
-        Picture to write.
-    """
+    """Draw a panel for each reading of the paper."""
     names = list(dict.fromkeys(point.method.readings for point in result.points))
     with figure(path, 5.4 * len(names), 5.0) as fig:
         panels = fig.subplots(1, len(names), sharey=True, squeeze=False)[0]
@@ -63,10 +51,11 @@ def _panel(axes: Axes, points: list[Point]) -> None:
         zorder=1,
         label="Pareto front",
     )
-    groups = dict.fromkeys((p.method.soil_elements, p.method.error_estimate, p.method.locate_yield) for p in points)
+    groups: dict[tuple[int, bool, bool], list[Point]] = {}
+    for p in points:
+        groups.setdefault((p.method.soil_elements, p.method.error_estimate, p.method.locate_yield), []).append(p)
     sums = iter(zip(COLOURS, MARKERS, strict=True))
-    for group in groups:
-        elements, estimate, located = group
+    for (elements, estimate, located), these in groups.items():
         if elements:
             colour, marker = next(sums)
             words = f"sums over {elements} elements"
@@ -74,7 +63,6 @@ def _panel(axes: Axes, points: list[Point]) -> None:
             colour, marker = (GREEN, "s") if estimate else (BLUE, "o")
             words = "error for each design" if estimate else "closed form"
             words += ", yield located" if located else ""
-        these = [p for p in points if (p.method.soil_elements, p.method.error_estimate, p.method.locate_yield) == group]
         _method(axes, these, colour, marker, words)
 
 
@@ -98,17 +86,9 @@ def _method(axes: Axes, points: list[Point], colour: str, marker: str, words: st
     )
     axes.vlines(cost, usual, largest, color=colour, linewidth=0.8, alpha=0.6, zorder=2)
     for point, x, y in zip(points, cost, usual, strict=True):
-        left = not point.method.error_estimate and point.method.step_ms != FIRST_STEP_MS
-        shown = not point.method.error_estimate and point.method.step_ms in NAMED_STEPS_MS[located]
-        text = point.accuracy or (f"{point.method.step_ms:g} ms" if shown else "")
-        axes.annotate(
-            text,
-            (x, y),
-            xytext=(-6 if left else 6, -2 if left else 2),
-            textcoords="offset points",
-            ha="right" if left else "left",
-            va="top" if left else "bottom",
-            fontsize=7.5,
-            fontweight="bold" if point.accuracy else "normal",
-            color=colour,
-        )
+        if point.accuracy or point in (points[0], points[-1]):
+            text = point.accuracy or f"{point.method.step_ms:g} ms"
+            weight = "bold" if point.accuracy else "normal"
+            axes.annotate(
+                text, (x, y), xytext=(6, 2), textcoords="offset points", fontsize=7.5, fontweight=weight, color=colour
+            )

@@ -6,9 +6,17 @@ import json
 from pathlib import Path
 from typing import Any
 
-from boulder_sweep.settings.choices import LAYER_FIELDS, MOST_LAYERS, MOST_POINTS, PROFILE_FIELDS, SCAN_KEYS, SIDES
 from boulder_sweep.settings.distributions import NEEDED
-from boulder_sweep.settings.entries import NAME, NAMED_SETS
+from boulder_sweep.settings.entries import (
+    LAYER_FIELDS,
+    MOST_LAYERS,
+    MOST_POINTS,
+    NAME,
+    NAMED_SETS,
+    PROFILE_FIELDS,
+    SCAN_KEYS,
+    SIDES,
+)
 from boulder_sweep.settings.fields import (
     ALLOW_UNUSUAL,
     BY_NAME,

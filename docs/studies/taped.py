@@ -54,7 +54,7 @@ class Stones(NamedTuple):
     given: dict[str, np.ndarray]
     """Inputs by the columns of the table, the taped sizes among them, shape (n,)."""
     outlines: np.ndarray
-    """Their own outlines, see `boulder_kernels.outline`, shape (n, P, 4)."""
+    """Their own outlines, see `boulder_kernels.design`, shape (n, P, 4)."""
 
 
 def stone(rng: np.random.Generator) -> tuple[np.ndarray, float]:

@@ -31,7 +31,7 @@ from docs.studies.coverage import (
 DESIGNS = 20_000
 """Designs of each family."""
 SEED = 7
-"""Of the random numbers: not one of those by which `boulder_kernels.error_estimates` was chosen."""
+"""Of the random numbers: not one of those by which `boulder_kernels.outcomes` was chosen."""
 HOOD_M = 1.45
 """Height of the hood that strikes wide and flat boulders [m]."""
 FIRST_STEP_S = 0.004

@@ -5,13 +5,12 @@ equation numbers in this package are theirs. Everything here is plain numbers in
 subgrade reaction beta in MN/m^3 as in Eq 24), and nothing here knows of files, units or tables on disk.
 """
 
-from ._cache import source_hash
+from ._jit import source_hash
 from .control import Control
 from .design import Constants, Design, DesignTable, Readings, as_printed, constants_of, corrected
 from .impact import Problem
-from .outcomes import SIMULATED, Maxima, Outcome, OutcomeTable, Status
+from .outcomes import SIMULATED, Maxima, Outcome, OutcomeTable, Record, Status, no_record
 from .table import simulate, simulate_design, simulate_table
-from .time_history import Record, no_record
 
 __all__ = [
     "SIMULATED",

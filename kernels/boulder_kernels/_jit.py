@@ -1,4 +1,4 @@
-"""The one decorator every kernel is compiled with, and the reasons for its flags.
+"""The one decorator of every kernel, where compiled code is kept and by whom it is compiled; tuples inside kernels.
 
 ``nogil``
     Blocks of designs run in threads of one process, which share the compiled code and the tables.
@@ -14,40 +14,287 @@
     would be a third of the work of compiling them.
 
 Numba keeps compiled code in a folder named by a hash of all kernel sources, because what it keeps of one function does
-not notice that a function it calls has changed in another file. What is kept is compiled by another process
-(`boulder_kernels.compiling`), so every process runs the code that it finds on the disk: code that was compiled in the
-same process may fuse other products and differ in the last bits.
+not notice that a function it calls has changed in another file. Another process compiles it: it takes requests from its
+standard input, keeps the code on the disk, and answers each with a byte. So every process that runs kernels loads them,
+the first one as well, and all run the same code: code that was compiled in the same process may fuse other products and
+differ in the last bits. That process ends with the one that started it, or when nothing was asked for a while.
+
+Named tuples go into kernels and out of arrays and lanes by `taken`, `load` and `store`, whole.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
+import fcntl
 import functools
 import hashlib
+import importlib
+import importlib.util
 import inspect
+import os
+import pickle
+import platform
+import queue
+import shutil
+import signal
+import stat
+import subprocess
+import sys
+import tempfile
 import threading
+import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import llvmlite.binding
 import numba
 import numpy as np
+from llvmlite import ir
+from numba.core import cgutils
 
-from . import _cache, compiling
-from ._cache import source_hash
+CACHE_VARIABLE = "BOULDER_SWEEP_CACHE_DIR"
+"""Environment variable that names another folder for compiled kernels."""
+
+
+def source_hash() -> str:
+    """Hash of all kernel sources: which code computed a table.
+
+    Returns
+    -------
+    str
+        64 hexadecimal digits (SHA-256 over names and contents, in order of name).
+    """
+    digest = hashlib.sha256()
+    for source in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(source.name.encode())
+        digest.update(source.read_bytes())
+    return digest.hexdigest()
+
+
+def _cache_folder() -> str | None:
+    """Return a folder for these kernels on this processor that only this user can write, or None with a warning.
+
+    Compiled code runs as the user who loads it.
+    """
+    named = os.environ.get(CACHE_VARIABLE)
+    user_caches = os.environ.get("XDG_CACHE_HOME")
+    candidates = [Path(named)] if named else []
+    with contextlib.suppress(RuntimeError):  # no home folder, as for some service accounts
+        candidates.append((Path(user_caches) if user_caches else Path.home() / ".cache") / "boulder-sweep")
+    candidates.append(Path(tempfile.gettempdir()) / f"boulder-sweep-{os.getuid()}")
+    refused = []
+    for candidate in candidates:
+        try:
+            folder = _make_private_folder(candidate / f"kernels-{source_hash()[:16]}" / f"native-{machine_hash()[:16]}")
+            with tempfile.TemporaryFile(dir=folder):
+                pass
+        except OSError as problem:
+            refused.append(f"{candidate}: {problem.strerror}")
+            continue
+        if named and refused:
+            warnings.warn(f"compiled kernels are kept in {folder} ({refused[0]})", stacklevel=2)
+        return str(folder)
+    warnings.warn(
+        f"compiled kernels are not kept, so every start takes up to half a minute ({'; '.join(refused)}). Set "
+        f"{CACHE_VARIABLE} to a folder that only you can write",
+        stacklevel=2,
+    )
+    return None
+
+
+def _make_private_folder(folder: Path) -> Path:
+    """Make a folder with access for this user only, and check that nobody else can put files into it, or has.
+
+    Returns
+    -------
+    Path
+        Without symbolic links, which could be changed later.
+
+    Raises
+    ------
+    OSError
+        It cannot be made, others can change it or a folder above it, or a file in it is another user's.
+    """
+    folder = Path(os.path.realpath(folder))
+    missing = [path for path in (folder, *folder.parents) if not path.exists()]
+    for path in reversed(missing):
+        if not path.parent.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, f"{path.parent} is not a folder")
+        path.mkdir(mode=0o700, exist_ok=True)
+    for path in (folder, *folder.parents):
+        status = path.lstat()
+        if not stat.S_ISDIR(status.st_mode):
+            raise NotADirectoryError(errno.ENOTDIR, f"{path} is not a folder")
+        if status.st_uid not in (os.getuid(), 0):
+            raise PermissionError(errno.EPERM, f"{path} belongs to another user")
+        # Where the sticky bit is set, as for /tmp, others cannot replace what lies in the folder.
+        open_to_others = status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+        if open_to_others and (path == folder or not status.st_mode & stat.S_ISVTX):
+            raise PermissionError(errno.EPERM, f"other users can write into {path}")
+    for path in folder.iterdir():
+        status = path.lstat()
+        if status.st_uid not in (os.getuid(), 0) or status.st_mode & stat.S_IWOTH:
+            raise PermissionError(errno.EPERM, f"{path} is another user's, or open to others")
+    return folder
+
+
+def empty(folder: Path) -> None:
+    """Remove what is in a folder of compiled kernels."""
+    for path in folder.iterdir():
+        shutil.rmtree(path, ignore_errors=True)
+        path.unlink(missing_ok=True)
+
+
+def target() -> str:
+    """Return what the bits of results depend on beside the sources.
+
+    Processors of one architecture give the same bits if both have fused multiply-add, or neither: wider registers only
+    take more designs at once.
+    """
+    fused = any(line.startswith("flags") and "fma" in line.split() for line in processor())
+    named = [os.environ[name] for name in ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES") if os.environ.get(name)]
+    return " ".join([f"{platform.machine()}{'+fma' if fused else ''}", *named])
+
+
+@functools.cache
+def processor() -> tuple[str, ...]:
+    """Return what tells the kind of processor and its features, line by line."""
+    try:
+        with Path("/proc/cpuinfo").open(encoding="utf-8", errors="replace") as described:
+            first = described.read(16_384).partition("\n\n")[0]
+    except OSError:
+        return (platform.processor(),)
+    return tuple(line for line in first.splitlines() if line.startswith(("model name", "flags", "Features", "CPU ")))
+
+
+@functools.cache
+def machine_hash() -> str:
+    """Hash of what code depends on beside the sources: processor, compiler and its settings."""
+    parts = [platform.machine(), platform.system(), *processor()]
+    parts += [f"{name}={value}" for name, value in sorted(os.environ.items()) if name.startswith("NUMBA_")]
+    for package in ("numba", "llvmlite"):
+        spec = importlib.util.find_spec(package)
+        if spec is not None and spec.origin is not None:
+            version = Path(spec.origin).with_name("_version.py").stat()
+            parts.append(f"{package} {version.st_size} {version.st_mtime_ns}")
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+CACHE_FOLDER = _cache_folder()
+
+
+DONE, FAILED = b"+", b"-"
+IDLE_S = 20.0
+"""How long the process waits for a request: what it has compiled for one kernel it need not compile for the next."""
+_process: subprocess.Popen[bytes] | None = None
+_owner = 0
+"""The process that started it: another one may have been forked from that."""
+
+
+def compile_elsewhere(kernel: Any, kinds: tuple[Any, ...], folder: Path) -> None:
+    """Have another process compile a kernel, and keep the code in a folder.
+
+    Parameters
+    ----------
+    kernel
+        The `Kernel`.
+    kinds
+        Numba types of its arguments.
+    folder
+        Where the code is kept.
+
+    Raises
+    ------
+    OSError
+        There is no such process, or it could not do it.
+    """
+    request = pickle.dumps((kernel.__module__, kernel.__qualname__, kinds, folder))
+    for _ in range(2):  # it may just have ended, since nothing was asked for a while
+        process, answer = _running(), b""
+        assert process.stdin is not None
+        assert process.stdout is not None
+        with contextlib.suppress(BrokenPipeError):
+            process.stdin.write(request)
+            answer = process.stdout.read(1)
+        if answer == DONE:
+            return
+        if answer == FAILED:
+            break
+        process.kill()
+        process.wait()
+    raise OSError(f"{kernel.__qualname__} was not compiled")
+
+
+def _running() -> subprocess.Popen[bytes]:
+    global _process, _owner
+    if _process is None or _owner != os.getpid() or _process.poll() is not None:
+        path = os.pathsep.join(entry or str(Path.cwd()) for entry in sys.path)
+        _process = subprocess.Popen(
+            [sys.executable, "-P", "-c", "from boulder_kernels import _jit; _jit.main()"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            bufsize=0,
+            env={**os.environ, "PYTHONPATH": path},
+        )
+        _owner = os.getpid()
+    return _process
+
+
+def main() -> None:
+    """Compile what is asked for."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that asks
+    os.umask(0o077)
+    requests: queue.SimpleQueue[Any] = queue.SimpleQueue()
+
+    def read() -> None:
+        """Take requests; end at once when nobody can ask any more."""
+        while True:
+            try:
+                requests.put(pickle.load(sys.stdin.buffer))
+            except EOFError:
+                os._exit(0)
+
+    threading.Thread(target=read, daemon=True).start()
+    with contextlib.suppress(queue.Empty):
+        while True:
+            os.write(1, DONE if _is_compiled(*requests.get(timeout=IDLE_S)) else FAILED)
+    os._exit(0)  # the thread above still reads
+
+
+def _is_compiled(module: str, name: str, kinds: tuple[Any, ...], folder: Path) -> bool:
+    """Compile a kernel, one process at a time, and keep the code; False where that cannot be done."""
+    try:
+        kernel = getattr(importlib.import_module(module), name)
+        mark = kernel.mark(kinds, folder)
+        with (folder / f"{module}-{name}.lock").open("w") as lock:
+            with contextlib.suppress(OSError):  # a file system without locks: the same may be compiled twice
+                fcntl.flock(lock, fcntl.LOCK_EX)
+            if not mark.exists():
+                kernel.keep(kinds, folder)
+                mark.touch()
+        return True
+    except Exception:  # the process that asks tries it, and raises what is wrong
+        return False
+
 
 __all__ = [
     "Kernel",
     "align_stack",
     "exact_inlined",
     "exact_kernel",
+    "fields_of",
     "inlined",
     "is_none",
     "kernel",
+    "load",
     "overload",
     "plain",
     "source_hash",
+    "store",
+    "taken",
     "through",
 ]
 
@@ -126,7 +373,7 @@ class Kernel:
     def _made_ready(self, kinds: tuple[Any, ...]) -> Any:
         """Return what runs the code for arguments of some types: kept on the disk, or compiled for this process."""
         with _LOCK:
-            folder = _cache.CACHE_FOLDER
+            folder = CACHE_FOLDER
             if kinds not in self._ready and folder and self.__module__.startswith(f"{__package__}."):
                 with contextlib.suppress(Exception):  # what is kept may be damaged in any way, and the disk full
                     self._ready[kinds] = self._loaded(kinds, Path(folder))
@@ -149,11 +396,11 @@ class Kernel:
         """
         if not self.mark(kinds, folder).exists():
             with announce(self.__qualname__):
-                compiling.compile_elsewhere(self, kinds, folder)
+                compile_elsewhere(self, kinds, folder)
         try:
             return self.keep(kinds, folder)
         except Exception:
-            _cache.empty(folder)  # the next process makes it anew
+            empty(folder)  # the next process makes it anew
             raise
 
     def mark(self, kinds: tuple[Any, ...], folder: Path) -> Path:
@@ -219,6 +466,168 @@ def through(add: Callable[..., Any]) -> Callable[..., Any]:
 
     overload(pass_on)(choose)
     return pass_on
+
+
+def fields_of(kind: Any) -> dict[str, Any]:
+    """Return the names of the fields of a named tuple and what they are: float, int, bool or another named tuple."""
+    return get_type_hints(kind)
+
+
+def _as(kind: Any, number: Any) -> Any:
+    """Return a number as a field has it."""
+    return kind(number) if kind in (int, bool) else number
+
+
+def _type_named(kind: Any) -> Any:
+    """Return the Numba type of a named tuple, or of a number."""
+    if not hasattr(kind, "_fields"):
+        return {int: numba.types.intp, bool: numba.types.boolean}.get(kind, numba.types.float64)
+    return numba.types.BaseTuple.from_types([_type_named(each) for each in fields_of(kind).values()], kind)
+
+
+def _place(builder: Any, record: Any, offset: int, array: Any, lane: Any) -> Any:
+    """Return where one lane has its number of a field."""
+    numbers = ir.ArrayType(ir.DoubleType(), array.nitems)
+    return cgutils.gep_inbounds(builder, cgutils.get_record_member(builder, record, offset, numbers), 0, lane)
+
+
+def _loaded(context: Any, builder: Any, kind: Any, record: Any, begin: int, of: Any, lane: Any) -> Any:
+    """Make a named tuple of one lane's numbers in a record that lies behind the beginning of another."""
+    values = []
+    for name, each in zip(kind.fields, kind.types, strict=True):
+        if name not in of.fields:
+            values.append(context.get_constant(each, ABSENT.get(name, 0)))
+        elif isinstance(each, numba.types.BaseTuple):
+            values.append(_loaded(context, builder, each, record, begin + of.offset(name), of.typeof(name), lane))
+        else:
+            number = builder.load(_place(builder, record, begin + of.offset(name), of.typeof(name), lane))
+            values.append(context.cast(builder, number, numba.types.float64, each))
+    return context.make_tuple(builder, kind, values)
+
+
+@numba.extending.intrinsic
+def _load(typing: Any, record: Any, lane: Any, kind: Any) -> Any:
+    """Load a named tuple, see `load`."""
+    named = _type_named(kind.instance_class)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """Load its numbers one by one."""
+        return _loaded(context, builder, named, arguments[0], 0, record, arguments[1])
+
+    return named(record, numba.types.intp, kind), generate
+
+
+@numba.extending.intrinsic
+def _store(typing: Any, record: Any, lane: Any, value: Any) -> Any:
+    """Store a named tuple, see `store`."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """Store its numbers one by one."""
+        to, at, values = arguments
+        for i, (name, each) in enumerate(zip(value.fields, value.types, strict=True)):
+            if name in record.fields:
+                number = context.cast(builder, builder.extract_value(values, i), each, numba.types.float64)
+                builder.store(number, _place(builder, to, record.offset(name), record.typeof(name), at))
+        return context.get_dummy_value()
+
+    return numba.types.void(record, numba.types.intp, value), generate
+
+
+ABSENT = {"w_0": 1.0}
+"""What stands for a number that a record of the lanes has no field for, where it is not zero: the compiler knows it,
+and leaves out what is multiplied by zero."""
+
+
+def load(record: Any, lane: int, kind: Any) -> Any:
+    """Return one lane's numbers in a record as a named tuple.
+
+    Parameters
+    ----------
+    record
+        It has a field of shape (lanes,) for each number, and a record for each named tuple; what it has none of is
+        `ABSENT`.
+    lane
+        The lane, not negative.
+    kind
+        The named tuple.
+    """
+    values = []
+    for name, each in fields_of(kind).items():
+        if name not in record.dtype.names:
+            values.append(ABSENT.get(name, 0.0))
+        elif hasattr(each, "_fields"):
+            values.append(load(record[name], lane, each))
+        else:
+            values.append(_as(each, record[name][lane]))
+    return kind(*values)
+
+
+@overload(load)
+def _load_in_kernels(record: Any, lane: Any, kind: Any) -> Callable[..., Any]:
+    intrinsic: Any = _load
+    return lambda record, lane, kind: intrinsic(record, lane, kind)
+
+
+def store(record: Any, lane: int, value: Any) -> None:
+    """Write those numbers of a named tuple into one lane that a record has a field for; see `load`."""
+    for name in value._fields:
+        if name in record.dtype.names:
+            record[name][lane] = getattr(value, name)
+
+
+@overload(store)
+def _store_in_kernels(record: Any, lane: Any, value: Any) -> Callable[..., None]:
+    intrinsic: Any = _store
+    return lambda record, lane, value: intrinsic(record, lane, value)
+
+
+def _address(context: Any, builder: Any, array: Any, value: Any, at: tuple[Any, ...]) -> Any:
+    """Return where an array has the number at some indices."""
+    numbers = context.make_helper(builder, array, value)
+    place = numbers.data
+    for index, stride in zip(at, cgutils.unpack_tuple(builder, numbers.strides, array.ndim), strict=True):
+        place = cgutils.pointer_add(builder, place, builder.mul(index, stride))
+    return place
+
+
+@numba.extending.intrinsic
+def _take(typing: Any, numbers: Any, first: Any, row: Any, kind: Any) -> Any:
+    """Take a named tuple out of an array, see `taken`."""
+    named, number = _type_named(kind.instance_class), numba.types.intp
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """Load its numbers one by one."""
+        array, begin, column, _ = arguments
+        values = []
+        for i, each in enumerate(named.types):
+            at = builder.add(begin, context.get_constant(number, i)), column
+            loaded = builder.load(_address(context, builder, numbers, array, at[: numbers.ndim]))
+            values.append(context.cast(builder, loaded, numbers.dtype, each))
+        return context.make_tuple(builder, named, values)
+
+    return named(numbers, number, number, kind), generate
+
+
+def taken(numbers: np.ndarray, first: int, row: int, kind: Any) -> Any:
+    """Return the numbers of an array that begin at an index, in one of its columns if it has any, as a named tuple.
+
+    Parameters
+    ----------
+    numbers
+        Shape (m,) or (m, n).
+    first, row
+        The index of the first number, and the column, not negative.
+    kind
+        The named tuple, whose fields they are in its order.
+    """
+    column = numbers[first:] if numbers.ndim == 1 else numbers[first:, row]
+    return kind(*(_as(each, number) for each, number in zip(fields_of(kind).values(), column, strict=False)))
+
+
+@overload(taken)
+def _taken(numbers: Any, first: Any, row: Any, kind: Any) -> Callable[..., Any]:
+    intrinsic: Any = _take
+    return lambda numbers, first, row, kind: intrinsic(numbers, first, row, kind)
 
 
 @numba.extending.intrinsic

@@ -21,13 +21,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import exact_inlined, inlined, kernel
+from ._jit import exact_inlined, inlined, kernel, taken
 from .design import Constants
-from .modes import AT_END, TOLERANCE, GapFactors, needs_moment
+from .dynamics import soil_reaction
+from .events import AT_END, TOLERANCE, GapFactors, needs_moment
 from .numerics import sine_versine
 from .outcomes import FINER, NONE_NEEDED, Status
 from .soil import Kinematics
-from .soil_laws import soil_reaction
 
 VALID_ROTATION = math.radians(20.0)
 """Rotation up to which the model is valid [rad]: beyond, the boulder climbs out of its bed, as the paper says. What
@@ -67,7 +67,7 @@ class Control(NamedTuple):
     paired: bool = False
     """Where errors are estimated: whether every design is solved twice for it, and not only doubtful ones."""
     event_tolerance: float = TOLERANCE
-    """Precision with which events are located, as a fraction of the step; `boulder_kernels.modes.TOLERANCE` as
+    """Precision with which events are located, as a fraction of the step; `boulder_kernels.events.TOLERANCE` as
     printed."""
     side_by_side: bool = True
     """Whether designs that may go through lanes side by side do, or one after another. The two round differently."""
@@ -105,12 +105,9 @@ BEHIND = 1.0 + 0.3 * AT_END * TOLERANCE
 
 @inlined
 def control_in(c: np.ndarray) -> Control:
-    """Return the control that an array holds, shape (13,), in the order of its fields; booleans are 0 or 1."""
-    stops, located, refined = c[5] > 0.0, c[6] > 0.0, c[7] > 0.0
-    return Control(
-        c[0], c[1], c[2], int(c[3]), c[4] > 0.0, stops, located, refined, c[8], c[9] > 0.0, c[10] > 0.0, c[11],
-        c[12] > 0.0,
-    )  # fmt: skip
+    """Return the control that an array holds, in the order of its fields; booleans are 0 or 1."""
+    control: Control = taken(c, 0, 0, Control)
+    return control
 
 
 @inlined

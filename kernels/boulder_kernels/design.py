@@ -1,16 +1,22 @@
-"""A design and the constants of its motion (Eqs 1-16, 24-28).
+"""A design and the constants of its motion (Eqs 1-16, 24-28), and boulders that are no boxes (Eqs 141 to 144).
 
 Symbols are the paper's. X points in the direction of travel, Y down, theta_b > 0 turns the top of the boulder
 away from the truck; alpha is the depth below the soil line, 0 ... d.
+
+**The outline** of a boulder gives width and length over the height, piecewise linear. At a height z over the foot it is
+w(z) wide, and reaches near(z) towards the vehicle and far(z) away from it, counted from the middle of its foot. Volume,
+centre and moment of inertia are integrals of polynomials over the pieces between the points of the outline. Gauss's
+rule of three points is exact up to the fifth degree, which none of them exceeds. A box has an outline without points.
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import exact_inlined, inlined
+from ._jit import exact_inlined, exact_kernel, inlined, taken
 from .numerics import direction, half_tangent
 
 
@@ -106,23 +112,8 @@ def design_at(table: DesignTable, row: int) -> Design:
 @inlined
 def design_in(a: np.ndarray, row: int) -> Design:
     """Return the design in a column of an array."""
-    return Design(
-        a[0, row],
-        a[1, row],
-        a[2, row],
-        a[3, row],
-        a[4, row],
-        a[5, row],
-        a[6, row],
-        a[7, row],
-        a[8, row],
-        a[9, row],
-        a[10, row],
-        a[11, row],
-        a[12, row],
-        a[13, row],
-        a[14, row],
-    )
+    design: Design = taken(a, 0, row, Design)
+    return design
 
 
 class Constants(NamedTuple):
@@ -422,16 +413,15 @@ def constants_of(design: Design, readings: Readings, elements: int) -> Constants
         Non-finite or non-positive where the design is impossible: see `is_computable`.
     """
     d = design.d
-    spring = spring_per_depth(design)
     return constants_with(
         design,
         body_of_box(design),
         readings,
         elements,
         soil_mass(design, elements),
-        spring * d * d,
+        spring_per_depth(design) * d * d,
         design.rho_s * design.W * d,
-        ultimate_per_depth(design) / spring,
+        yield_displacement(design),
     )
 
 
@@ -453,3 +443,84 @@ def is_computable(c: Constants) -> bool:
     total = c.m_eff + c.J_eff + c.inverse_m_eff + c.inverse_J_eff + c.K_soil + c.R_soil + c.x_yield
     total += abs(c.h) + abs(c.g_x) + c.k_v + c.k_m + c.tau_v + c.v_0 + abs(c.C_cos) + abs(c.C_sin)
     return positive and np.isfinite(total)
+
+
+HEIGHT, WIDTH, NEAR, FAR = range(4)
+"""Columns of an outline, shape (P, 4), from the foot to the top: height over the foot, ascending from 0 to H, width,
+and reach towards the vehicle and away from it [m]. Between its points it is linear."""
+
+NODES = (0.5 - 0.5 * math.sqrt(0.6), 0.5, 0.5 + 0.5 * math.sqrt(0.6))
+WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
+"""Gauss's rule of three points on 0 ... 1."""
+
+
+@exact_inlined
+def piece_at(outline: np.ndarray, z: float) -> int:
+    """Return the number of the piece of an outline that a height [m] lies in, at a point of the outline the lower."""
+    i = 0
+    while i < len(outline) - 2 and outline[i + 1, HEIGHT] < z:
+        i += 1
+    return i
+
+
+@exact_inlined
+def slope_of(outline: np.ndarray, i: int, column: int) -> float:
+    """Return by how much a column of an outline grows with the height on its piece i [-]."""
+    return (outline[i + 1, column] - outline[i, column]) / (outline[i + 1, HEIGHT] - outline[i, HEIGHT])
+
+
+@exact_inlined
+def on_piece(outline: np.ndarray, i: int, column: int, z: float) -> float:
+    """Return a column of an outline at a height z [m] on its piece i [m]."""
+    return outline[i, column] + slope_of(outline, i, column) * (z - outline[i, HEIGHT])
+
+
+@exact_inlined
+def at_height(outline: np.ndarray, column: int, z: float) -> float:
+    """Return a column of an outline at a height z [m]; beyond its top that at the top [m]."""
+    z = min(z, outline[-1, HEIGHT])
+    return on_piece(outline, piece_at(outline, z), column, z)
+
+
+@exact_kernel
+def body_of_outline(design: Design, outline: np.ndarray) -> Body:
+    """Mass, centre, moment of inertia and reach of a boulder with an outline (Eqs 141 to 144).
+
+    Parameters
+    ----------
+    design
+        The design, SI; its density is the mass over the volume within the outline.
+    outline
+        The outline, shape (P, 4).
+    """
+    d = design.d
+    volume = x = z_c = xx = zz = line = 0.0
+    for i in range(len(outline) - 1):
+        low, high = outline[i, HEIGHT], outline[i + 1, HEIGHT]
+        buried = min(high, d)
+        for g in range(3):
+            z = low + NODES[g] * (high - low)
+            w, near, far = (on_piece(outline, i, WIDTH, z), on_piece(outline, i, NEAR, z), on_piece(outline, i, FAR, z))
+            slice_ = WEIGHTS[g] * (high - low) * w
+            area = slice_ * (near + far)
+            volume += area
+            z_c += area * z
+            zz += area * z * z
+            x += slice_ * 0.5 * (far * far - near * near)
+            xx += slice_ * (far * far * far + near * near * near) / 3.0
+            if low < buried:
+                z = low + NODES[g] * (buried - low)
+                line += WEIGHTS[g] * (buried - low) * (d - z) * on_piece(outline, i, FAR, z)
+    x, z_c, line = x / volume, z_c / volume, line / (0.5 * d * d)
+    m_b = design.rho_b * volume
+    J = design.rho_b * (xx + zz) - m_b * (x * x + z_c * z_c)
+    struck = at_height(outline, NEAR, d + design.e)
+    foot_near, foot_far = outline[0, NEAR], outline[0, FAR]
+    half = 0.5 * (foot_near + foot_far)
+    return Body(m_b, J, struck + x, z_c, struck + line, half, 0.5 * (foot_far - foot_near) - x)
+
+
+@exact_kernel
+def body_with(design: Design, outline: np.ndarray) -> Body:
+    """Return the boulder with an outline, shape (P, 4), or the box of the design where it has no points."""
+    return body_of_outline(design, outline) if len(outline) > 0 else body_of_box(design)

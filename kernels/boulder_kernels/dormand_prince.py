@@ -18,127 +18,134 @@ with the pair, and no stage has to be kept for it.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ._jit import inlined
 from .design import Constants, error_arm
 from .dynamics import Acceleration, State, Switches, acceleration
 
-_A = (
-    (),
-    (Fraction(1, 5),),
-    (Fraction(3, 40), Fraction(9, 40)),
-    (Fraction(44, 45), Fraction(-56, 15), Fraction(32, 9)),
-    (Fraction(19372, 6561), Fraction(-25360, 2187), Fraction(64448, 6561), Fraction(-212, 729)),
-    (Fraction(9017, 3168), Fraction(-355, 33), Fraction(46732, 5247), Fraction(49, 176), Fraction(-5103, 18656)),
-    (Fraction(35, 384), Fraction(0), Fraction(500, 1113), Fraction(125, 192), Fraction(-2187, 6784), Fraction(11, 84)),
-)
-_C = (Fraction(0), Fraction(1, 5), Fraction(3, 10), Fraction(4, 5), Fraction(8, 9), Fraction(1), Fraction(1))
-_B_FOURTH = (
-    Fraction(5179, 57600),
-    Fraction(0),
-    Fraction(7571, 16695),
-    Fraction(393, 640),
-    Fraction(-92097, 339200),
-    Fraction(187, 2100),
-    Fraction(1, 40),
-)
-STAGES = 7
+
+class Tableau(NamedTuple):
+    """Coefficients of an explicit pair whose last stage is the first of the next step, s stages."""
+
+    A: tuple[tuple[float, ...], ...]
+    """Stage weights, shape (s, s); the last row is the solution."""
+    C: tuple[float, ...]
+    """Nodes of the stages, shape (s,)."""
+    AA: tuple[tuple[float, ...], ...]
+    """Weights of the accelerations in the stage displacements, A A, shape (s, s)."""
+    ERROR: tuple[float, ...]
+    """Weights of the accelerations in the difference of the solutions of higher and of lower order, shape (s,)."""
 
 
-def _entry(i: int, j: int) -> Fraction:
-    return _A[i][j] if j < len(_A[i]) else Fraction(0)
+def tableau(nodes: str, rows: tuple[str, ...], lower: str, orders: tuple[int, int]) -> Tableau:
+    """Return a method from its coefficients as written.
 
+    Parameters
+    ----------
+    nodes, rows, lower
+        Nodes, rows of stage weights below the diagonal, and weights of the solution of lower order, as fractions.
+    orders
+        Orders of both solutions, up to the fourth, for the conditions of quadrature.
 
-def _check() -> None:
-    """Refuse to import with a mistyped coefficient: row sums and quadrature conditions."""
-    for i in range(STAGES):
-        assert sum(_A[i], Fraction(0)) == _C[i], f"row {i} of the tableau does not sum to its node"
-    for weights in ((*_A[6], Fraction(0)), _B_FOURTH):
-        for power in range(4):
-            quadrature = sum(w * c**power for w, c in zip(weights, _C, strict=True))
+    Raises
+    ------
+    AssertionError
+        A coefficient is mistyped: a row does not sum to its node, or a condition of quadrature is missed.
+    """
+    C, second = ([Fraction(number) for number in given.split()] for given in (nodes, lower))
+    A = [[Fraction(number) for number in row.split()] + [Fraction(0)] * (len(C) - i) for i, row in enumerate(rows)]
+    for row, node in zip(A, C, strict=True):
+        assert sum(row) == node, f"the row of node {node} does not sum to it"
+    for weights, order in zip((A[-1], second), orders, strict=True):
+        for power in range(order):
+            quadrature = sum(w * c**power for w, c in zip(weights, C, strict=True))
             assert quadrature == Fraction(1, power + 1), "the weights miss a quadrature condition"
+    AA = [[sum(a * A[m][j] for m, a in enumerate(row)) for j in range(len(C))] for row in A]
+    error = [a - b for a, b in zip(A[-1], second, strict=True)]
+    return Tableau(tuple(map(_floats, A)), _floats(C), tuple(map(_floats, AA)), _floats(error))
 
 
-_check()
+def _floats(numbers: Iterable[Any]) -> tuple[float, ...]:
+    return tuple(map(float, numbers))
 
-C = tuple(float(c) for c in _C)
-"""Nodes of the stages, shape (7,)."""
-A = tuple(tuple(float(_entry(i, j)) for j in range(STAGES)) for i in range(STAGES))
-"""Stage weights, shape (7, 7); the last row is the fifth-order solution."""
-ERROR = tuple(float(_entry(6, j) - _B_FOURTH[j]) for j in range(STAGES))
-"""Weights of the accelerations in the difference of the solutions of fifth and of fourth order, shape (7,)."""
-AA = tuple(
-    tuple(float(sum((_entry(i, m) * _entry(m, j) for m in range(STAGES)), Fraction(0))) for j in range(STAGES))
-    for i in range(STAGES)
+
+METHOD = (
+    "0 1/5 3/10 4/5 8/9 1 1",
+    (
+        "",
+        "1/5",
+        "3/40 9/40",
+        "44/45 -56/15 32/9",
+        "19372/6561 -25360/2187 64448/6561 -212/729",
+        "9017/3168 -355/33 46732/5247 49/176 -5103/18656",
+        "35/384 0 500/1113 125/192 -2187/6784 11/84",
+    ),
+    "5179/57600 0 7571/16695 393/640 -92097/339200 187/2100 1/40",
+    (4, 4),
 )
-"""Weights of the accelerations in the stage displacements, A A, shape (7, 7)."""
+"""Dormand and Prince's coefficients; their orders are five and four."""
+A, C, AA, ERROR = tableau(*METHOD)
 
 
-class DegreeOfFreedom(NamedTuple):
-    """Displacement and velocity of one degree of freedom."""
+def weighted(weights: Sequence[float]) -> Callable[[Any], float]:
+    """Return a function that adds up the numbers of a tuple with these weights, in order, without those that are zero.
 
-    x: float
-    v: float
-
-
-@inlined
-def stage_2(x: float, v: float, h: float, a1: float) -> DegreeOfFreedom:
-    """Second stage of one degree of freedom."""
-    return DegreeOfFreedom(x + h * (C[1] * v), v + h * (A[1][0] * a1))
-
-
-@inlined
-def stage_3(x: float, v: float, h: float, a1: float, a2: float) -> DegreeOfFreedom:
-    """Third stage of one degree of freedom."""
-    return DegreeOfFreedom(
-        x + h * (C[2] * v + h * (AA[2][0] * a1)),
-        v + h * (A[2][0] * a1 + A[2][1] * a2),
-    )
+    Written out term by term: a loop would keep the one over lanes from being vectorised.
+    """
+    *_, last = (j for j, weight in enumerate(weights) if weight != 0.0)
+    weight = weights[last]
+    if not any(weights[:last]):
+        return inlined(lambda a: weight * a[last])
+    before = weighted(weights[:last])
+    return inlined(lambda a: before(a) + weight * a[last])
 
 
-@inlined
-def stage_4(x: float, v: float, h: float, a1: float, a2: float, a3: float) -> DegreeOfFreedom:
-    """Fourth stage of one degree of freedom."""
-    return DegreeOfFreedom(
-        x + h * (C[3] * v + h * (AA[3][0] * a1 + AA[3][1] * a2)),
-        v + h * (A[3][0] * a1 + A[3][1] * a2 + A[3][2] * a3),
-    )
+def stage(i: int) -> Callable[..., Any]:
+    """Return a function that gives displacement and velocity of one degree of freedom in stage i = 1 ... 6."""
+    node, gained = C[i], weighted(A[i])
+    if not any(AA[i]):
+        return inlined(lambda x, v, h, a: (x + h * (node * v), v + h * gained(a)))
+    moved = weighted(AA[i])
+    return inlined(lambda x, v, h, a: (x + h * (node * v + h * moved(a)), v + h * gained(a)))
 
 
-@inlined
-def stage_5(x: float, v: float, h: float, a1: float, a2: float, a3: float, a4: float) -> DegreeOfFreedom:
-    """Fifth stage of one degree of freedom."""
-    return DegreeOfFreedom(
-        x + h * (C[4] * v + h * (AA[4][0] * a1 + AA[4][1] * a2 + AA[4][2] * a3)),
-        v + h * (A[4][0] * a1 + A[4][1] * a2 + A[4][2] * a3 + A[4][3] * a4),
-    )
+class Stages(NamedTuple):
+    """The stages of a step up to one of them."""
+
+    y: State
+    """State of the last one."""
+    k: Acceleration
+    """Acceleration there."""
+    a_b: tuple[float, ...]
+    alpha_b: tuple[float, ...]
+    a_v: tuple[float, ...]
+    """Accelerations of all of them."""
 
 
-@inlined
-def stage_6(x: float, v: float, h: float, a1: float, a2: float, a3: float, a4: float, a5: float) -> DegreeOfFreedom:
-    """Sixth stage of one degree of freedom."""
-    return DegreeOfFreedom(
-        x + h * (v + h * (AA[5][0] * a1 + AA[5][1] * a2 + AA[5][2] * a3 + AA[5][3] * a4)),
-        v + h * (A[5][0] * a1 + A[5][1] * a2 + A[5][2] * a3 + A[5][3] * a4 + A[5][4] * a5),
-    )
+def stages(i: int) -> Callable[..., Any]:
+    """Return a function that gives the `Stages` of a step up to stage i = 0 ... 6."""
+    if i == 0:
+        return inlined(lambda y, k, h, s, c: Stages(y, k, (k.a_b,), (k.alpha_b,), (k.a_v,)))
+    before, at = stages(i - 1), stage(i)
+
+    @inlined
+    def up_to(y: State, k1: Acceleration, h: float, s: Switches, c: Constants) -> Stages:
+        """Add a stage to those before."""
+        m = before(y, k1, h, s, c)
+        x_b, v_b = at(y.x_b, y.v_b, h, m.a_b)
+        theta_b, omega_b = at(y.theta_b, y.omega_b, h, m.alpha_b)
+        x_v, v_v = at(y.x_v, y.v_v, h, m.a_v)
+        k = acceleration(x_b, v_b, theta_b, omega_b, x_v, v_v, s, c)
+        y_i = State(x_b, v_b, theta_b, omega_b, x_v, v_v)
+        return Stages(y_i, k, (*m.a_b, k.a_b), (*m.alpha_b, k.alpha_b), (*m.a_v, k.a_v))
+
+    return up_to
 
 
-@inlined
-def stage_7(x: float, v: float, h: float, a1: float, a3: float, a4: float, a5: float, a6: float) -> DegreeOfFreedom:
-    """End of the step, of fifth order, for one degree of freedom."""
-    return DegreeOfFreedom(
-        x + h * (v + h * (AA[6][0] * a1 + AA[6][2] * a3 + AA[6][3] * a4 + AA[6][4] * a5)),
-        v + h * (A[6][0] * a1 + A[6][2] * a3 + A[6][3] * a4 + A[6][4] * a5 + A[6][5] * a6),
-    )
-
-
-@inlined
-def difference(a1: float, a3: float, a4: float, a5: float, a6: float, a7: float) -> float:
-    """Modulus by which the solutions of fifth and of fourth order differ in a velocity, per length of the step."""
-    d = ERROR[0] * a1 + ERROR[2] * a3 + ERROR[3] * a4 + ERROR[4] * a5 + ERROR[5] * a6 + ERROR[6] * a7
-    return abs(d)
+all_stages, difference = stages(len(C) - 1), weighted(ERROR)
 
 
 @inlined
@@ -168,34 +175,9 @@ def step(y: State, k1: Acceleration, h: float, s: Switches, c: Constants) -> tup
         Difference of the solutions of fifth and of fourth order: the sum over the velocities, the rotation counted
         at the arm of `boulder_kernels.design.error_arm` [m/s].
     """
-    b = stage_2(y.x_b, y.v_b, h, k1.a_b)
-    r = stage_2(y.theta_b, y.omega_b, h, k1.alpha_b)
-    t = stage_2(y.x_v, y.v_v, h, k1.a_v)
-    k2 = acceleration(b.x, b.v, r.x, r.v, t.x, t.v, s, c)
-    b = stage_3(y.x_b, y.v_b, h, k1.a_b, k2.a_b)
-    r = stage_3(y.theta_b, y.omega_b, h, k1.alpha_b, k2.alpha_b)
-    t = stage_3(y.x_v, y.v_v, h, k1.a_v, k2.a_v)
-    k3 = acceleration(b.x, b.v, r.x, r.v, t.x, t.v, s, c)
-    b = stage_4(y.x_b, y.v_b, h, k1.a_b, k2.a_b, k3.a_b)
-    r = stage_4(y.theta_b, y.omega_b, h, k1.alpha_b, k2.alpha_b, k3.alpha_b)
-    t = stage_4(y.x_v, y.v_v, h, k1.a_v, k2.a_v, k3.a_v)
-    k4 = acceleration(b.x, b.v, r.x, r.v, t.x, t.v, s, c)
-    b = stage_5(y.x_b, y.v_b, h, k1.a_b, k2.a_b, k3.a_b, k4.a_b)
-    r = stage_5(y.theta_b, y.omega_b, h, k1.alpha_b, k2.alpha_b, k3.alpha_b, k4.alpha_b)
-    t = stage_5(y.x_v, y.v_v, h, k1.a_v, k2.a_v, k3.a_v, k4.a_v)
-    k5 = acceleration(b.x, b.v, r.x, r.v, t.x, t.v, s, c)
-    b = stage_6(y.x_b, y.v_b, h, k1.a_b, k2.a_b, k3.a_b, k4.a_b, k5.a_b)
-    r = stage_6(y.theta_b, y.omega_b, h, k1.alpha_b, k2.alpha_b, k3.alpha_b, k4.alpha_b, k5.alpha_b)
-    t = stage_6(y.x_v, y.v_v, h, k1.a_v, k2.a_v, k3.a_v, k4.a_v, k5.a_v)
-    k6 = acceleration(b.x, b.v, r.x, r.v, t.x, t.v, s, c)
-    b = stage_7(y.x_b, y.v_b, h, k1.a_b, k3.a_b, k4.a_b, k5.a_b, k6.a_b)
-    r = stage_7(y.theta_b, y.omega_b, h, k1.alpha_b, k3.alpha_b, k4.alpha_b, k5.alpha_b, k6.alpha_b)
-    t = stage_7(y.x_v, y.v_v, h, k1.a_v, k3.a_v, k4.a_v, k5.a_v, k6.a_v)
-    k7 = acceleration(b.x, b.v, r.x, r.v, t.x, t.v, s, c)
-    off = difference(k1.a_b, k3.a_b, k4.a_b, k5.a_b, k6.a_b, k7.a_b)
-    off += difference(k1.a_v, k3.a_v, k4.a_v, k5.a_v, k6.a_v, k7.a_v)
-    off += error_arm(c) * difference(k1.alpha_b, k3.alpha_b, k4.alpha_b, k5.alpha_b, k6.alpha_b, k7.alpha_b)
-    return State(b.x, b.v, r.x, r.v, t.x, t.v), k7, h * off
+    m = all_stages(y, k1, h, s, c)
+    off = abs(difference(m.a_b)) + abs(difference(m.a_v)) + error_arm(c) * abs(difference(m.alpha_b))
+    return m.y, m.k, h * off
 
 
 class Track(NamedTuple):

@@ -25,8 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import exact_inlined, exact_kernel, kernel
-from .design import DesignTable, G
-from .outline import FAR, HEIGHT, NEAR, WIDTH, at_height
+from .design import FAR, HEIGHT, NEAR, WIDTH, DesignTable, G, at_height
 from .pieces import PRESSURE, PRESSURE_SLOPE, TO
 
 KP_SQUARED, BROMS, WIDTH_CAPPED = range(3)
@@ -204,7 +203,7 @@ def put_soil(
         Where the layers go, shape (n, M, 6), see `boulder_kernels.pieces`: one for every boundary of soil or water,
         and one more for every cut between slices; M may be 0 where nothing asks for layers.
     outlines
-        Where the outlines go, shape (n, P, 4), see `boulder_kernels.outline`.
+        Where the outlines go, shape (n, P, 4), see `boulder_kernels.design`.
     """
     cuts = slices - 1 if len(profile) > 0 and ground.law == WIDTH_CAPPED else 0
     for row in range(len(layers)):

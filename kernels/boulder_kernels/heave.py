@@ -37,12 +37,11 @@ from .design import (
     passive_pressure_coefficient,
     soil_mass,
 )
-from .dynamics import contact_displacement, contact_lever, spring_compression
+from .dynamics import contact_displacement, contact_lever, spring_compression, type_of
 from .ground import WATER
 from .numerics import field, put, sine_versine
 from .pieces import DENSITY, FRICTION, TO, ManyPieces, SoilConstants, combined, powers_of, times
 from .soil import TINY, Kinematics, soil_kinematics
-from .soil_laws import type_of
 
 GROUP, FINEST = 16, 4
 """Pieces of the coarsest solution: two of the widest registers; and what their number may be multiplied by, twice."""

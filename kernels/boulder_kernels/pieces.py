@@ -29,6 +29,8 @@ import numpy as np
 
 from ._jit import exact_inlined, exact_kernel, inlined, kernel, overload, through
 from .design import (
+    HEIGHT,
+    WIDTH,
     Body,
     Constants,
     Design,
@@ -36,15 +38,18 @@ from .design import (
     G,
     Readings,
     SoilMass,
+    body_with,
     constants_with,
     design_in,
+    on_piece,
+    piece_at,
+    slope_of,
     spring_per_depth,
     ultimate_pressure,
     wedge_slope,
 )
 from .numerics import WIDTH as SUMS
 from .numerics import add, field, partial_sums, total
-from .outline import HEIGHT, WIDTH, body_with, on_piece, piece_at, slope_of
 from .soil import TINY, Kinematics, Potential, Reaction
 
 TO, DENSITY, FRICTION, SUBGRADE, PRESSURE, PRESSURE_SLOPE = range(6)
@@ -144,7 +149,7 @@ class SoilProfile(NamedTuple):
     layers: np.ndarray
     """Layers from the top down, shape (M, 6)."""
     outline: np.ndarray
-    """Outline of the boulder, shape (P, 4), see `boulder_kernels.outline`; P = 0 of a box."""
+    """Outline of the boulder, shape (P, 4), see `boulder_kernels.design`; P = 0 of a box."""
     soil: Any
     """`SoilElements` or `ManyPieces`, worked out by whoever computes the constants."""
 

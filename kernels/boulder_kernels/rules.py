@@ -23,8 +23,7 @@ import numpy as np
 
 from ._jit import exact_inlined, exact_kernel
 from .control import VALID_ROTATION, Control, control_in
-from .error_estimates import LEAST_LATE_M
-from .outcomes import THETA_ERROR, X_ERROR, OutcomeTable, Status, copy_outcome, outcome_in
+from .outcomes import LEAST_LATE_M, THETA_ERROR, X_ERROR, OutcomeTable, Status, copy_outcome, outcome_in
 
 RULES = (
     ("error", ""),  # which has a reason of its own
@@ -417,7 +416,7 @@ def agree(coarse: OutcomeTable, fine: OutcomeTable, v_0: float) -> bool:
         columns.
     v_0
         Speed of impact [m/s]: an error of the displacement is one of the time, too, see
-        `boulder_kernels.error_estimates.estimate_error`.
+        `boulder_kernels.outcomes.estimate_error`.
     """
     limit = coarse.status == Status.LIMIT.value
     if limit != (fine.status == Status.LIMIT.value) or not np.isfinite(fine.x_error):

@@ -11,56 +11,21 @@ step needs lies in one workspace, behind what `boulder_kernels.heave` keeps ther
 
 from __future__ import annotations
 
-from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
 
 from ._jit import inlined, kernel
 from .design import Constants, error_arm
-from .dormand_prince import Track, displacement_at, slope_at, track
+from .dormand_prince import Track, displacement_at, slope_at, tableau, track
 from .dynamics import contact_displacement, spring_compression
 from .heave import FOOT, ROOM, SETS, HeaveConstants, accelerations, forces, strip_depth
 from .numerics import ITERATIONS, Bracket, field, narrowed, next_guess, put, sine_versine
 
-_A = (
-    (),
-    (Fraction(1, 2),),
-    (Fraction(0), Fraction(3, 4)),
-    (Fraction(2, 9), Fraction(1, 3), Fraction(4, 9)),
-)
-_C = (Fraction(0), Fraction(1, 2), Fraction(3, 4), Fraction(1))
-_B_SECOND = (Fraction(7, 24), Fraction(1, 4), Fraction(1, 3), Fraction(1, 8))
-STAGES = 4
-
-
-def _entry(i: int, j: int) -> Fraction:
-    return _A[i][j] if j < len(_A[i]) else Fraction(0)
-
-
-def _check() -> None:
-    """Refuse to import with a mistyped coefficient: row sums and quadrature conditions."""
-    for i in range(STAGES):
-        assert sum(_A[i], Fraction(0)) == _C[i], f"row {i} of the tableau does not sum to its node"
-    for weights, order in (((*_A[3], Fraction(0)), 3), (_B_SECOND, 2)):
-        for power in range(order):
-            quadrature = sum(w * c**power for w, c in zip(weights, _C, strict=True))
-            assert quadrature == Fraction(1, power + 1), "the weights miss a quadrature condition"
-
-
-_check()
-
-C = tuple(float(c) for c in _C)
-"""Nodes of the stages, shape (4,)."""
-A = tuple(tuple(float(_entry(i, j)) for j in range(STAGES)) for i in range(STAGES))
-"""Stage weights, shape (4, 4); the last row is the third-order solution."""
-ERROR = tuple(float(_entry(3, j) - _B_SECOND[j]) for j in range(STAGES))
-"""Weights of the accelerations in the difference of the solutions of third and of second order, shape (4,)."""
-AA = tuple(
-    tuple(float(sum((_entry(i, m) * _entry(m, j) for m in range(STAGES)), Fraction(0))) for j in range(STAGES))
-    for i in range(STAGES)
-)
-"""Weights of the accelerations in the stage displacements, A A, shape (4, 4)."""
+METHOD = ("0 1/2 3/4 1", ("", "1/2", "0 3/4", "2/9 1/3 4/9"), "7/24 1/4 1/3 1/8", (3, 2))
+"""Bogacki and Shampine's coefficients."""
+A, C, AA, ERROR = tableau(*METHOD)
+STAGES = len(C)
 LEAST_SINKING = 1e-9
 """Velocity below which a strip has come to rest, so that no step is cut twice where one turns back [m/s]."""
 AXES = 4

@@ -19,8 +19,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ._jit import inlined, is_none, kernel, overload, plain
-from .design import Constants, Design, DesignTable, G, constants_of, corrected, design_in, is_computable
+from .design import Constants, Design, DesignTable, G, body_with, constants_of, corrected, design_in, is_computable
 from .dormand_prince import displacement_at, slope_at, turning_point
+from .dynamics import empty_soil
 from .heave import (
     ALONG_X,
     FINEST,
@@ -45,7 +46,6 @@ from .heave import (
 )
 from .numerics import ITERATIONS, Bracket, field, narrowed, next_guess, put, sine_versine
 from .outcomes import Status
-from .outline import body_with
 from .pieces import ManyPieces, constants_in_soil, fill_pieces
 from .runge_kutta import (
     AXES,
@@ -66,7 +66,6 @@ from .runge_kutta import (
     track_of,
 )
 from .soil import soil_kinematics
-from .soil_laws import empty_soil
 
 READINGS = corrected()
 """The only readings that there are second opinions of."""

@@ -29,11 +29,10 @@ import math
 
 from ._jit import inlined, kernel
 from .design import Constants, Readings
-from .dynamics import State, contact_displacement, least_couple, lift_of, spring_compression
+from .dynamics import State, contact_displacement, least_couple, lift_of, soil_potential, spring_compression
 from .numerics import Bracket, narrowed, next_guess, sine_versine
 from .outcomes import Maxima
 from .soil import Potential, soil_kinematics
-from .soil_laws import soil_potential
 
 NO_PROOF = -1e300
 """Barrier of a motion that nothing has been proved of: no energy is below it."""

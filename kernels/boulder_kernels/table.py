@@ -1,38 +1,635 @@
-"""Tables of designs in, tables of outcomes out."""
+"""Tables of designs in, tables of outcomes out: many designs side by side, one in each lane of the vector registers.
+
+One loop advances all lanes by a step, each by its own clock (`attempt_steps`), and another accepts the steps that are
+plain (`take_over_steps`). What follows from any other step is found for its lane alone, by the function that the single
+impact uses (`boulder_kernels.impact.follow`), and a lane whose design has ended goes on with the next of the table.
+Designs are started side by side, in a group of their own. What a lane computes does not depend on the others.
+
+**Memory.** A group of lanes is one record, in which every field has a number for each lane: ``group.y.theta_b[lane]``.
+A field keeps the numbers of neighbouring lanes next to each other, and all fields are parts of one record. The compiler
+can then see that no store touches a later load, and vectorises a loop over the lanes. A soil in pieces adds fields of
+its own.
+"""
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
+from itertools import product
 from typing import Any, NamedTuple
 
+import numba
 import numpy as np
 
-from ._jit import is_none, kernel, overload, plain
-from .control import STEP_RATIO, Control, control_for
-from .design import Design, DesignTable, Readings, design_at, design_in
-from .error_estimates import safety_of, step_errors, take_seconds
-from .following import failed
-from .impact import Problem, simulate_alone, simulate_last_resort
-from .lanes import simulate_lanes
+from ._jit import IS_PLAIN, LINE, align_stack, fields_of, inlined, is_none, kernel, load, overload, plain, store, taken
+from .control import ACCEPTED, MOST_STEPS, RETRY, STEP_RATIO, Control, control_for, first_step
+from .design import Body, Constants, Design, DesignTable, Readings, constants_of, design_at, design_in, is_computable
+from .dormand_prince import step
+from .dynamics import Acceleration, State, Switches, empty_soil, profile_of
+from .events import NONE
+from .impact import (
+    RUNNING,
+    Clock,
+    Impact,
+    ImpactNotes,
+    Pace,
+    Problem,
+    begin_to_turn,
+    failed,
+    first_touch,
+    follow,
+    go_on,
+    nothing_watched,
+    outcome_of,
+    simulate_alone,
+    simulate_last_resort,
+    stop_of,
+    watch,
+)
 from .outcomes import (
     COARSER,
     FINER,
     NONE_NEEDED,
     PAIR,
     SECOND,
+    STATUS,
     STEP,
     T_END,
     Outcome,
     OutcomeTable,
+    Record,
     Status,
     empty_outcomes,
+    no_record,
     outcome_table,
+    safety_of,
+    step_errors,
+    take_seconds,
     write_outcome,
 )
-from .pieces import PRESSURE, PiecewiseTable, SoilProfile, given_pieces, lanes_count, pieces_count
+from .pieces import (
+    COUNTS,
+    PRESSURE,
+    FewPieces,
+    GivenPiece,
+    Piece,
+    PiecewiseTable,
+    SoilProfile,
+    SoilSums,
+    constants_of_few,
+    given_pieces,
+    lanes_count,
+    pieces_count,
+    with_soil,
+)
 from .settling import proof_is_possible
-from .soil_laws import empty_soil, profile_of
-from .time_history import Record, no_record
+
+LANES = 1 if IS_PLAIN else 8
+"""Designs that are integrated side by side: one vector of eight doubles. More of them hide no more latency and take
+more of the fastest memory (measured: 2 to 5 % slower with 16 or 32). Without the compiler there is nothing to gain."""
+
+
+class Attempt(NamedTuple):
+    """What is known of a lane's last step, beside where it ended."""
+
+    error: float
+    """Estimated error of the step [m/s]."""
+    plain: float
+    """1.0 where it has been accepted as it is."""
+    status: float
+    """RUNNING, or why the design that has been started here needs no step."""
+
+
+class Leaning(NamedTuple):
+    """What constants have of a boulder that leans, see `boulder_kernels.pieces.SoilConstants`."""
+
+    lean: float
+
+
+UNUSED = ("c_x", "c_y", "elements", "d_N")
+"""Constants that no motion in lanes depends on."""
+
+
+def numbers_of(names: tuple[str, ...]) -> np.dtype:
+    """Return the type of a record of the lanes' numbers under these names."""
+    numbers = np.dtype([(name, np.float64, (LANES,)) for name in names], align=True)
+    return np.dtype((np.record, numbers))
+
+
+@functools.cache
+def group_type(pieces: int, has_strength: bool, has_outline: bool) -> np.dtype:
+    """Return the type of a group of lanes.
+
+    Parameters
+    ----------
+    pieces
+        Number of pieces of the soil of a design, in `boulder_kernels.pieces.COUNTS`; 0 for uniform soils beside boxes.
+    has_strength
+        Whether the ultimate resistance of a piece may be other than proportional to the depth.
+    has_outline
+        Whether boulders are no boxes.
+    """
+    records: list[Any] = []
+    if pieces:  # first, since Numba takes a record that begins like another for a kind of it
+        # A piece begins where the one above it ends.
+        constant = ("low", *(() if has_strength else ("P_0",)), *(() if has_outline else ("w_0", "w_1")))
+        piece = tuple(name for name in Piece._fields if name not in constant)
+        records += [("lean", np.float64, (LANES,))] if has_outline else []
+        records += [("sums", numbers_of(SoilSums._fields))]
+        records += [("pieces", numbers_of(piece), (pieces,)), ("body", numbers_of(Body._fields))]
+        records += [("given", numbers_of(GivenPiece._fields), (pieces,))]
+    tuples = [*fields_of(Impact).items()]
+    tuples += [("y_end", State), ("k_end", Acceleration), ("attempt", Attempt), ("design", Design)]
+    records += [(name, numbers_of(each._fields)) for name, each in tuples]
+    records += [("constants", numbers_of(tuple(name for name in Constants._fields if name not in UNUSED)))]
+    return np.dtype((np.record, np.dtype(records, align=True)))
+
+
+_SOILS = (0, True, True), *product(COUNTS, (False, True), (False, True))
+GROUP_TYPES = tuple(numba.from_dtype(group_type(*soil)) for soil in _SOILS)
+"""Numba's types of all groups, made in the same order in every process and kept. Numba numbers record types as they are
+made, and names compiled code by these numbers. Code that two processes have compiled for two kinds of groups could have
+one name, and a process that loads both would run one in place of the other."""
+
+
+def empty_groups(pieces: int = 0, *, has_strength: bool = True, has_outline: bool = True) -> np.ndarray:
+    """Return two groups of lanes: where designs run, and where they are started. Arguments: see `group_type`.
+
+    Their vectors lie on whole lines of the fast memory.
+    """
+    kind = group_type(pieces, has_strength, has_outline)
+    room = np.zeros(2 * kind.itemsize + LINE, np.uint8)
+    first = -room.ctypes.data % LINE
+    return room[first : first + 2 * kind.itemsize].view(kind)
+
+
+def field_of(group: Any, name: str) -> Any:
+    """Return a field of a record or of its type, Numba's or NumPy's; None if there is none of this name."""
+    if isinstance(group, numba.types.Record):
+        return group.fields[name].type if name in group.fields else None
+    return group[name] if name in group.dtype.names else None
+
+
+def by_soil(uniform: Callable[..., Any], in_pieces: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that calls one for groups of uniform soils, and another where the soil is in pieces."""
+
+    def chosen(group: Any) -> Callable[..., Any]:
+        """Return the one for a group or its type."""
+        return uniform if field_of(group, "pieces") is None else in_pieces
+
+    def call(group: Any, lane: int, *others: Any) -> Any:
+        """Call the function that suits the soil of the group."""
+        return chosen(group)(group, lane, *others)
+
+    def choose(group: Any, lane: Any, *others: Any) -> Callable[..., Any]:
+        """Return the call for these types."""
+        of_soil = chosen(group)
+        calls: list[Callable[..., Any]] = [
+            lambda group, lane: of_soil(group, lane),
+            lambda group, lane, c: of_soil(group, lane, c),
+            lambda group, lane, one, other: of_soil(group, lane, one, other),
+        ]
+        return calls[len(others)]  # Numba inlines nothing whose number of arguments is open
+
+    overload(call)(choose)
+    return call
+
+
+@inlined
+def store_motion(group: Any, lane: int, i: Impact) -> None:
+    """Write what changes with every step of an impact into its lane."""
+    store(group.y, lane, i.y)
+    store(group.k, lane, i.k)
+    store(group.front, lane, i.front)
+    store(group.maxima, lane, i.maxima)
+    store(group.clock, lane, i.clock)
+
+
+@inlined
+def store_modes(group: Any, lane: int, i: Impact) -> None:
+    """Write what changes with the modes of an impact into its lane."""
+    store(group.modes, lane, i.modes)
+    store(group.switches, lane, i.switches)
+    store(group.factors, lane, i.factors)
+
+
+@inlined
+def load_piece(group: Any, m: int, lane: int) -> Piece:
+    """Return one piece of the soil of a lane; the ends of the soil are numbers that the compiler knows."""
+    pieces = group.pieces
+    p = load(pieces[m], lane, Piece)
+    low = pieces[m - 1].to[lane] if m > 0 else 0.0
+    to = p.to if m + 1 < len(pieces) else 1.0
+    return Piece(low, to, p.K, p.inverse_K, p.P_0, p.P_1, p.R, p.w_0, p.w_1)
+
+
+@inlined
+def load_given(group: Any, m: int, lane: int) -> GivenPiece:
+    """Return one piece as it is given."""
+    piece: GivenPiece = load(group.given[m], lane, GivenPiece)
+    return piece
+
+
+def by_count(load_one: Callable[[Any, int, int], Any]) -> Callable[[Any, int], tuple[Any, ...]]:
+    """Return a function that loads a record of each piece, one after another, into a tuple."""
+
+    def load_all(group: Any, lane: int) -> tuple[Any, ...]:
+        """Return all of them."""
+        return tuple(load_one(group, m, lane) for m in range(len(group.pieces)))
+
+    @inlined
+    def one(group: Any, m: int, lane: int) -> Any:
+        """Load one, as a tuple."""
+        return (load_one(group, m, lane),)
+
+    @inlined
+    def two(group: Any, m: int, lane: int) -> Any:
+        """Load two from m on, as a tuple."""
+        return one(group, m, lane) + one(group, m + 1, lane)
+
+    @inlined
+    def four(group: Any, m: int, lane: int) -> Any:
+        """Load four from m on, as a tuple."""
+        return two(group, m, lane) + two(group, m + 2, lane)
+
+    def choose(group: Any, lane: Any) -> Callable[..., Any]:
+        """Return the function for so many."""
+        return {
+            1: lambda group, lane: one(group, 0, lane),
+            2: lambda group, lane: two(group, 0, lane),
+            4: lambda group, lane: four(group, 0, lane),
+            8: lambda group, lane: four(group, 0, lane) + four(group, 4, lane),
+        }[field_of(group, "pieces").shape[0]]
+
+    overload(load_all)(choose)
+    return load_all
+
+
+load_pieces, load_all_given = by_count(load_piece), by_count(load_given)
+
+
+@inlined
+def load_numbers(group: Any, lane: int) -> Constants:
+    """Return the constants of a lane but for its soil."""
+    c: Constants = load(group.constants, lane, Constants)
+    return c
+
+
+@inlined
+def load_in_soil(group: Any, lane: int) -> Any:
+    """Return the constants of a lane whose soil is in pieces."""
+    soil = FewPieces(load(group.sums, lane, SoilSums), load_pieces(group, lane))
+    return with_soil(load_numbers(group, lane), load(group, lane, Leaning).lean, soil)
+
+
+load_constants = by_soil(load_numbers, load_in_soil)
+"""Return the constants of a lane."""
+
+
+@inlined
+def store_numbers(group: Any, lane: int, c: Any) -> None:
+    """Write the constants of a lane but for its soil."""
+    store(group.constants, lane, c)
+
+
+@inlined
+def store_in_soil(group: Any, lane: int, c: Any) -> None:
+    """Write constants whose soil is in pieces."""
+    store(group.constants, lane, c)
+    store(group, lane, Leaning(c.lean))
+    store(group.sums, lane, c.soil.sums)
+    for m in range(len(c.soil.pieces)):
+        store(group.pieces[m], lane, c.soil.pieces[m])
+
+
+store_constants = by_soil(store_numbers, store_in_soil)
+"""Write the constants of a lane."""
+
+BELOW, BODY_SIZE, PIECE_SIZE = len(Design._fields), len(Body._fields), len(GivenPiece._fields)
+"""Rows of a table of designs: above the soil, of the body, and of each piece."""
+
+
+@inlined
+def store_nothing_given(group: Any, lane: int, a: np.ndarray, row: int) -> None:
+    """Write nothing of uniform soil."""
+
+
+@inlined
+def store_pieces_given(group: Any, lane: int, a: np.ndarray, row: int) -> None:
+    """Write body and pieces of a design that is to be started, rows of a table."""
+    store(group.body, lane, taken(a, BELOW, row, Body))
+    for m in range(len(group.given)):
+        store(group.given[m], lane, taken(a, BELOW + BODY_SIZE + PIECE_SIZE * m, row, GivenPiece))
+
+
+store_given = by_soil(store_nothing_given, store_pieces_given)
+"""Write what is given of the soil of a design that is to be started, the rows of a table below its `Design`."""
+
+
+@inlined
+def uniform_in_lane(group: Any, lane: int, design: Design, readings: Readings) -> Constants:
+    """Return the constants of a design in uniform soil."""
+    return constants_of(design, readings, 0)
+
+
+@inlined
+def pieces_in_lane(group: Any, lane: int, design: Design, readings: Readings) -> Any:
+    """Return the constants of a design whose soil is in pieces."""
+    return constants_of_few(design, readings, load(group.body, lane, Body), load_all_given(group, lane))
+
+
+constants_in_lane = by_soil(uniform_in_lane, pieces_in_lane)
+"""Return the constants of a design that is being started."""
+
+
+@inlined
+def copy_start(group: Any, lane: int, start: Any, other: int) -> None:
+    """Copy constants and impact from a lane of one group to a lane of another, or of the same."""
+    i = load(start, other, Impact)
+    store_constants(group, lane, load_constants(start, other))
+    store(group.pace, lane, i.pace)
+    store_motion(group, lane, i)
+    store_modes(group, lane, i)
+
+
+@inlined
+def copy_step(group: Any, lane: int, start: Any, other: int) -> None:
+    """Copy the end of a step, too."""
+    copy_start(group, lane, start, other)
+    store(group.y_end, lane, load(start.y_end, other, State))
+    store(group.k_end, lane, load(start.k_end, other, Acceleration))
+    store(group.attempt, lane, load(start.attempt, other, Attempt))
+
+
+EMPTY = -1
+"""Row of a lane that holds no design."""
+NEXT = LANES
+"""Behind the rows in the lanes: the next row of the table."""
+
+
+@kernel
+def attempt_steps(group: Any) -> None:
+    """Advance every lane by its step, in one vectorised loop."""
+    align_stack()
+    for lane in range(LANES):
+        y_end, k_end, error = step(
+            load(group.y, lane, State),
+            load(group.k, lane, Acceleration),
+            group.clock.h[lane],
+            load(group.switches, lane, Switches),
+            load_constants(group, lane),
+        )
+        store(group.y_end, lane, y_end)
+        store(group.k_end, lane, k_end)
+        store(group.attempt, lane, Attempt(error, 0.0, group.attempt.status[lane]))
+
+
+@kernel
+def take_over_steps(group: Any) -> int:
+    """Accept the steps that are plain; mark and count the others."""
+    align_stack()
+    others = 0
+    for lane in range(LANES):
+        i, error, c = load(group, lane, Impact), group.attempt.error[lane], load_constants(group, lane)
+        y_end, k_end = load(group.y_end, lane, State), load(group.k_end, lane, Acceleration)
+        plain, after = go_on(i, y_end, k_end, error, c)
+        store(group.attempt, lane, Attempt(error, 1.0 if plain else 0.0, RUNNING))
+        others += 0 if plain else 1
+        if plain:
+            store_motion(group, lane, after)
+    return others
+
+
+@kernel
+def compute_constants(group: Any, designs: np.ndarray, first: int, readings: Readings, control: Control) -> None:
+    """Work out constants and steps of designs, and whether they can be simulated; arguments: see `start_designs`."""
+    align_stack()
+    # Loads from another array would keep the loop from being vectorised.
+    for lane in range(LANES):
+        store(group.design, lane, design_in(designs, first + lane))
+        store_given(group, lane, designs, first + lane)
+    for lane in range(LANES):
+        design = load(group.design, lane, Design)
+        c = constants_in_lane(group, lane, design, readings)
+        h, status = first_step(control, stop_of(control), c)
+        status = RUNNING if status == ACCEPTED else status
+        status = status if is_computable(c) else Status.INVALID.value
+        status = Status.NO_CONTACT.value if design.H - design.d <= design.e_bumper else status
+        store_constants(group, lane, c)
+        store(group.pace, lane, Pace(h, h, 0.0))
+        store(group.attempt, lane, Attempt(0.0, 0.0, status))
+
+
+@kernel
+def stand_still(group: Any, readings: Readings, control: Control) -> None:
+    """Put every lane at the first touch."""
+    align_stack()
+    for lane in range(LANES):
+        h = group.pace.h_touching[lane]
+        i = first_touch(h, h, load_constants(group, lane), readings, control)
+        store(group.pace, lane, i.pace)
+        store_motion(group, lane, i)
+    # In a loop of its own: with more stores in one the compiler vectorises neither.
+    for lane in range(LANES):
+        h = group.pace.h_touching[lane]
+        store_modes(group, lane, first_touch(h, h, load_constants(group, lane), readings, control))
+
+
+@kernel
+def take_first_steps(group: Any, readings: Readings, control: Control) -> None:
+    """Accept the first steps that end where the boulder begins to turn; leave the others undone."""
+    align_stack()
+    for lane in range(LANES):
+        i, error, c = load(group, lane, Impact), group.attempt.error[lane], load_constants(group, lane)
+        turns, after = begin_to_turn(
+            i, load(group.y_end, lane, State), load(group.k_end, lane, Acceleration), error, c, readings, control
+        )
+        if turns:
+            store_motion(group, lane, after)
+            store_modes(group, lane, after)
+
+
+@inlined
+def start_designs(group: Any, designs: np.ndarray, first: int, readings: Readings, control: Control) -> None:
+    """Put as many designs as there are lanes into a group, and take their first step where it ends as it should.
+
+    Parameters
+    ----------
+    group
+        The group.
+    designs, first
+        The designs of `simulate_lanes`, and the row of the design in the first lane.
+    readings, control
+        How they are simulated.
+
+    Notes
+    -----
+    A lane is left with the status RUNNING, or with the status of a design that needs no integration or allows none.
+    """
+    compute_constants(group, designs, first, readings, control)
+    stand_still(group, readings, control)
+    attempt_steps(group)
+    take_first_steps(group, readings, control)
+
+
+@inlined
+def next_design(
+    groups: Any, rows: np.ndarray, lane: int, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray
+) -> None:
+    """Put the next design that needs integration into a lane; write those that need none."""
+    running, starting = groups[0], groups[1]
+    while rows[NEXT] < out.shape[1]:
+        row = rows[NEXT]
+        rows[NEXT] += 1
+        if row % LANES == 0:
+            start_designs(starting, designs, row, readings, control)
+        status = int(starting.attempt.status[row % LANES])
+        if status == RUNNING:
+            copy_start(running, lane, starting, row % LANES)
+            rows[lane] = row
+            return
+        out[STATUS, row] = status
+    rows[lane] = EMPTY
+    # An empty lane stands still: its steps have no length, and their results are ignored.
+    store(running.clock, lane, Clock(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+
+
+@kernel
+def follow_lane(group: Any, lane: int, readings: Readings, control: Control) -> int:
+    """Find what follows from the step of a lane, see `boulder_kernels.impact.follow`; return its status."""
+    i, c, error = load(group, lane, Impact), load_constants(group, lane), group.attempt.error[lane]
+    y_end, k_end = load(group.y_end, lane, State), load(group.k_end, lane, Acceleration)
+    followed = follow(i, y_end, k_end, error, c, readings, control)
+    status, after = followed.status, followed.impact
+    if status == Status.UNSTABLE.value and control.horizon <= MOST_STEPS * i.clock.h_full:
+        h = RETRY * i.clock.h_full
+        after = first_touch(h, h, c, readings, control)
+        store(group.pace, lane, after.pace)
+        status = RUNNING
+    store_motion(group, lane, after)
+    if followed.event > NONE or after.clock.t == 0.0:
+        store_modes(group, lane, after)
+    return status
+
+
+@kernel
+def write_lane(
+    group: Any, lane: int, status: int, t_limit: float, designs: np.ndarray, control: Control, out: np.ndarray, row: int
+) -> Outcome:
+    """Write the outcome of a lane into its row, and return it; a design that failed leaves its row NaN."""
+    o = outcome_of(load(group, lane, Impact), status, t_limit, control)
+    if np.isnan(o.t_end):
+        out[STATUS, row] = status
+    else:
+        write_outcome(out, row, o, step_errors(o, design_in(designs, row), control.theta_limit, control.horizon))
+    return o
+
+
+@kernel
+def watch_lane(groups: Any, w: ImpactNotes, control: Control, record: Record) -> ImpactNotes:
+    """Note what there is of a step of the first lane, whose impact at its start lies in the group of starts."""
+    running, before = groups[0], groups[1]
+    i, after = load(before, 0, Impact), load(running, 0, Impact)
+    if after.clock.t == 0.0:
+        return nothing_watched()  # it starts again, by shorter steps
+    if after.clock.t == i.clock.t:
+        return w
+    y_end, k_end = load(running.y_end, 0, State), load(running.k_end, 0, Acceleration)
+    return watch(w, i, y_end, k_end, after, load_constants(running, 0), control, record)
+
+
+@kernel
+def run_lanes(
+    designs: np.ndarray,
+    readings: Readings,
+    control: Control,
+    groups: Any,
+    rows: np.ndarray,
+    record: Record,
+    out: np.ndarray,
+) -> Outcome:
+    """Simulate every design of a table, and return the outcome of the last that has ended.
+
+    Parameters
+    ----------
+    designs, readings, control, record, out
+        The same as in `simulate_lanes`, with designs for whole groups.
+    groups, rows
+        The lanes, see `empty_groups`; the rows of the designs in them, EMPTY before they are
+        filled, and behind them 0.
+    """
+    for lane in range(LANES):
+        next_design(groups, rows, lane, designs, readings, control, out)
+    running, starting = groups[0], groups[1]
+    o, w = failed(int(out[STATUS, -1])), nothing_watched()
+    watching = out.shape[1] == 1 and (record.times.size > 0 or not control.stop_at_limit)
+    if watching:
+        copy_step(running, 0, starting, 0)  # with the end of its first step
+        stand_still(starting, readings, control)
+        w = watch_lane(groups, w, control, record)
+    busy = rows[0] != EMPTY
+    while busy:
+        if watching:
+            copy_step(starting, 0, running, 0)
+        attempt_steps(running)
+        busy = take_over_steps(running) == 0
+        for lane in range(LANES if watching or not busy else 0):
+            if rows[lane] == EMPTY:
+                continue
+            busy, status = True, RUNNING
+            if running.attempt.plain[lane] == 0.0:
+                status = follow_lane(running, lane, readings, control)
+            if watching:
+                w = watch_lane(groups, w, control, record)
+            if status != RUNNING:
+                o = write_lane(running, lane, status, w.t_limit, designs, control, out, rows[lane])
+                next_design(groups, rows, lane, designs, readings, control, out)
+    return o
+
+
+def filled_up(designs: np.ndarray) -> np.ndarray:
+    """Return designs that fill whole groups of lanes, the last one repeated."""
+    missing = -designs.shape[1] % LANES
+    return np.pad(designs, ((0, 0), (0, missing)), "edge") if missing else designs
+
+
+def simulate_lanes(
+    designs: np.ndarray,
+    pieces: int,
+    has_strength: bool,
+    has_outline: bool,
+    readings: Readings,
+    control: Control,
+    record: Record,
+    out: np.ndarray,
+) -> Outcome:
+    """Simulate every design of a table in lanes, by a closed form of the soil.
+
+    Parameters
+    ----------
+    designs
+        Designs, SI, shape (15 + G, n): first the fields of `DesignTable`, then what is given where the soil is in
+        pieces: the body and the pieces (`Body`, `GivenPiece`) one after another.
+    pieces, has_strength, has_outline
+        The same as in `group_type`.
+    readings
+        Which formulas are read as printed.
+    control
+        How they are simulated, its choice of soil ignored. One that does not stop at the limit is for one design.
+    record
+        Filled with the time history of one design at the times it names; for several, one that keeps nothing.
+    out
+        Where the outcomes go in the order of the designs, an array of `boulder_kernels.outcomes.empty_outcomes`.
+
+    Returns
+    -------
+    Outcome
+        The outcome of the design that ended last.
+    """
+    rows = np.full(LANES + 1, EMPTY)
+    rows[NEXT] = 0
+    groups = empty_groups(pieces, has_strength=has_strength, has_outline=has_outline)
+    return run_lanes(filled_up(designs), readings, control, groups, rows, record, out)
 
 
 @kernel
@@ -269,7 +866,7 @@ def simulate_table(table: DesignTable, readings: Readings, control: Control) -> 
     readings
         Which formulas are read as printed.
     control
-        Step, horizon, limit, soil. Every outcome has the error of its steps (`boulder_kernels.error_estimates`). With
+        Step, horizon, limit, soil. Every outcome has the error of its steps (`boulder_kernels.outcomes`). With
         ``error_estimate`` some designs, or all where `is_paired` says so, have a second solution, see
         `boulder_kernels.control.control_for`; the finest is reported.
 

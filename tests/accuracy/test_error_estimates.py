@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from boulder_kernels import OutcomeTable, Status, simulate_table
-from boulder_kernels.error_estimates import take_seconds
-from boulder_kernels.outcomes import NONE_NEEDED, PAIR, THETA_ERROR, X_ERROR
+from boulder_kernels.outcomes import NONE_NEEDED, PAIR, THETA_ERROR, X_ERROR, take_seconds
 from boulder_sweep.columns import OUTCOMES
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import UNDECIDED

@@ -19,20 +19,22 @@ from boulder_sweep.designs import block_of
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.judged import PASS
 from boulder_sweep.settings import Sweep, load_text
+from boulder_sweep.settings.shape import tapered
 from tests.answers.designs import DEPTH, bare_need, passes, random_designs, site
 
 
-def test_the_lightest_boulder_is_lighter_than_any_of_the_grid(tmp_path: Path) -> None:
+@pytest.mark.parametrize("taper", ["1", pytest.param("0.8", marks=pytest.mark.nightly)])
+def test_the_lightest_boulder_is_lighter_than_any_of_the_grid(tmp_path: Path, taper: str) -> None:
     sweep = site(
         width="{from: 1.4 m, to: 2.0 m, step: 0.1 m}",
-        height="{from: 2.6 m, to: 3.4 m, step: 0.1 m}",
+        height=f"{{from: 2.6 m, to: 3.4 m, step: 0.1 m}}, taper: {taper}",
         site="embedment_ratio: {from: 0.55, to: 0.75, step: 0.02}",
         friction="[38, 41] deg",
     )
     boulder_sweep.run(sweep, tmp_path / "grid")
     table = boulder_sweep.read(tmp_path / "grid")
     table = table[table.verdict == "pass"].astype({"friction_angle_deg": float})
-    mass = table.boulder_length_m.astype(float) * table.boulder_width_m.astype(float)
+    mass = tapered(float(taper)).filled * table.boulder_length_m.astype(float) * table.boulder_width_m.astype(float)
     mass *= table.boulder_height_m.astype(float) * table.boulder_density_kg_m3.astype(float)
     of_grid = mass.groupby(table.friction_angle_deg).min()
     found = bare_need(sweep, "mass")
@@ -193,24 +195,17 @@ def test_no_boulder_around_one_that_slides_is_lighter() -> None:
 
 
 @pytest.mark.nightly
-def test_no_boulder_around_the_lightest_of_shallow_ones_is_lighter() -> None:
-    rng = np.random.default_rng(3)
-    for _ in range(24):
-        sweep = site(**shallow_bounds(rng))
-        if bare_need(sweep, "mass").frame.found[0] == "found":
-            assert_lightest(sweep)
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("tallest", [(2.8, 3.8), (3.4, 4.2)])
-def test_no_boulder_around_the_lightest_is_lighter(tallest: tuple[float, float]) -> None:
-    """Within random bounds; with low ones the lightest is as high as it may be."""
-    rng = np.random.default_rng(11)
-    for _ in range(12):
-        _, changes = random_bounds(rng)
-        height = f"[1.4, {rng.uniform(*tallest):.2f}] m"
-        subgrade = f"{rng.uniform(40.0, 100.0):.0f} MN/m^3"
-        assert_lightest(site(**changes | {"height": height, "subgrade": subgrade, "length": "[0.8, 2.2] m"}))
+@pytest.mark.parametrize("tallest", [None, (2.8, 3.8), (3.4, 4.2)])
+def test_no_boulder_around_the_lightest_is_lighter(tallest: tuple[float, float] | None) -> None:
+    """Within random bounds: shallow ones; low ones, of which the lightest is as high as it may be; high ones."""
+    rng = np.random.default_rng(3 if tallest is None else 11)
+    for _ in range(24 if tallest is None else 12):
+        changes = shallow_bounds(rng) if tallest is None else random_bounds(rng)[1]
+        if tallest is not None:
+            height, subgrade = f"[1.4, {rng.uniform(*tallest):.2f}] m", f"{rng.uniform(40.0, 100.0):.0f} MN/m^3"
+            changes |= {"height": height, "subgrade": subgrade, "length": "[0.8, 2.2] m"}
+        if tallest is not None or bare_need(site(**changes), "mass").frame.found[0] == "found":
+            assert_lightest(site(**changes))
 
 
 def test_one_boulder_is_scaled_with_its_proportions() -> None:

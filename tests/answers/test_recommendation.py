@@ -16,6 +16,7 @@ from boulder_sweep.answers.need import Need, need
 from boulder_sweep.answers.recommendation import PREFERENCES, Design, _Boulders
 from boulder_sweep.answers.trials import judges_of
 from boulder_sweep.errors import QuestionError
+from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.settings import Sweep, load, load_text
 from boulder_sweep.text import NO_BREAK_SPACE
 from tests.answers.designs import DEPTH, UNCERTAIN_FRICTION, bare_need, site
@@ -140,13 +141,14 @@ def test_a_sensitive_boulder_is_recommended_as_such_only() -> None:
     ],
     ids=["car", "loose"],
 )
-def test_what_no_study_covers_is_said_first_and_recommended_by_the_margin_only(changes: dict, why: str) -> None:
+def test_what_no_study_covers_is_said_first_though_it_stands_under_the_second_opinion(changes: dict, why: str) -> None:
     found = need(load(CONFIGS / "site.yaml", [f"{key}={value}" for key, value in changes.items()]))
     assert design_of(found).grade == "open"
     words = said(found)
     assert words.startswith("Not graded: no study of second opinions covers ")
-    assert why in words.partition(" By the margin alone, bury the ")[0]
-    assert "soil models" not in words
+    assert why in words.partition(" Bury the ")[0]
+    assert "to spare, and with 25 % under the weakest of three soil models" in words
+    assert all("width_capped" in row["stands_under"] for row in design_of(found).rows)
 
 
 def test_what_second_opinions_do_not_know_is_asked_by_the_margin_alone() -> None:
@@ -299,3 +301,34 @@ def test_what_cannot_be_preferred_is_refused_and_nothing_need_be() -> None:
     assert need(site(), prefer=None).recommendation is None
     with pytest.raises(QuestionError, match="--prefer height: must be mass, depth, excavation"):
         need(site(), prefer="height")
+
+
+@pytest.mark.parametrize(
+    ("at", "words"),
+    [
+        ("p5", "it passes at the 5 % ends of its uncertain inputs with"),
+        ("mean", "it passes at the means of its uncertain inputs with"),
+    ],
+)
+def test_an_answer_says_at_which_values_uncertain_inputs_are_taken(at: str, words: str) -> None:
+    sweep = at_values(load(CONFIGS / "uncertain_site.yaml", ["boulder.height=3.6 m", "boulder.width=3 m"]), at)
+    assert words in said(bare_need(sweep))
+
+
+def test_boulders_of_a_yard_that_will_not_do_are_named_with_what_was_asked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    lines = (
+        "stone,boulder_length_m,boulder_width_m,boulder_height_m,boulder_mass_t",
+        "S3,1.5,2,3,16.55",
+        "S4,1.8,2.1,3.3,23.8",
+        "S8,1.6,2.3,3.4,29.84",
+    )
+    Path("yard.csv").write_text("\n".join(lines))
+    soil = "soil: {density: 1900, friction_angle: 38, subgrade_reaction: 70}\n"
+    vehicle = "vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3e3, damper: 138.91e3}\n"
+    boulder = "table: yard.csv\nboulder: {density: 2650}\nsite: {embedment_depth: to be found}\n"
+    Path("yard.yaml").write_text(boulder + soil + vehicle)
+    found = need("yard.yaml")
+    assert "At no depth with 25 % to spare: S3." in said(found)

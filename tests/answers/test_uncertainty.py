@@ -35,10 +35,14 @@ UNCERTAIN = {"height": "3.2 m", "site": "embedment_depth: 2.2 m", "friction": "{
 
 def test_chance_follows_from_the_least_friction_angle() -> None:
     """With one uncertain input the design passes from its least friction angle on, and the chance is known."""
-    least = bare_need(site(**UNCERTAIN | {"friction": "38 deg"}), "friction_angle").frame.passes_at[0]
-    exact = ndtr((38.0 - least) / 3.0)
     found = uncertainty(site(**UNCERTAIN), half_width=0.002, confidence=0.99).frame.iloc[0]
-    assert found.p_pass_low - 5e-4 <= exact <= found.p_pass_high + 5e-4  # 0.01 deg of the lattice is 0.1 %
+    for name, robust in (("p_pass", False), ("p_robust", True)):
+        sweep = site(**UNCERTAIN | {"friction": "38 deg"})
+        exact = ndtr((38.0 - bare_need(sweep, "friction_angle", robust=robust).frame.passes_at[0]) / 3.0)
+        low, estimate, high = found[[f"{name}_low", name, f"{name}_high"]]
+        assert low - 5e-4 <= exact <= high + 5e-4  # 0.01 deg of the lattice is 0.1 %
+        assert low <= estimate <= high
+    assert found.p_robust < found.p_pass - 0.1
     assert found.verdict == "pass"
     assert found.p_pass_driver == "soil.friction_angle"
 

@@ -43,7 +43,7 @@ def test_the_command_to_go_on_names_the_scheduler(sweep, possible_grid, schedule
         code, out, err = sweep("run", possible_grid, *words)
     assert (code, out) == (130, "")
     command = f"sweep run grid.yaml -o out --backend dask --scheduler {scheduler} --resume"
-    assert f"0 of 18 rows are safe. Resume with: {command}" in err
+    assert f"0 of 18 rows are safe. Resume with:\n  {command}" in err
     assert sweep(*shlex.split(command)[1:], "-q")[0] == 0
     assert len(finished_table(possible_grid.parent / "out")) == 18
 

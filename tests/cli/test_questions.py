@@ -48,7 +48,8 @@ def test_the_answer_is_at_most_a_screen_and_the_boulder_stands_first(sweep):
 def test_notes_say_what_words_mean_and_only_notes_do(sweep):
     plain, noted = (sweep("need", CONFIG, "-q", *BARE, *words)[1] for words in ((), ("--notes",)))
     said = (
-        "up to where the truck would pass or ride over the boulder\n  (3 rows)\n",
+        "blocked: does not pass by what was asked, up to where the truck would pass or\n"
+        "  ride over the boulder (3 rows)\n",
         "an answer is a simulation, not a rating by test\n",
         "flags: 0 of 9 answers inside what the model was tested on; rotation 9,",
         "sensitive: a second opinion overturns it",
@@ -364,7 +365,7 @@ def test_every_command_is_run_and_leads_on(sweep, tmp_path, monkeypatch, words):
                 assert value in command
         code, answer, err = sweep(*command, "-q")
         assert (code, err) == (0, "")
-        assert re.search(r"\b[Bb]ury\s+the ", answer)
+        assert re.search(r"\b[Bb]ury\s+the\s", answer)
 
 
 def test_a_probability_is_kept(sweep, tmp_path, monkeypatch):

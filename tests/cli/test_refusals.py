@@ -20,6 +20,8 @@ RESULT_ONLY = "--set, --at and --second-opinion change the settings of a file; s
 SI_ONLY = "leave out --units us or --json"
 NEED = "need SITE --set 'site.embedment_ratio=[0.3, 0.7]'"
 """A question that is asked with a note, which is not given where the question is refused."""
+NOTED = "UNCERTAIN --set 'boulder.width=6 m'"
+"""The same of a file with uncertain inputs."""
 
 
 @pytest.fixture(scope="module")
@@ -92,17 +94,23 @@ def beside(tmp_path_factory):
         ("need SITE --between 5 '2,5 m'", "as in --between '5 m' '2,5 m' or --between '5 ft' '2,5 m'"),
         ("need SITE --most speed --between 5 9", "--between '5 m/s' '9 m/s' or --between '5 mph' '9 mph'"),
         ("need SITE --between 0", "requires 2 arguments"),
-        ("need UNCERTAIN --at p5 --probability 0.9", "--at and --probability cannot be used together"),
+        (f"need {NOTED} --at p5 --probability 0.9", "--at and --probability cannot be used together"),
         ("uncertainty SITE", "no input has a distribution"),
-        ("uncertainty UNCERTAIN --margin=-0.5", "--margin -0.5: must be 0 or more and less than 100 %"),
-        ("uncertainty UNCERTAIN --margin=200%", "--margin 200%: must be 0 or more and less than 100 %"),
-        ("uncertainty UNCERTAIN --design 1", "holds 1 design, numbered from 0; there is no 1"),
-        ("uncertainty UNCERTAIN --design -1", "is not in the range x>=0"),
-        ("uncertainty UNCERTAIN --json --units us", SI_ONLY),
+        (f"uncertainty {NOTED} --margin=-0.5", "--margin -0.5: must be 0 or more and less than 100 %"),
+        (f"uncertainty {NOTED} --margin=200%", "--margin 200%: must be 0 or more and less than 100 %"),
+        (f"uncertainty {NOTED} --design 1", "holds 1 design, numbered from 0; there is no 1"),
+        (f"uncertainty {NOTED} --design -1", "is not in the range x>=0"),
+        (f"uncertainty {NOTED} --json --units us", SI_ONLY),
         ("capacity SITE --json --units us", SI_ONLY),
         ("compare small-grid.sweep small-grid.sweep --json --units us", "--json is in SI units"),
         ("simulate RWG --at p5", "no input has a distribution"),
-        ("simulate UNCERTAIN --at p80", "'p80' is not mean, p5 or another quantile"),
+        *((f"{command} {NOTED} --at p99", "'p99' is not mean") for command in ("need", "capacity", "run")),
+        (f"uncertainty {NOTED} --half-width 80%", "must be between 0.000001 and 0.5"),
+        (f"uncertainty {NOTED} --plot picture.jpeg", "must end in"),
+        (f"capacity {NOTED} -o table.txt", "must end in .parquet"),
+        (f"simulate {NOTED} --design 7", "there is no 7"),
+        (f"explore {NOTED} --design 7", "there is no 7"),
+        (f"simulate {NOTED} --at p80", "'p80' is not mean, p5 or another quantile"),
         ("simulate no.sweep", f"there is no no.sweep{NO_RESULT}"),
         ("simulate .", ". is not the result of a sweep: no rows of it are finished"),
         ("simulate depths.parquet", f"there is no depths.parquet{NO_RESULT}"),

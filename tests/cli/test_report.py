@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.store.folders import parts_of
-from tests.waiting import wait_until
+from tests.waiting import is_running, wait_until
 
 
 @pytest.fixture
@@ -210,11 +210,3 @@ def test_no_process_of_a_browser_is_left(sweep, possible_grid, browser, monkeypa
     assert sweep("run", possible_grid, "-q")[0] == 0
     assert sweep("report", "small-grid.sweep", "-o", "page.pdf")[0] == 2
     wait_until(lambda: not is_running(int(Path("child").read_text())), "the child of the browser ends")
-
-
-def is_running(pid: int) -> bool:
-    """Whether a process exists that has not ended; one that nobody waits for is a zombie."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False

@@ -184,7 +184,7 @@ def test_the_command_to_go_on_repeats_every_option(sweep, grid, monkeypatch):
     words += ["--accuracy", "0.01 deg", "--second-opinion"]
     code, _, err = sweep("run", grid, *words)
     assert code == 130
-    assert shlex.split(err.partition("Resume with: ")[2]) == ["sweep", "run", "grid.yaml", *words, "--resume"]
+    assert shlex.split(err.partition("Resume with:\n  ")[2]) == ["sweep", "run", "grid.yaml", *words, "--resume"]
 
 
 def test_an_internal_error_is_one_line_unless_verbose(sweep, grid, monkeypatch):

@@ -13,7 +13,7 @@ from scipy.signal import butter, filtfilt
 
 from boulder_sweep.crash_tests.cases import rigid_wall_test
 from boulder_sweep.crash_tests.fitting import VehicleFit, fit_pulse
-from boulder_sweep.crash_tests.measured import Pulse, TimeHistory, pulse_of
+from boulder_sweep.crash_tests.measured import TimeHistory, pulse_of
 from boulder_sweep.crash_tests.rigid_wall import RigidWall
 from boulder_sweep.errors import FitError
 from docs.studies.example_pulse import example_pulse
@@ -25,6 +25,7 @@ OVER_DAMPED = replace(PAPER, damper_N_s_m=55e3)
 SIGNALS = ("displacement", "velocity", "acceleration")
 GRAVITY = 9.80665
 SEEDS = 10
+RECORD = Path("made_up.csv")
 
 
 def known(wall: RigidWall, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -49,7 +50,7 @@ def made(
     offset_g: float = 0.0,
     filter_Hz: float | None = None,
     held: bool = False,
-) -> Pulse:
+) -> TimeHistory:
     """A generated pulse; its times count from `late` seconds after first touch, and noise is a share of the peaks."""
     rng = np.random.default_rng(seed)
     t = np.arange(start, end, step)
@@ -63,7 +64,7 @@ def made(
         values["acceleration"] = values["acceleration"] + offset_g * GRAVITY
         if filter_Hz is not None:
             values["acceleration"] = filtfilt(*butter(2, 2.0 * filter_Hz * step), values["acceleration"])
-    return Pulse("made up", t - late, values)
+    return TimeHistory(RECORD, t - late, values)
 
 
 EXACT: dict[str, dict[str, Any]] = {
@@ -152,14 +153,18 @@ def test_the_right_speed_is_kept_and_helps_a_cut_record() -> None:
 TIMES = np.linspace(0.0, 0.15, 151)
 
 
-def with_times(scale: float) -> Pulse:
-    pulse = made(noise=0.0)
-    return Pulse("made up", pulse.time_s * scale, pulse.signals)
+def recorded(signals: dict[str, np.ndarray]) -> TimeHistory:
+    return TimeHistory(RECORD, TIMES, signals)
 
 
-def with_size(scale: float) -> Pulse:
+def with_times(scale: float) -> TimeHistory:
     pulse = made(noise=0.0)
-    return Pulse("made up", pulse.time_s, {name: scale * values for name, values in pulse.signals.items()})
+    return TimeHistory(RECORD, pulse.time_s * scale, pulse.signals)
+
+
+def with_size(scale: float) -> TimeHistory:
+    pulse = made(noise=0.0)
+    return TimeHistory(RECORD, pulse.time_s, {name: scale * values for name, values in pulse.signals.items()})
 
 
 def stiffening(t: np.ndarray, k: float = 3e5, k_3: float = 8e6, damper: float = 1.2e5) -> np.ndarray:
@@ -182,24 +187,29 @@ def stiffening(t: np.ndarray, k: float = 3e5, k_3: float = 8e6, damper: float = 
             "does not determine the damper: a spring alone fits as well, since .*To do: ",
         ),
         (
-            Pulse("", TIMES, {"velocity": replace(PAPER, spring_N_m=1e12).velocity(TIMES)}),
+            recorded({"velocity": replace(PAPER, spring_N_m=1e12).velocity(TIMES)}),
             "does not determine the spring: a damper alone",
         ),
         (with_times(1e3), r"the fitted speed of 1\d{4} m/s is far outside .*crushed by .* more than it is long"),
         (with_times(1e-3), r"the fitted spring of 3\.10\d*e\+09 kN/m is far outside what vehicles have"),
         (with_size(100.0), "the fitted speed of 1340 m/s is far outside what vehicles have, 4 to 25 m/s"),
         (with_size(1e-3), r"the fitted speed of 0\.0134 m/s is far outside"),
-        (Pulse("", TIMES, {"acceleration": np.full(151, -100.0)}), "far outside|does not determine"),
-        (Pulse("", TIMES, {"displacement": 13.4 * TIMES}), "does not determine"),
-        (Pulse("", TIMES, {"acceleration": np.random.default_rng(0).normal(-5, 50, 151)}), "does not determine"),
+        (recorded({"acceleration": np.full(151, -100.0)}), "far outside|does not determine"),
+        (recorded({"displacement": 13.4 * TIMES}), "does not determine"),
         (
-            Pulse("", TIMES, dict(zip(SIGNALS, (0.1 * known(PAPER, TIMES)[0], *known(PAPER, TIMES)[1:]), strict=True))),
+            recorded({"acceleration": np.random.default_rng(0).normal(-5, 50, 151)}),
+            "does not determine",
+        ),
+        (
+            TimeHistory(
+                RECORD, TIMES, dict(zip(SIGNALS, (0.1 * known(PAPER, TIMES)[0], *known(PAPER, TIMES)[1:]), strict=True))
+            ),
             "no spring and damper in series come near it: the .* is off by",
         ),
     ],
-    ids=lambda value: "" if isinstance(value, Pulse) else value[:30],
+    ids=lambda value: "" if isinstance(value, TimeHistory) else value[:30],
 )
-def test_a_result_that_no_vehicle_has_is_refused(pulse: Pulse, message: str) -> None:
+def test_a_result_that_no_vehicle_has_is_refused(pulse: TimeHistory, message: str) -> None:
     with pytest.raises(FitError, match=message):
         fit_pulse(pulse, PAPER.mass_kg)
 
@@ -220,7 +230,7 @@ def test_impossible_vehicles_are_refused(mass: float, speed: float | None, messa
 
 
 def test_a_front_that_stiffens_is_named() -> None:
-    fit = fit_pulse(Pulse("", TIMES, {"acceleration": stiffening(TIMES, k=1e4, k_3=3e7)}), 6800.0)
+    fit = fit_pulse(recorded({"acceleration": stiffening(TIMES, k=1e4, k_3=3e7)}), 6800.0)
     assert fit.touch_s == pytest.approx(0.0147, abs=1e-3)
     assert any("stiffens as it is crushed" in warning for warning in fit.warnings)
 

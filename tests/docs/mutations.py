@@ -20,7 +20,7 @@ _DYNAMICS = "kernels/boulder_kernels/dynamics.py"
 _WALL, _TRAJECTORY = "boulder_sweep/crash_tests/rigid_wall.py", "boulder_sweep/impact/trajectory.py"
 _DESIGNS = "boulder_sweep/designs.py"
 _GROUND = "kernels/boulder_kernels/ground.py"
-_OUTLINE, _PIECES, _LAWS = (f"kernels/boulder_kernels/{name}.py" for name in ("outline", "pieces", "soil_laws"))
+_PIECES = "kernels/boulder_kernels/pieces.py"
 _HEAVE, _STEPS, _OPINION = (f"kernels/boulder_kernels/{name}.py" for name in ("heave", "runge_kutta", "second_opinion"))
 
 MUTATIONS = (
@@ -161,17 +161,17 @@ MUTATIONS = (
         "control.stop and field(work, START, 7) <= 9.0",
     ),
     Mutation((137,), _OPINION, "f) + (crush_energy(u, c) if touching else 0.0)", "f)"),
-    Mutation((141,), _OUTLINE, "m_b = design.rho_b * volume", "m_b = 1.01 * design.rho_b * volume"),
-    Mutation((141,), _OUTLINE, "area = slice_ * (near + far)", "area = slice_ * 2.0 * near"),
-    Mutation((142,), _OUTLINE, "0.5 * (far * far - near * near)", "0.5 * (far * far + near * near)"),
-    Mutation((142,), _OUTLINE, "z_c += area * z\n", "z_c += slice_ * z\n"),
-    Mutation((143,), _OUTLINE, "- m_b * (x * x + z_c * z_c)", "- m_b * z_c * z_c"),
+    Mutation((141,), _DESIGN, "m_b = design.rho_b * volume", "m_b = 1.01 * design.rho_b * volume"),
+    Mutation((141,), _DESIGN, "area = slice_ * (near + far)", "area = slice_ * 2.0 * near"),
+    Mutation((142,), _DESIGN, "0.5 * (far * far - near * near)", "0.5 * (far * far + near * near)"),
+    Mutation((142,), _DESIGN, "z_c += area * z\n", "z_c += slice_ * z\n"),
+    Mutation((143,), _DESIGN, "- m_b * (x * x + z_c * z_c)", "- m_b * z_c * z_c"),
     Mutation(
-        (143,), _OUTLINE, "(far * far * far + near * near * near) / 3.0", "(far * far * far - near * near * near) / 3.0"
+        (143,), _DESIGN, "(far * far * far + near * near * near) / 3.0", "(far * far * far - near * near * near) / 3.0"
     ),
     Mutation((144,), _DYNAMICS, '+ getattr(c, "lean", 0.0) * c.d * sin', '- getattr(c, "lean", 0.0) * c.d * sin'),
     Mutation((144,), _DYNAMICS, 'c.C_cos - abs(getattr(c, "lean", 0.0)) * c.d', "c.C_cos"),
-    Mutation((144,), _LAWS, "reaction.M - times(lean, k.lever_d)", "reaction.M + times(lean, k.lever_d)"),
+    Mutation((144,), _DYNAMICS, "reaction.M - times(lean, k.lever_d)", "reaction.M + times(lean, k.lever_d)"),
     Mutation(
         (145,), _PIECES, "-slope_of(outline, i, WIDTH) * d / design.W", "slope_of(outline, i, WIDTH) * d / design.W"
     ),

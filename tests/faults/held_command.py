@@ -8,16 +8,20 @@ from __future__ import annotations
 import os
 import sys
 import threading
+import zipfile
 from pathlib import Path
+from typing import NoReturn
 
 
-def _held(descriptor: int) -> None:
+def _held(*_: object) -> NoReturn:
     Path(sys.argv[1]).touch()
-    threading.Event().wait()
+    while True:
+        threading.Event().wait()
 
 
 if __name__ == "__main__":
     from boulder_sweep.cli.main import main
 
     os.fsync = _held
+    zipfile.ZipFile.write = _held  # of a spreadsheet, whose parts are in temporary files then
     main(sys.argv[2:])

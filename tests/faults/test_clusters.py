@@ -53,7 +53,7 @@ def test_the_work_of_a_killed_worker_is_done_by_others(tmp_path, whole):
 
 def test_a_killed_scheduler_ends_the_run_in_words_and_it_goes_on(tmp_path, whole):
     out = tmp_path / "out"
-    words = r"Dask.* rows are safe\. Resume with: .*--backend dask --scheduler tcp.*--resume"
+    words = r"Dask.* rows are safe\. Resume with:\n  .*--backend dask --scheduler tcp.*--resume"
     with Cluster(2, tmp_path) as cluster, pytest.raises(ClusterLostError, match=words) as lost:
         on(cluster, out, progress=at_first_rows(cluster.kill_scheduler))
     assert lost.value.exit_code == 130

@@ -37,7 +37,7 @@ class Compiling(NamedTuple):
 
     def compiles(self) -> bool:
         """Whether a process of its own compiles."""
-        return any("boulder_kernels.compiling" in command for command in marked(self.mark))
+        return any("boulder_kernels._jit" in command for command in marked(self.mark))
 
     def stop(self, number: int, again: bool = False) -> tuple[int, str]:
         """Send a signal; exit code, and what was told on stderr. No process is left."""

@@ -59,7 +59,7 @@ def test_a_disk_that_fills_up_stops_the_run_and_loses_nothing(filling, tmp_path,
     disk, make_room = filling
     monkeypatch.setattr(limits, "_disk_free", lambda out: None)
     out = disk / "out"
-    words = r"No space left on device; free some space and try again. .* rows are safe. Resume with: "
+    words = r"No space left on device; free some space and try again. .* rows are safe. Resume with:\n  "
     with pytest.raises(WriteError, match=words):
         run(grid_of(ROWS), out, simulate=plausible)
     assert nothing_left(out)

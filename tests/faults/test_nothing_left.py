@@ -13,7 +13,7 @@ import pytest
 
 from tests.faults.processes import ROOT, signalled
 from tests.faults.test_compiling import GRID
-from tests.waiting import HANG_GUARD_S, wait_until
+from tests.waiting import HANG_GUARD_S, is_running, wait_until
 
 pytestmark = [pytest.mark.faults, pytest.mark.compiled]
 
@@ -85,11 +85,7 @@ class Place:
     def child_is_running(self) -> bool:
         """Whether what a browser started is still there."""
         pid = Path(f"{self.held}.child")
-        try:
-            state = Path(f"/proc/{int(pid.read_text())}/stat").read_text() if pid.exists() else ") Z"
-        except OSError:
-            return False
-        return state.rpartition(")")[2].split()[0] != "Z"
+        return pid.exists() and is_running(int(pid.read_text()))
 
 
 @pytest.fixture

@@ -93,8 +93,13 @@ def test_the_longest_wedge_of_the_layers_above_the_base_counts():
     assert quantities(ROW, BOX, deep)["excavated_m3"] == quantities(ROW, BOX, PLAIN)["excavated_m3"]
 
 
-def test_a_weighed_boulder_keeps_its_mass():
-    assert quantities(ROW | {"boulder_mass_kg": 2e4}, BOX, PLAIN)["boulder_mass_kg"] == 2e4
+def test_a_weighed_boulder_keeps_its_mass_and_fills_its_share_of_the_pit():
+    box = quantities(ROW, BOX, PLAIN)
+    found = quantities(ROW | {"boulder_mass_kg": 0.7 * box["boulder_mass_kg"]}, BOX, PLAIN)
+    assert found["boulder_mass_kg"] == 0.7 * box["boulder_mass_kg"]
+    assert found["excavated_m3"] - found["backfill_m3"] == pytest.approx(0.7 * 1.65 * 1.68 * 2.03)
+    heavier = quantities(ROW | {"boulder_mass_kg": 1.1 * box["boulder_mass_kg"]}, BOX, PLAIN)
+    assert heavier["backfill_m3"] == box["backfill_m3"]
 
 
 def test_many_designs_at_once():

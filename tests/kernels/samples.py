@@ -10,9 +10,8 @@ import numpy as np
 
 import boulder_kernels as bk
 from boulder_kernels.design import ultimate_pressure
-from boulder_kernels.dynamics import State, contact_displacement, spring_compression
+from boulder_kernels.dynamics import State, constants_in, contact_displacement, profile_of, spring_compression
 from boulder_kernels.pieces import table_in_layers
-from boulder_kernels.soil_laws import constants_in, profile_of
 from tests import oracle
 
 BUMPER = 0.5  # height of the underside of the bumper [m]

@@ -10,7 +10,7 @@ import numpy as np
 import boulder_kernels as bk
 from boulder_kernels.dormand_prince import step
 from boulder_kernels.dynamics import Modes, State, rate_of
-from boulder_kernels.following import RUNNING, Clock, Impact, Pace, enter_modes, follow, go_on
+from boulder_kernels.impact import RUNNING, Clock, Impact, Pace, enter_modes, follow, go_on
 from boulder_kernels.outcomes import compression_at, no_maxima
 from boulder_kernels.settling import NO_PROOF
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from boulder_kernels import _cache
+from boulder_kernels import _jit
 
 ROOT = Path(__file__).parents[2]
 OTHER_USER = 65534
@@ -31,16 +31,16 @@ def place() -> Iterator[Path]:
 
 def named_only(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
     """Leave one candidate for the folder: the named one."""
-    monkeypatch.setenv(_cache.CACHE_VARIABLE, str(folder))
+    monkeypatch.setenv(_jit.CACHE_VARIABLE, str(folder))
     monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null")
-    monkeypatch.setattr(_cache.tempfile, "gettempdir", lambda: "/dev/null")
+    monkeypatch.setattr(_jit.tempfile, "gettempdir", lambda: "/dev/null")
 
 
 def test_new_folders_are_closed_to_others(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     named_only(monkeypatch, place / "a" / "b")
     before = os.umask(0)
     try:
-        folder = _cache._cache_folder()
+        folder = _jit._cache_folder()
     finally:
         os.umask(before)
     assert folder is not None
@@ -55,14 +55,14 @@ def test_a_folder_that_others_can_write_is_refused(
 ) -> None:
     """A sticky folder above is safe, as the shared temporary folder: nobody else can replace what lies in it."""
     named_only(monkeypatch, place / "cache")
-    folder = _cache._cache_folder()
+    folder = _jit._cache_folder()
     assert folder is not None
     (Path(folder) if where == "itself" else place).chmod(mode)
     if where == "above" and mode & stat.S_ISVTX:
-        assert _cache._cache_folder() == folder
+        assert _jit._cache_folder() == folder
     else:
         with pytest.warns(UserWarning, match="other users can write into"):
-            assert _cache._cache_folder() is None
+            assert _jit._cache_folder() is None
 
 
 def test_a_folder_of_another_user_is_refused(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -73,32 +73,32 @@ def test_a_folder_of_another_user_is_refused(place: Path, monkeypatch: pytest.Mo
         os.chown(folder, OTHER_USER, OTHER_USER)
     else:
         user = os.getuid() + 1
-        monkeypatch.setattr(_cache.os, "getuid", lambda: user)
+        monkeypatch.setattr(_jit.os, "getuid", lambda: user)
     named_only(monkeypatch, folder)
     with pytest.warns(UserWarning, match="belongs to another user"):
-        assert _cache._cache_folder() is None
+        assert _jit._cache_folder() is None
 
 
 @pytest.mark.parametrize("mode", [0o666, 0o777])
 def test_a_file_that_others_can_write_is_refused(place: Path, monkeypatch: pytest.MonkeyPatch, mode: int) -> None:
     named_only(monkeypatch, place)
-    folder = _cache._cache_folder()
+    folder = _jit._cache_folder()
     assert folder is not None
     (Path(folder) / "kernel.so").touch()
     (Path(folder) / "kernel.so").chmod(mode)
     with pytest.warns(UserWarning, match="is another user's, or open to others"):
-        assert _cache._cache_folder() is None
+        assert _jit._cache_folder() is None
 
 
 def test_a_file_of_another_user_is_refused(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     named_only(monkeypatch, place)
-    folder = _cache._cache_folder()
+    folder = _jit._cache_folder()
     assert folder is not None
     (Path(folder) / "kernel.so").touch()
     if os.getuid() == 0:
         os.chown(Path(folder) / "kernel.so", OTHER_USER, OTHER_USER)
         with pytest.warns(UserWarning, match="is another user's"):
-            assert _cache._cache_folder() is None
+            assert _jit._cache_folder() is None
 
 
 def test_a_link_is_followed_once(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,16 +106,16 @@ def test_a_link_is_followed_once(place: Path, monkeypatch: pytest.MonkeyPatch) -
     (place / "real").mkdir()
     (place / "link").symlink_to(place / "real")
     named_only(monkeypatch, place / "link")
-    folder = _cache._cache_folder()
+    folder = _jit._cache_folder()
     assert folder is not None
     assert Path(folder).parents[1] == place / "real"
 
 
 TINY = """
-from boulder_kernels import _cache
+from boulder_kernels import _jit
 from boulder_kernels.numerics import sine_versine
 
-print(sine_versine(0.0)[0], _cache.CACHE_FOLDER)
+print(sine_versine(0.0)[0], _jit.CACHE_FOLDER)
 """
 
 
@@ -135,7 +135,7 @@ def run_tiny(place: Path) -> subprocess.CompletedProcess[str]:
         "PATH": os.environ["PATH"],
         "PYTHONPATH": f"{ROOT / 'kernels'}",
         "PYTHONDONTWRITEBYTECODE": "1",
-        _cache.CACHE_VARIABLE: str(place / "cache"),
+        _jit.CACHE_VARIABLE: str(place / "cache"),
         "XDG_CACHE_HOME": "/dev/null",
     }
     command = [sys.executable, "-W", "always", str(place / "tiny.py")]

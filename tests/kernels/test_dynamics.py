@@ -21,7 +21,7 @@ from boulder_kernels.dynamics import (
     signed_arm,
     switches_of,
 )
-from boulder_kernels.modes import initial_modes, mode_at_rest
+from boulder_kernels.events import initial_modes, mode_at_rest
 from tests import oracle
 from tests.oracle.dynamics import Contact, Rotation, loads, rate
 from tests.oracle.events import first_modes, rest_modes

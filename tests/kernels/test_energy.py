@@ -13,7 +13,7 @@ import pytest
 import boulder_kernels as bk
 from boulder_kernels.design import constants_of
 from boulder_kernels.dynamics import FREE, TURNING_BACK, TURNING_FORWARD, Modes, State, signed_arm, switches_of
-from boulder_kernels.time_history import exchange_rates, stored_energies
+from boulder_kernels.outcomes import exchange_rates, stored_energies
 from tests import oracle
 from tests.oracle.dynamics import Rotation, loads
 from tests.oracle.energy import ledger, path_rates
@@ -171,7 +171,7 @@ import json
 import boulder_kernels as bk
 from boulder_kernels import dynamics
 from boulder_kernels.soil import Kinematics, Reaction
-from boulder_kernels.soil_laws import soil_reaction
+from boulder_kernels.dynamics import soil_reaction
 from tests import oracle
 from tests.kernels.samples import design_of
 from tests.kernels.test_energy import audit, imbalance

@@ -14,33 +14,31 @@ from boulder_kernels._jit import plain
 from boulder_kernels.control import control_for
 from boulder_kernels.design import error_arm
 from boulder_kernels.dormand_prince import ERROR
-from boulder_kernels.error_estimates import (
+from boulder_kernels.outcomes import (
     AT_LIMIT,
     AT_LIMIT_AFTER_CHANGES,
     CHATTERING,
     CHATTERING_T,
     CHATTERING_THETA,
     CHATTERING_X,
+    COARSER,
+    FINER,
     LEAST_CONFIRMED_M,
     LEAST_IF_DOUBTFUL,
+    LEAST_ROTATION,
     LONG_MOTION,
+    NONE_NEEDED,
+    PAIR,
     ROCKING,
     SAFETY,
     SAFETY_CONFIRMED,
+    THETA_MAX,
     YIELD_LOCATED,
     YIELD_PASSED,
     error_time,
-    step_errors,
-)
-from boulder_kernels.outcomes import (
-    COARSER,
-    FINER,
-    LEAST_ROTATION,
-    NONE_NEEDED,
-    PAIR,
-    THETA_MAX,
     no_maxima,
     outcome_table,
+    step_errors,
 )
 from boulder_kernels.table import is_paired, solve, step_of_solution
 from tests import oracle

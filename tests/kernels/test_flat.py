@@ -13,10 +13,10 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels.design import constants_of
+from boulder_kernels.dynamics import fill_soil, profile_of
 from boulder_kernels.numerics import WIDTH
 from boulder_kernels.pieces import reaction_of_elements, uniform_layers
 from boulder_kernels.soil import Kinematics, element_sums
-from boulder_kernels.soil_laws import fill_soil, profile_of
 
 from .samples import random_designs
 

@@ -11,6 +11,7 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels import Status
+from boulder_kernels.dynamics import empty_soil
 from boulder_kernels.ground import BROMS, KP_SQUARED, WIDTH_CAPPED, put_soil
 from boulder_kernels.ground import Ground as KernelGround
 from boulder_kernels.heave import (
@@ -37,7 +38,6 @@ from boulder_kernels.second_opinion import (
     second_opinions,
     simulate_heave,
 )
-from boulder_kernels.soil_laws import empty_soil
 from boulder_kernels.table import simulate_table, some_rows
 from tests.oracle.heave import Base as OracleBase
 from tests.oracle.heave import Body, loads

@@ -13,7 +13,7 @@ import numba
 import numpy as np
 import pytest
 
-from boulder_kernels import _cache, _jit, compiling
+from boulder_kernels import _jit
 from boulder_kernels.numerics import sine_versine
 
 pytestmark = pytest.mark.compiled
@@ -29,7 +29,7 @@ def forget(kernel: _jit.Kernel, monkeypatch: pytest.MonkeyPatch) -> None:
 def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A kernel of the package that was not called before, and an empty folder for what it is compiled to."""
     tmp_path.chmod(0o700)
-    monkeypatch.setattr(_cache, "CACHE_FOLDER", str(tmp_path))
+    monkeypatch.setattr(_jit, "CACHE_FOLDER", str(tmp_path))
     forget(sine_versine, monkeypatch)
     return tmp_path
 
@@ -100,13 +100,13 @@ def test_where_nothing_can_be_kept_the_kernel_is_compiled_once_for_this_process(
         raise OSError
 
     expected = sine_versine(0.3)
-    monkeypatch.setattr(_cache, "CACHE_FOLDER", str(fresh / "other"))
-    monkeypatch.setattr(compiling, "compile_elsewhere", fail)
+    monkeypatch.setattr(_jit, "CACHE_FOLDER", str(fresh / "other"))
+    monkeypatch.setattr(_jit, "compile_elsewhere", fail)
     forget(sine_versine, monkeypatch)
     compiled.clear()
     assert sine_versine(0.3) == sine_versine(0.3) == expected
     assert compiled == ["sine_versine"] * 2  # tried elsewhere, and done here
-    monkeypatch.setattr(_cache, "CACHE_FOLDER", None)
+    monkeypatch.setattr(_jit, "CACHE_FOLDER", None)
     forget(sine_versine, monkeypatch)
     assert sine_versine(0.3) == expected
 
@@ -114,8 +114,8 @@ def test_where_nothing_can_be_kept_the_kernel_is_compiled_once_for_this_process(
 def test_a_process_that_has_ended_is_started_again(fresh: Path) -> None:
     """It ends when nothing was asked for a while, perhaps just when something is."""
     sine_versine(0.3)
-    assert compiling._process is not None
-    compiling._process.kill()
+    assert _jit._process is not None
+    _jit._process.kill()
     assert sine_versine(2)[0] == pytest.approx(np.sin(2.0))
     assert len(marks(fresh)) == 2
 
@@ -128,32 +128,32 @@ def test_wrong_arguments_are_told_by_numba(fresh: Path) -> None:
 
 def test_code_is_kept_by_processor_and_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     """A home folder that machines share holds code for each of them."""
-    before = _cache.machine_hash.__wrapped__()
-    assert _cache.machine_hash.__wrapped__() == before
+    before = _jit.machine_hash.__wrapped__()
+    assert _jit.machine_hash.__wrapped__() == before
     monkeypatch.setenv("NUMBA_CPU_NAME", "generic")
-    named = _cache.machine_hash.__wrapped__()
+    named = _jit.machine_hash.__wrapped__()
     monkeypatch.delenv("NUMBA_CPU_NAME")
-    monkeypatch.setattr(_cache, "processor", lambda: ("model name : another",))
-    assert len({before, named, _cache.machine_hash.__wrapped__()}) == 3
+    monkeypatch.setattr(_jit, "processor", lambda: ("model name : another",))
+    assert len({before, named, _jit.machine_hash.__wrapped__()}) == 3
 
 
 @pytest.mark.parametrize(("features", "ending"), [("sse2 fma avx2", "+fma"), ("sse2", "")])
 def test_a_table_says_whether_products_are_fused(monkeypatch: pytest.MonkeyPatch, features: str, ending: str) -> None:
     for name in ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(_cache, "processor", lambda: ("model name : any", f"flags : {features}"))
-    assert _cache.target() == f"{_cache.platform.machine()}{ending}"
+    monkeypatch.setattr(_jit, "processor", lambda: ("model name : any", f"flags : {features}"))
+    assert _jit.target() == f"{_jit.platform.machine()}{ending}"
 
 
 NAMES = """
 import re
 import sys
 import numba
-from boulder_kernels.workspace import group_type
+from boulder_kernels.table import group_type
 
 @numba.njit
 def first(group):
-    return group.state.theta_b[0]
+    return group.y.theta_b[0]
 
 kinds = {"dry": (1, False, True), "wet": (2, True, True)}
 for name in sys.argv[1:]:
@@ -191,7 +191,7 @@ def test_code_that_two_processes_have_compiled_runs_in_one(tmp_path: Path) -> No
 
     def rotations(*more: str) -> list[str]:
         command = [sys.executable, "-c", ROTATIONS, str(TAPERED), *more]
-        environment = os.environ | {_cache.CACHE_VARIABLE: str(tmp_path)}
+        environment = os.environ | {_jit.CACHE_VARIABLE: str(tmp_path)}
         return subprocess.run(command, check=True, capture_output=True, text=True, env=environment).stdout.split()
 
     dry, wet = rotations(DRY), rotations(WET)

@@ -10,10 +10,9 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels import Design, OutcomeTable, Status
-from boulder_kernels.error_estimates import step_errors
 from boulder_kernels.impact import simulate_uniform
-from boulder_kernels.outcomes import STEP, T_END, empty_outcomes, outcome_table, write_outcome
-from boulder_kernels.workspace import LANES
+from boulder_kernels.outcomes import STEP, T_END, empty_outcomes, outcome_table, step_errors, write_outcome
+from boulder_kernels.table import LANES
 
 from .samples import ALL_READINGS, control, random_designs, same_bits, table_of
 

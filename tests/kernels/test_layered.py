@@ -8,9 +8,9 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels.design import constants_of
+from boulder_kernels.dynamics import drag_power, soil_energy, soil_potential, soil_reaction
 from boulder_kernels.pieces import table_in_layers, uniform_layers
 from boulder_kernels.soil import closed_form, uniform_drag_power, uniform_potential
-from boulder_kernels.soil_laws import drag_power, soil_energy, soil_potential, soil_reaction
 from boulder_kernels.table import problem_at, simulate_table
 from tests import oracle
 from tests.kernels.samples import layered_constants

@@ -7,13 +7,11 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels import OutcomeTable, Status
-from boulder_kernels.error_estimates import step_errors
+from boulder_kernels.dynamics import soil_potential
 from boulder_kernels.impact import simulate_alone
-from boulder_kernels.outcomes import empty_outcomes, write_outcome
+from boulder_kernels.outcomes import empty_outcomes, step_errors, write_outcome
 from boulder_kernels.pieces import COUNTS, GivenPiece, PiecewiseTable, given_pieces, lanes_count
-from boulder_kernels.soil_laws import soil_potential
-from boulder_kernels.table import problem_at, some_rows
-from boulder_kernels.workspace import LANES
+from boulder_kernels.table import LANES, problem_at, some_rows
 
 from .samples import control, layered_constants, random_designs, random_layers
 from .test_lanes import PRESETS, assert_alike, assert_same, with_step

@@ -19,10 +19,10 @@ from boulder_kernels.dynamics import (
     signed_arm,
     switches_of,
 )
+from boulder_kernels.events import CONTACT, CORNER, COUPLE, ROTATION, TOLERANCE
 from boulder_kernels.impact import Problem
-from boulder_kernels.modes import CONTACT, CORNER, COUPLE, ROTATION, TOLERANCE
+from boulder_kernels.outcomes import no_record
 from boulder_kernels.table import simulate_table
-from boulder_kernels.time_history import no_record
 from tests import oracle
 from tests.oracle.dynamics import motion_of
 

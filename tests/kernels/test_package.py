@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import boulder_kernels
-from boulder_kernels import _cache, _jit
+from boulder_kernels import _jit
 
 SOURCES = sorted(Path(boulder_kernels.__file__).parent.glob("*.py"))
 ALLOWED = {"numpy", "numba", "llvmlite"}  # llvmlite is a part of Numba
@@ -67,11 +67,11 @@ def run(script: str, environment: dict[str, str]) -> str:
 @pytest.mark.compiled
 def test_a_second_process_compiles_nothing(tmp_path: Path) -> None:
     """It finds all machine code on the disk, as the first one did: no new file, none written again, the same bits."""
-    environment = {_cache.CACHE_VARIABLE: str(tmp_path)}
+    environment = {_jit.CACHE_VARIABLE: str(tmp_path)}
     bits = run(RUN, environment)
     files = {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*") if file.is_file()}
     assert files
-    folder = f"kernels-{_cache.source_hash()[:16]}"
+    folder = f"kernels-{_jit.source_hash()[:16]}"
     assert {file.relative_to(tmp_path).parts[0] for file in files} == {folder}
     assert run(RUN, environment) == bits
     assert {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*") if file.is_file()} == files
@@ -81,43 +81,43 @@ def test_the_hash_tells_sources_apart(tmp_path: Path, monkeypatch: pytest.Monkey
     """A change of one character anywhere in the package, or another name of a file, is another hash."""
     for source in SOURCES:
         (tmp_path / source.name).write_bytes(source.read_bytes())
-    monkeypatch.setattr(_cache, "__file__", str(tmp_path / "_jit.py"))
-    before = _cache.source_hash()
+    monkeypatch.setattr(_jit, "__file__", str(tmp_path / "_jit.py"))
+    before = _jit.source_hash()
     monkeypatch.undo()
-    assert before == _cache.source_hash() == boulder_kernels.source_hash()
-    monkeypatch.setattr(_cache, "__file__", str(tmp_path / "_jit.py"))
+    assert before == _jit.source_hash() == boulder_kernels.source_hash()
+    monkeypatch.setattr(_jit, "__file__", str(tmp_path / "_jit.py"))
     soil = tmp_path / "soil.py"
     soil.write_text(soil.read_text().replace("0.25", "0.26", 1))
-    assert _cache.source_hash() != before
+    assert _jit.source_hash() != before
     soil.write_bytes(SOURCES[[s.name for s in SOURCES].index("soil.py")].read_bytes())
-    assert _cache.source_hash() == before
+    assert _jit.source_hash() == before
     soil.rename(tmp_path / "soil2.py")
-    assert _cache.source_hash() != before
+    assert _jit.source_hash() != before
 
 
 def test_folder_of_the_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The one that is named; else the user's; else a temporary one of this user's own; named by the hashes."""
-    name = f"kernels-{_cache.source_hash()[:16]}/native-{_cache.machine_hash()[:16]}"
-    monkeypatch.setenv(_cache.CACHE_VARIABLE, str(tmp_path / "named"))
-    assert _cache._cache_folder() == str(tmp_path / "named" / name)
-    monkeypatch.delenv(_cache.CACHE_VARIABLE)
+    name = f"kernels-{_jit.source_hash()[:16]}/native-{_jit.machine_hash()[:16]}"
+    monkeypatch.setenv(_jit.CACHE_VARIABLE, str(tmp_path / "named"))
+    assert _jit._cache_folder() == str(tmp_path / "named" / name)
+    monkeypatch.delenv(_jit.CACHE_VARIABLE)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
-    assert _cache._cache_folder() == str(tmp_path / "xdg" / "boulder-sweep" / name)
+    assert _jit._cache_folder() == str(tmp_path / "xdg" / "boulder-sweep" / name)
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
-    assert _cache._cache_folder() == str(tmp_path / "home" / ".cache" / "boulder-sweep" / name)
+    assert _jit._cache_folder() == str(tmp_path / "home" / ".cache" / "boulder-sweep" / name)
 
 
 def test_where_no_folder_can_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without any folder to write to, there is no cache, and the kernels still work."""
     blocked = tmp_path / "file"
     blocked.write_text("a file where a folder should be")
-    monkeypatch.setenv(_cache.CACHE_VARIABLE, str(blocked))
+    monkeypatch.setenv(_jit.CACHE_VARIABLE, str(blocked))
     monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
-    monkeypatch.setattr(_cache.tempfile, "gettempdir", lambda: str(blocked))
+    monkeypatch.setattr(_jit.tempfile, "gettempdir", lambda: str(blocked))
     with pytest.warns(UserWarning, match="compiled kernels are not kept.*is not a folder.*BOULDER_SWEEP_CACHE_DIR"):
-        assert _cache._cache_folder() is None
-    monkeypatch.setattr(_cache, "CACHE_FOLDER", None)
+        assert _jit._cache_folder() is None
+    monkeypatch.setattr(_jit, "CACHE_FOLDER", None)
     assert _jit.kernel(lambda x: x + 1.0)(1.0) == 2.0
 
 
@@ -127,11 +127,11 @@ def test_without_a_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     def homeless() -> Path:
         raise RuntimeError("no home")
 
-    monkeypatch.delenv(_cache.CACHE_VARIABLE, raising=False)
+    monkeypatch.delenv(_jit.CACHE_VARIABLE, raising=False)
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
-    monkeypatch.setattr(_cache.Path, "home", homeless)
-    monkeypatch.setattr(_cache.tempfile, "gettempdir", lambda: str(tmp_path))
-    folder = _cache._cache_folder()
+    monkeypatch.setattr(_jit.Path, "home", homeless)
+    monkeypatch.setattr(_jit.tempfile, "gettempdir", lambda: str(tmp_path))
+    folder = _jit._cache_folder()
     assert folder is not None
     assert Path(folder).is_relative_to(tmp_path)
 
@@ -189,7 +189,7 @@ def test_compiling_after_loading(tmp_path: Path) -> None:
     """A process that has loaded kernels can still compile others, which call them."""
     for name, source in (("called.py", CALLED), ("more.py", MORE)):
         (tmp_path / name).write_text(source)
-    environment = {_cache.CACHE_VARIABLE: str(tmp_path / "cache")}
+    environment = {_jit.CACHE_VARIABLE: str(tmp_path / "cache")}
     run(f"import sys; sys.path.append({str(tmp_path)!r}); import called", environment)
     printed = run(f"import sys; sys.path.append({str(tmp_path)!r}); import more", environment)
     assert printed.split() == ["0.25", "0.5", "1.5", "0.25", "0.5", "0.0", "0.5", "1.0"]
@@ -201,5 +201,5 @@ def test_a_kernel_is_called_from_python_and_by_kernels(tmp_path: Path) -> None:
     (tmp_path / "called.py").write_text(CALLED)
     script = f"import runpy; runpy.run_path({str(tmp_path / 'called.py')!r})"
     for _ in range(2):
-        printed = run(script, {_cache.CACHE_VARIABLE: str(tmp_path / "cache")})
+        printed = run(script, {_jit.CACHE_VARIABLE: str(tmp_path / "cache")})
         assert printed.split() == ["0.25", "0.5", "1.5", "0.25"]

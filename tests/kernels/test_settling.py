@@ -9,7 +9,7 @@ from scipy.optimize import minimize_scalar
 import boulder_kernels as bk
 from boulder_kernels import Design, Status
 from boulder_kernels.design import constants_of
-from boulder_kernels.dynamics import State
+from boulder_kernels.dynamics import State, soil_potential
 from boulder_kernels.numerics import sine_versine
 from boulder_kernels.outcomes import Maxima
 from boulder_kernels.settling import (
@@ -20,7 +20,6 @@ from boulder_kernels.settling import (
     energy_to_turn,
     proof_is_possible,
 )
-from boulder_kernels.soil_laws import soil_potential
 from tests import oracle
 from tests.oracle.restoring import gravity_energy
 from tests.oracle.soil import Motion

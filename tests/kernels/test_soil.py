@@ -7,7 +7,7 @@ import pytest
 
 import boulder_kernels as bk
 from boulder_kernels.design import constants_of, yield_displacement
-from boulder_kernels.dynamics import State
+from boulder_kernels.dynamics import State, soil_energy, soil_reaction
 from boulder_kernels.soil import (
     Kinematics,
     Reaction,
@@ -17,7 +17,6 @@ from boulder_kernels.soil import (
     soil_kinematics,
     spring_force,
 )
-from boulder_kernels.soil_laws import soil_energy, soil_reaction
 from tests import oracle
 from tests.oracle.soil import Motion, Soil, drag_forces, polar, spring_constants, stretch, ultimate_forces
 

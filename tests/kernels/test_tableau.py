@@ -12,7 +12,7 @@ A = np.array(tableau.A)
 AA = np.array(tableau.AA)
 B = A[6]
 C = np.array(tableau.C)
-FOURTH = np.array([float(weight) for weight in tableau._B_FOURTH])
+FOURTH = B - np.array(tableau.ERROR)
 
 
 def test_rows_sum_to_their_nodes() -> None:
@@ -73,10 +73,10 @@ def test_same_numbers_as_scipy() -> None:
 
 
 @pytest.mark.parametrize(("i", "j"), [(i, j) for i in range(1, 7) for j in range(i)])
-def test_a_mistyped_coefficient_is_refused(i: int, j: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The module checks itself when it is imported: one digit wrong and it does not come up."""
-    rows = [list(row) for row in tableau._A]
-    rows[i][j] += Fraction(1, 10**6)
-    monkeypatch.setattr(tableau, "_A", tuple(map(tuple, rows)))
+def test_a_mistyped_coefficient_is_refused(i: int, j: int) -> None:
+    """A method checks itself when it is made: one digit wrong and the module does not come up."""
+    nodes, rows, lower, orders = tableau.METHOD
+    wrong = [row.split() for row in rows]
+    wrong[i][j] = str(Fraction(wrong[i][j]) + Fraction(1, 10**6))
     with pytest.raises(AssertionError):
-        tableau._check()
+        tableau.tableau(nodes, tuple(map(" ".join, wrong)), lower, orders)

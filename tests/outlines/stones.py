@@ -3,8 +3,8 @@
 import numpy as np
 
 import boulder_kernels as bk
+from boulder_kernels.dynamics import constants_in, profile_of
 from boulder_kernels.pieces import PiecewiseTable, uniform_layers
-from boulder_kernels.soil_laws import constants_in, profile_of
 from tests.kernels.samples import table_of
 from tests.outlines.oracle import Stone
 

@@ -10,11 +10,17 @@ import boulder_kernels as bk
 from boulder_kernels import OutcomeTable
 from boulder_kernels._jit import plain
 from boulder_kernels.design import Body, Design
-from boulder_kernels.dynamics import least_couple, lift_of
+from boulder_kernels.dynamics import (
+    constants_in,
+    drag_power,
+    least_couple,
+    lift_of,
+    profile_of,
+    soil_potential,
+    soil_reaction,
+)
 from boulder_kernels.pieces import COUNTS, GivenPiece, PiecewiseTable, constants_of_few, given_pieces, uniform_layers
-from boulder_kernels.soil_laws import constants_in, drag_power, profile_of, soil_potential, soil_reaction
-from boulder_kernels.table import is_layered, is_paired, simulate_table, some_rows
-from boulder_kernels.workspace import LANES
+from boulder_kernels.table import LANES, is_layered, is_paired, simulate_table, some_rows
 from tests.kernels.samples import control, random_designs, random_layers, random_state, table_of
 from tests.kernels.test_lanes import PRESETS, assert_alike, assert_same
 from tests.kernels.test_layered_lanes import one_by_one

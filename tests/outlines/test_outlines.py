@@ -4,10 +4,16 @@ import numpy as np
 import pytest
 
 import boulder_kernels as bk
-from boulder_kernels.design import G, body_of_box, constants_of
-from boulder_kernels.dynamics import least_couple, lift_of
-from boulder_kernels.outline import FAR, NEAR, WIDTH, at_height, body_of_outline
-from boulder_kernels.soil_laws import constants_in, drag_power, profile_of, soil_potential, soil_reaction
+from boulder_kernels.design import FAR, NEAR, WIDTH, G, at_height, body_of_box, body_of_outline, constants_of
+from boulder_kernels.dynamics import (
+    constants_in,
+    drag_power,
+    least_couple,
+    lift_of,
+    profile_of,
+    soil_potential,
+    soil_reaction,
+)
 from boulder_kernels.table import simulate_table
 from tests import oracle
 from tests.kernels.samples import design_of, random_designs, random_state

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 import boulder_sweep
 from boulder_kernels import DesignTable
-from boulder_kernels.design import design_at
-from boulder_kernels.outline import body_of_outline
+from boulder_kernels.design import body_of_outline, design_at
 from boulder_sweep.columns import SHAPES, VERDICTS
 from boulder_sweep.designs import some
 from boulder_sweep.impact.recomputing import recompute

@@ -102,8 +102,7 @@ def test_of_a_question_without_a_recommendation_the_governing_answer_is_named(fi
 def test_what_has_no_answer_says_why(files: dict[str, Path]) -> None:
     said = [str(sentence[0]) for sentence in answer_of(read_rows(files["nothing"])).sentences]
     assert said == [
-        "The boulder does not pass up to where the truck would pass or ride over the boulder; "
-        "another boulder is needed."
+        "The boulder does not pass by what was asked, up to where the truck would pass or ride over the boulder."
     ]
     rows = read_rows(files["depth"])
     found = answers_table(rows)

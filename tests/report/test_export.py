@@ -2,19 +2,26 @@
 
 import csv
 import errno
+import math
 import os
+import re
 import shutil
 import subprocess
 import sys
+import tempfile
+import zipfile
 from pathlib import Path
 
 import numpy as np
 import openpyxl
 import pandas as pd
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
 import boulder_sweep
+from boulder_sweep.answers.advice import advice
+from boulder_sweep.answers.printing import need_screen, screen_lines, wrapped
 from boulder_sweep.answers.reserves import capacity
 from boulder_sweep.cli.main import execute
 from boulder_sweep.columns import COLUMNS, OUTCOME_COLUMNS
@@ -22,12 +29,14 @@ from boulder_sweep.errors import OlderRulesWarning, ReportError
 from boulder_sweep.judge.quantities import QUANTITIES
 from boulder_sweep.report import export as module
 from boulder_sweep.report import write_explorer, write_report, writing
+from boulder_sweep.report.answers import answer_of
 from boulder_sweep.report.export import export
 from boulder_sweep.report.page import ASSETS, SCRIPTS
+from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import load_text
-from boulder_sweep.settings.shown_units import shown_column, shown_settings, shown_unit
+from boulder_sweep.settings.shown_units import ShownColumn, shown_column, shown_settings, shown_unit
 from boulder_sweep.settings.units import factor
-from tests.answers.designs import bare_need
+from tests.answers.designs import bare_need, site
 from tests.store.folders import rewrite
 
 US = {
@@ -59,6 +68,20 @@ def test_names_end_in_their_units():
     assert shown_column("peak_force_kN", "us").size == 4.4482216152605
 
 
+SAME = (
+    *("boulder_length_ft", "boulder_density_pcf", "soil_density_pcf", "subgrade_reaction_pci", "strain_rate_factor"),
+    *("vehicle_mass_lb", "impact_speed_mph", "vehicle_spring_lb_in", "vehicle_damper_lb_s_in", "bumper_height_ft"),
+    *("hood_height_ft", "bed_offset_ft", "solidity", "shape"),
+)
+"""Columns with one value in all rows of the result."""
+
+
+def place_in_a_sheet(name):
+    """The answer comes first, and what is the same in every row last."""
+    first = ["design_id", "verdict", "reason", "margin", "robustness"]
+    return first.index(name) if name in first else 5 + (name in SAME)
+
+
 @pytest.mark.parametrize("kind", ["csv", "parquet", "xlsx"])
 def test_every_row_is_there_in_the_units_asked_for(result, table, tmp_path, kind):
     target = tmp_path / f"designs.{kind}"
@@ -67,7 +90,8 @@ def test_every_row_is_there_in_the_units_asked_for(result, table, tmp_path, kind
     found = read(target)
     assert len(found) == len(table)
     added = ["boulder_mass_lb", "height_above_ground_ft", "excavated_yd3", "backfill_yd3"]
-    assert list(found.columns) == [*(shown_column(name, "us").name for name in table.columns), *added]
+    names = [*(shown_column(name, "us").name for name in table.columns), *added]
+    assert list(found.columns) == (sorted(names, key=place_in_a_sheet) if kind == "xlsx" else names)
     buried = table.eval("boulder_length_m * boulder_width_m * embedment_depth_m") / 0.9144**3
     np.testing.assert_allclose(found.excavated_yd3 - found.backfill_yd3, buried, rtol=1e-9)
     for name in table.columns:
@@ -83,7 +107,7 @@ def test_every_row_is_there_in_the_units_asked_for(result, table, tmp_path, kind
 def test_a_spreadsheet_tells_units_settings_and_that_it_is_no_test(result, tmp_path):
     export(result, tmp_path / "designs.xlsx")
     book = openpyxl.load_workbook(tmp_path / "designs.xlsx")
-    assert book.sheetnames == ["designs", "about"]
+    assert book.sheetnames == ["answer", "designs", "about"]
     lines = [[cell or "" for cell in row] for row in book["about"].iter_rows(values_only=True)]
     assert "not a rating by test" in lines[0][0]
     assert ["boulder_length_m", "m", "length L of the boulder along the direction of travel"] in lines
@@ -94,10 +118,126 @@ def test_a_spreadsheet_tells_units_settings_and_that_it_is_no_test(result, tmp_p
 def test_a_spreadsheet_is_ready_to_be_read(result, tmp_path):
     rows = export(result, tmp_path / "designs.xlsx")
     sheet = openpyxl.load_workbook(tmp_path / "designs.xlsx")["designs"]
+    assert openpyxl.load_workbook(tmp_path / "designs.xlsx", read_only=True)["designs"].max_row == rows + 1
     assert sheet.freeze_panes == "B2"
     assert sheet.auto_filter.ref == f"A1:{openpyxl.utils.get_column_letter(sheet.max_column)}{rows + 1}"
+    ranges = [(column.min, column.max, column.width) for column in sheet.column_dimensions.values()]
     for cell in sheet[1]:
-        assert sheet.column_dimensions[cell.column_letter].width >= len(cell.value) + 2, "and an arrow of the filter"
+        (width,) = [width for first, last, width in ranges if first <= cell.column <= last]
+        assert width >= len(cell.value) + 2, "and an arrow of the filter"
+
+
+def answer_sheet(file, target, units="si"):
+    """Sentences as lines, heads and rows of the table of the first sheet."""
+    export(file, target, units=units)
+    sheet = openpyxl.load_workbook(target)["answer"]
+    lines = [list(row) for row in sheet.iter_rows()]
+    blank = next((k for k, line in enumerate(lines) if not any(cell.value for cell in line)), -1)
+    above, below, *rows = lines[blank + 1 :]
+    heads = [f"{one.value or ''} {other.value or ''}".strip() for one, other in zip(above, below, strict=True)]
+    return [line[0].value for line in lines[: max(blank, 0)]], heads, rows
+
+
+@pytest.mark.parametrize("units", ["si", "us"])
+def test_the_first_sheet_is_what_the_terminal_says(tmp_path, units):
+    found = boulder_sweep.need(site(height="[2.8, 3.4, 3.6] m"))
+    found.write(tmp_path / "depth.parquet")
+    said, heads, rows = answer_sheet(tmp_path / "depth.parquet", tmp_path / "depth.xlsx", units)
+    assert said == wrapped(advice(found, units))
+    assert heads == [" ".join(head).strip() for head, _ in need_screen(found, units).columns]
+    texts = [line.split() for line in screen_lines(found, units)[3:]]
+    assert [row[0].value for row in rows] == [None, "→", None]
+    assert [{cell.font.bold for cell in row} for row in rows] == [{False}, {True}, {False}]
+    for row, line in zip(rows, texts, strict=True):
+        for cell, text in zip(row[1:], line[line[0] == "→" :], strict=False):
+            if text[0].isdigit():
+                assert cell.value == float(text)
+                assert cell.number_format == f"0.{'0' * len(text.partition('.')[2])}".rstrip(".")
+            else:
+                assert cell.value == {"-": "–"}.get(text, text)
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "kind"),
+    [
+        *(("2.340", 2.34, "0.000"), ("12,500", 12500.0, "#,##0"), ("49.7%", 0.497, "0.0%"), ("-3", -3.0, "0")),
+        *(("-", "–", "General"), ("", None, "General"), ("≤1.2", "≤1.2", "General"), ("=1", "'=1", "General")),
+    ],
+)
+def test_texts_of_the_first_sheet_are_numbers_where_they_can_be(text, value, kind):
+    assert module._number(text) == (value, kind)
+
+
+def test_of_a_long_table_the_first_sheet_says_where_the_rest_is(tmp_path):
+    found = boulder_sweep.need(site(height="{from: 2.6 m, to: 3.6 m, count: 21}"))
+    found.write(tmp_path / "depth.parquet")
+    _, _, rows = answer_sheet(tmp_path / "depth.parquet", tmp_path / "depth.xlsx")
+    assert rows[-1][0].value == "(16 of 21, the best first; all are on the sheet designs)"
+    assert len(rows) == 17
+
+
+def test_the_first_sheet_of_a_run_is_the_recommendation_of_its_page(result, tmp_path):
+    said, heads, (best, other) = answer_sheet(result, tmp_path / "run.xlsx")
+    need = answer_of(read_rows(result)).need
+    design, named = need.recommendation.design, wrapped(advice(need))
+    assert said[: len(named)] == named
+    assert said[len(named)] == "57 of 252 designs pass (22.6%)."
+    shown = {head: cell.value for head, cell in zip(heads, best, strict=True)}
+    assert [best[0].value, other[0].value] == ["→", None]
+    assert shown["depth m"] == pytest.approx(design.sizes["embedment_depth_m"], abs=5e-4)
+    assert shown["dig m³"] == pytest.approx(design.excavated_m3, abs=0.05)
+    margins = [shown["φ′ 36 deg"], shown["φ′ 40 deg"]]
+    assert margins == pytest.approx([row["margin"] for row in design.rows], abs=5e-4)
+    assert shown["least margin"] == min(margins)
+
+
+@pytest.mark.parametrize("units", ["si", "us"])
+def test_the_first_sheet_of_a_run_without_a_design_that_qualifies_has_the_nearest(tmp_path, units):
+    boulder_sweep.run(site(site="embedment_ratio: 0.5", height="[2.0, 2.6] m"), tmp_path / "low.sweep")
+    said, heads, (nearest,) = answer_sheet(tmp_path / "low.sweep", tmp_path / "low.xlsx", units)
+    assert any(line.startswith("Nearest: ") for line in said)
+    assert nearest[0].value is None
+    assert nearest[heads.index("H m" if units == "si" else "H ft")].value == (2.0 if units == "si" else 6.562)
+
+
+def test_the_first_sheet_of_other_answers_is_their_table(answers, tmp_path):
+    for name, head in (("uncertainty", "P(pass)"), ("capacity", "class, simulated")):
+        said, heads, rows = answer_sheet(answers[name][0], tmp_path / f"{name}.xlsx")
+        assert said == []
+        assert head in heads
+        assert len(rows) == answers[name][1].num_rows
+    export(answers["simulate"][0], tmp_path / "history.xlsx")
+    assert openpyxl.load_workbook(tmp_path / "history.xlsx").sheetnames == ["designs", "about"]
+
+
+def test_one_table_gives_the_same_spreadsheet(result, tmp_path):
+    for name in ("one.xlsx", "two.xlsx"):
+        export(result, tmp_path / name)
+    assert (tmp_path / "one.xlsx").read_bytes() == (tmp_path / "two.xlsx").read_bytes()
+    with zipfile.ZipFile(tmp_path / "one.xlsx") as book:
+        assert {entry.date_time[0] for entry in book.infolist()} == {1980}
+        assert {*re.findall(rb"\d{4}-\d\d-\d\dT", book.read("docProps/core.xml"))} == {b"1980-01-01T"}
+
+
+@pytest.mark.parametrize("where", ["rows", "file"])
+def test_a_disk_that_fills_up_under_a_spreadsheet_is_named(result, tmp_path, monkeypatch, where):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(*((module, "_rows", full) if where == "rows" else (zipfile.ZipFile, "write", full)))
+    with pytest.raises(ReportError, match=r"designs\.xlsx cannot be written: No space left on device"):
+        export(result, tmp_path / "designs.xlsx")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_cells_without_a_number_are_blank(answers, tmp_path, monkeypatch):
+    table = pa.table({"design_id": [0, 1, 2, 3], "x": [1.5, None, math.nan, math.inf], "word": ["a", "", None, "b"]})
+    columns = [ShownColumn(name, name, "", 1.0, "") for name in table.column_names]
+    monkeypatch.setattr(module, "_tables", lambda *_: iter([(columns, table.slice(0, 3)), (columns, table.slice(3))]))
+    export(answers["simulate"][0], tmp_path / "blank.xlsx")
+    rows = openpyxl.load_workbook(tmp_path / "blank.xlsx")["designs"].iter_rows(min_row=2, values_only=True)
+    assert list(rows) == [(0, 1.5, "a"), (1, None, None), (2, None, None), (3, None, "b")]
 
 
 def test_settings_are_in_the_units_asked_for(result, tmp_path):
@@ -163,8 +303,9 @@ def test_parquet_keeps_units_and_meanings(result, tmp_path):
 
 def test_a_text_that_looks_like_a_formula_stays_a_text(tmp_path):
     signs = [*"=+-@", *"＝＋－＠", *"﹦﹢﹣﹫⁼₌⁺₊"]
-    formulas = [f"{sign}HYPERLINK(1)" for sign in signs]
-    rows = [f"{text},3" for text in (*formulas, "plain", "a=b", "±3")]
+    formulas = [*(f"{sign}HYPERLINK(1)" for sign in signs), "{=1}", "<r><f>1</f></r>"]
+    others = ["plain", "a=b", "±3", "</v>&amp;", "https://a.b", "mailto:a", "12"]
+    rows = [f"{text},3" for text in (*formulas, *others)]
     (tmp_path / "designs.csv").write_text("\n".join(("boulder_id,boulder_height_m", *rows)), encoding="utf-8")
     (tmp_path / "list.yaml").write_text(
         "name: list\ntable: designs.csv\nboulder: {length: 1.65 m, width: 1.5 m, density: 2600 kg/m^3}\n"
@@ -176,11 +317,13 @@ def test_a_text_that_looks_like_a_formula_stays_a_text(tmp_path):
     export(tmp_path / "out", tmp_path / "out.csv")
     with (tmp_path / "out.csv").open(newline="", encoding="utf-8") as file:
         shown = [row["boulder_id"] for row in csv.DictReader(file)]
-    assert [text.lstrip("'") for text in shown] == [*formulas, "plain", "a=b", "±3"]
-    assert [text.startswith("'") for text in shown] == [True] * len(formulas) + [False] * 3
+    assert [text.lstrip("'") for text in shown] == [*formulas, *others]
+    assert [text.startswith("'") for text in shown] == [True] * len(formulas) + [False] * len(others)
     export(tmp_path / "out", tmp_path / "out.xlsx")
     sheet = openpyxl.load_workbook(tmp_path / "out.xlsx")["designs"]
     assert {cell.data_type for row in sheet.iter_rows() for cell in row} <= {"s", "inlineStr", "n"}
+    (ids,) = [column for column in sheet.iter_cols(values_only=True) if column[0] == "boulder_id"]
+    assert list(ids[1:]) == shown
 
 
 @pytest.mark.parametrize("sign", [*module.FORMULA_SIGNS, "\x00", "\x1b[31m"])
@@ -314,8 +457,12 @@ def test_files_of_answers_are_exported_like_results(answers, tmp_path, name, kin
     assert all(has_answer) == (name != "need")
     added = QUANTITIES if name == "uncertainty" else ()  # tables of other answers have them
     assert len(found.columns) == len(table.column_names) + len(added)
+    export(file, tmp_path / "names.parquet", units="us")
+    names = pq.read_schema(tmp_path / "names.parquet").names
+    assert set(found.columns) == {*names}
+    assert (list(found.columns) == names) == (kind != "xlsx" or name == "simulate"), "a sheet has an order of its own"
     for place, field in enumerate(table.schema):
-        shown, own = found.columns[place], table.column(place).to_pylist()
+        shown, own = names[place], table.column(place).to_pylist()
         unit = field.metadata[b"unit"].decode() if field.metadata else ""
         size = shown_unit(unit, "us").size if unit and not field.name.endswith("passes_within") else 1.0
         there = [None if pd.isna(value) or value == "" else value for value in found[shown]]

@@ -1,11 +1,15 @@
 """Boulders that were weighed, and rounded feet, in the page: verdicts and settings file equal the command's."""
 
+import math
 from pathlib import Path
 
 import pytest
 
 import boulder_sweep
-from boulder_sweep.report import write_explorer
+from boulder_sweep.report import write_explorer, write_report
+from boulder_sweep.report.answers import answer_of
+from boulder_sweep.report.rows import read_rows
+from boulder_sweep.report.sheet import sheet_of
 from boulder_sweep.settings import load_text
 
 FILE = """boulder: {{length: 1.65 m, width: 1.68 m, height: 3.44 m, {boulder}}}
@@ -50,3 +54,18 @@ def test_the_simulator_refuses_a_boulder_as_taped_in_words(tmp_path, opened):
     assert "this page does not know the shapes" in page.inner_text("body")
     (box,) = page.evaluate("page.simulator.rows([{ ...page.design, boulder_mass_kg: 24500 }])")
     assert box["verdict"] == "pass"
+
+
+def test_the_report_of_a_taped_boulder_shows_the_shape_that_decides(tmp_path, opened):
+    """Its drawing has that shape, and nothing stands where the page cannot simulate it."""
+    found = boulder_sweep.need(load_text(FILE.format(boulder="density: 2600 kg/m^3, mass: 20 t"), Path("stone.yaml")))
+    found.write(tmp_path / "depth.parquet")
+    rows = read_rows(tmp_path / "depth.parquet")
+    sheet = sheet_of(rows, answer_of(rows), "si")
+    solidity = 20e3 / (2600 * math.prod(rows.row(0)[f"boulder_{side}_m"] for side in ("length", "width", "height")))
+    assert ("fills of its box", f"{solidity:.0%}") in sheet.build
+    assert ("drawn: worst of its shapes", rows.row(0)["shape"].replace("_", " ")) in sheet.build
+    assert len({x for x, _ in sheet.sketch.corners}) > 2, "a box has two upright sides"
+    page = opened(write_report(tmp_path / "depth.parquet", tmp_path / "page.html"))
+    page.emulate_media(media="print")
+    assert "this page does not know the shapes" not in page.inner_text("body")

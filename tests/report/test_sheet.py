@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import random
 import re
 from datetime import date
@@ -111,7 +112,7 @@ def test_the_limits_are_those_of_the_case_with_the_least_margin(needs: dict[str,
     assert f"friction angle φ′ {worst['friction_angle_deg']:g}°" in found.words["si"].governs
     assert found.cases is not None
     assert len(found.cases.rows) == len(best.design.rows) == 2
-    assert ("friction angle φ′, least", Measure(36.0, "deg"), "given") in found.soil
+    assert ("friction angle φ′, least", Measure(36.0, "deg"), "settings") in found.soil
     assert ("bumper above ground", Measure(0.5, "m"), "default") in found.vehicle
     assert found.grade[0] == "robust"
     assert found.qualifies
@@ -137,12 +138,12 @@ def test_a_map_is_printed_only_where_no_table_says_the_same(
 
 def test_a_spreadsheet_says_what_is_recommended(needs: dict[str, Need], files: dict[str, Path], tmp_path: Path) -> None:
     boulder_sweep.export(files["depth"], tmp_path / "depth.xlsx", units="us")
-    sheets = openpyxl.load_workbook(tmp_path / "depth.xlsx").worksheets
+    book = openpyxl.load_workbook(tmp_path / "depth.xlsx")
     said = advice(needs["depth"], "us")
-    assert [row[0] for row in sheets[1].iter_rows(max_row=len(said), values_only=True)] == said
+    assert [row[0] for row in book["about"].iter_rows(max_row=len(said), values_only=True)] == said
 
 
-OTHERS = (None, True, -1, 0, 1.5, 1e300, "", "x", [], ["x"], {}, {"a": 1}, "gone")
+OTHERS = (None, True, -1, 0, 1.5, 1e300, math.nan, "", "x", [], ["x"], {}, {"a": 1}, "gone")
 
 
 def places(tree: Any, above: tuple[str | int, ...] = ()) -> list[tuple[str | int, ...]]:
@@ -177,6 +178,36 @@ def test_a_damaged_recommendation_ends_in_words(files: dict[str, Path], name: st
     assert all("changed.parquet is damaged; write it again with `sweep need`" in words for words in said)
 
 
+@pytest.mark.parametrize("name", ["depth", "chance", "nearest"])
+def test_no_null_in_a_recommendation_is_said(files: dict[str, Path], name: str, tmp_path: Path) -> None:
+    table, changed, refused = pq.read_table(files[name]), tmp_path / "changed.parquet", list[tuple[str | int, ...]]()
+    key = b"boulder_sweep.recommendation"
+    tree = json.loads(table.schema.metadata[key])
+    for *above, last in places(tree):
+        if 1 in above:
+            continue  # a second soil is read as the first
+        inner: Any = tree
+        for step in above:
+            inner = inner[step]
+        kept, inner[last] = inner[last], None
+        metadata = table.schema.metadata | {key: json.dumps(tree).encode()}
+        pq.write_table(table.replace_schema_metadata(metadata), changed)
+        try:
+            found = AnswerFile(changed, ReportError).answers()
+            assert isinstance(found, Need)
+            assert "None" not in " ".join(advice(found, "us")), (above, last)
+        except ReportError:
+            refused.append((*above, last))
+        inner[last] = kept
+    assert {last for *_, last in refused} >= {
+        "boulder_density_kg_m3",
+        "boulder_mass_kg",
+        "verdict",
+        "conditions",
+        "rows",
+    }
+
+
 def test_a_pdf_has_todays_date_and_a_page_only_a_given_one(
     files: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -194,7 +225,7 @@ def test_a_pdf_has_todays_date_and_a_page_only_a_given_one(
     assert "<dt>date</dt><dd>2031-02-03</dd>" in pages[0]
     assert "2031-02-03" not in pages[1]
     assert "2031-02-03" not in write_report(files["depth"], tmp_path / "page.html").read_text()
-    for words in ("<dt>checked by</dt><dd>E. Fox</dd>", "<dt>revision</dt><dd>A</dd>", "Prepared by C. Day"):
+    for words in ("<dt>to be checked by</dt><dd>E. Fox</dd>", "<dt>revision</dt><dd>A</dd>", "Prepared by C. Day"):
         assert words in pages[1]
 
 
@@ -203,7 +234,7 @@ def test_the_name_of_a_project_stays_text_in_the_footer(files: dict[str, Path], 
     page = write_report(files["depth"], tmp_path / "page.html", heading=HEADING._replace(project=name)).read_text()
     (footer,) = re.findall(r'@bottom-left \{ content: "(.*?)"; \}', page)
     plain = re.sub(r"\\([0-9a-f]+) ", lambda code: chr(int(code[1], 16)), footer)
-    assert plain.startswith(f"{name} · site · boulder-sweep ")
+    assert plain.startswith(f"{name} · site · revision A · 2026-11-28 · boulder-sweep ")
     assert "<" not in footer
 
 

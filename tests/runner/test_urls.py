@@ -46,7 +46,7 @@ def test_a_run_into_a_store_is_interrupted_and_resumed(local):
         told.append(progress)
         raise Interrupted(2)
 
-    with pytest.raises(Interrupted, match=f"rows are safe. Resume with: .*{OUT}"):
+    with pytest.raises(Interrupted, match=f"rows are safe. Resume with:\n  .*{OUT}"):
         run(grid(), OUT, progress=interrupt, **HOW)
     assert told
     assert run(grid(), OUT, resume=True, **HOW).rows == 441
@@ -61,7 +61,7 @@ def test_a_store_that_does_not_answer_ends_the_run_in_words(monkeypatch):
         raise ConnectionResetError("not now")
 
     monkeypatch.setattr(MemoryFileSystem, "pipe_file", refuse)
-    with pytest.raises(WriteError, match=f"cannot write into {OUT}: .*not now. .* rows are safe. Resume with: "):
+    with pytest.raises(WriteError, match=f"cannot write into {OUT}: .*not now. .* rows are safe. Resume with:\n  "):
         run(grid(), OUT, **HOW)
 
 
@@ -76,7 +76,7 @@ def test_a_store_that_lists_nothing_any_more_ends_the_run_in_words(monkeypatch, 
         return ls(self, path, **more)
 
     monkeypatch.setattr(MemoryFileSystem, "ls", refuse)
-    with pytest.raises(WriteError, match=f"cannot write into {OUT}: .*not now. .* rows are safe. Resume with: "):
+    with pytest.raises(WriteError, match=f"cannot write into {OUT}: .*not now. .* rows are safe. Resume with:\n  "):
         run(grid(), OUT, overwrite=True, **HOW)
 
 
@@ -87,7 +87,7 @@ def test_rows_of_an_earlier_run_are_not_said_to_be_none_before_they_are_counted(
         raise ConnectionResetError("not now")
 
     monkeypatch.setattr(MemoryFileSystem, "ls", refuse)
-    with pytest.raises(WriteError, match=r"not now\. the rows that were there are safe\. Resume with: "):
+    with pytest.raises(WriteError, match=r"not now\. the rows that were there are safe\. Resume with:\n  "):
         run(grid(), OUT, resume=True, **HOW)
 
 

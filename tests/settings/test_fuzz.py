@@ -85,7 +85,7 @@ def mutated(draw: st.DrawFn) -> str:
 
 
 QUICK = settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
-LONG = settings(QUICK, max_examples=40_000)
+LONG = settings(QUICK, max_examples=80_000)
 
 
 def _any_bytes(data: bytes) -> None:
@@ -184,22 +184,15 @@ def test_any_table(tmp_path_factory: pytest.TempPathFactory, columns, count, cha
 
 @pytest.mark.nightly
 @settings(LONG)
-@given(text=mutated())
-def test_mutated_files_at_length(text: str) -> None:
-    loads_or_says_why(text)
-
-
-@pytest.mark.nightly
-@settings(LONG)
 @given(
-    data=st.one_of(st.binary(max_size=400), st.text(max_size=200).map(lambda text: text.encode(errors="surrogatepass")))
+    text=st.one_of(
+        mutated(),
+        st.lists(st.sampled_from([*SCRAPS, "boulder", "height", "site", "soil", "a"]), max_size=40).map("".join),
+    ),
+    data=st.one_of(
+        st.binary(max_size=400), st.text(max_size=200).map(lambda text: text.encode(errors="surrogatepass"))
+    ),
 )
-def test_any_bytes_at_length(data: bytes) -> None:
+def test_files_and_bytes_at_length(text: str, data: bytes) -> None:
+    loads_or_says_why(text)
     _any_bytes(data)
-
-
-@pytest.mark.nightly
-@settings(LONG)
-@given(parts=st.lists(st.sampled_from([*SCRAPS, "boulder", "height", "site", "soil", "a"]), max_size=40))
-def test_scraps_in_any_order_at_length(parts: list[str]) -> None:
-    loads_or_says_why("".join(parts))

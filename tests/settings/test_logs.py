@@ -13,9 +13,8 @@ from boulder_sweep import investigation as sand
 from boulder_sweep import need
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings import SettingsError, load_text
-from boulder_sweep.settings.log_layers import FEWEST, WINDOW_M, layers_of
 from boulder_sweep.settings.logs import count_of
-from boulder_sweep.settings.soil_readings import BELOW_FOOT, IN_TOPSOIL, covered_depth
+from boulder_sweep.settings.soil_readings import BELOW_FOOT, FEWEST, IN_TOPSOIL, WINDOW_M, covered_depth, layers_of
 from boulder_sweep.settings.sweep import derived_words
 from boulder_sweep.views.log_text import log_lines
 from tests.settings.log_files import ags_cone, ags_counts, bro, gef, table, written

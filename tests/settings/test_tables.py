@@ -257,20 +257,16 @@ def test_a_column_may_be_in_any_unit_that_fits(load_table, name, value, column, 
         ("boulder_length_kg", "did you mean boulder_length, with its unit at the end?"),
         ("beta", "did you mean subgrade_reaction, with its unit at the end?"),
         ("bumper_hieght_ft", "did you mean bumper_height_ft?"),
+        ("boulder_length_ft", "gives the same as column boulder_length_m"),
         ("price", "is not an input (inputs: boulder_length, boulder_width"),
         ("<script>", "may hold letters, digits"),
         ("\x1b[31m", "may hold letters, digits"),
     ],
 )
-def test_unknown_columns_of_numbers(messages_of, name, words):
+def test_columns_of_numbers_that_are_not_used(messages_of, name, words):
     messages = messages_of(HEADER.replace("\n", f",{name}\n") + "1,1,2,1,7\n")
     assert words in messages[0]
     assert not any(" _m?" in message for message in messages)
-
-
-def test_the_same_input_in_two_units(messages_of):
-    (message,) = messages_of(HEADER.replace("\n", ",boulder_length_ft\n") + "1,1,2,1,3\n")
-    assert "gives the same as column boulder_length_m" in message
 
 
 def test_text_is_carried_along(load_table):
@@ -282,17 +278,13 @@ def test_text_is_carried_along(load_table):
     assert sweep.resolved()["labels"]["boulder_id"] == ["7", "8", "9"]
 
 
-def test_a_table_of_text_alone_is_no_table(messages_of):
-    (message,) = messages_of("boulder_id,remark\na,b\n", grid=GRID)[:1]
-    assert "has no column that is an input" in message
-
-
 @pytest.mark.parametrize(
     ("content", "words"),
     [
         ("", "is empty"),
         ("# only\n", "is empty"),
         (HEADER, "no rows below the column names"),
+        ("boulder_id,remark\na,b\n", "has no column that is an input"),
         (HEADER.encode("utf-16"), "not UTF-8"),
         (HEADER + "1,\x00,1,1\n", "designs.csv:2"),
         (b"\xff\xd8\xff\xe0", "not UTF-8"),
@@ -303,43 +295,50 @@ def test_files_that_are_no_tables(messages_of, content, words):
     assert any(words in message for message in messages_of(content))
 
 
-@pytest.mark.parametrize("name", ["designs.xls", "designs", ".csv.txt"])
-def test_other_formats(messages_of, name):
-    (message,) = messages_of(HEADER + ROWS, name)
-    assert message.startswith("grid.yaml:1:8: table: ")
-    assert "has an unsupported type; use one of .csv, .xlsx, .parquet" in message
-
-
-def test_missing_table(messages_of):
-    (message,) = messages_of(None, "no.csv")
-    assert message == "grid.yaml:1:8: table: no.csv: there is no such file"
-
-
-def test_a_large_table_is_refused_before_it_is_read(messages_of, tmp_path):
+@pytest.mark.parametrize(
+    ("content", "name", "message"),
+    [
+        *(
+            (HEADER + ROWS, name, "has an unsupported type; use one of .csv")
+            for name in ("designs.xls", "a", ".csv.txt")
+        ),
+        (None, "no.csv", "no.csv: there is no such file"),
+        (None, "large.csv", "large.csv: has 3000.0 MB; at most 500 MB is read"),  # before it is read
+    ],
+)
+def test_files_that_are_not_opened(messages_of, tmp_path, content, name, message):
     with (tmp_path / "large.csv").open("wb") as stream:
         stream.truncate(3_000_000_000)
-    (message,) = messages_of(None, "large.csv")
-    assert "has 3000.0 MB" in message
+    (found,) = messages_of(content, name)
+    assert found.startswith("grid.yaml:1:8: table: ")
+    assert message in found
 
 
-def test_table_and_file_must_not_give_the_same(messages_of):
-    grid = GRID.replace("{{density: 2600}}", "{{density: 2600, height: 3}}") + "site: {{embedment_ratio: 0.5}}\n"
-    messages = messages_of(HEADER + ROWS, grid=grid)
-    assert len(messages) == 2
-    assert messages[0].startswith(
-        "grid.yaml:2:26: boulder.height: is given here and as column boulder_height_m of the table"
-    )
-    assert "not both" in messages[1]
+BOTH = "give embedment_ratio or embedment_depth, not both"
+GIVEN = "boulder.height: is given here and as column boulder_height_m of the table"
 
 
-def test_axes_beside_a_table_are_refused(messages_of):
-    (message,) = messages_of(HEADER + ROWS, grid=GRID.replace("speed: 13.4", "speed: [13.4, 20]"))
-    assert message.startswith("grid.yaml:4:30: vehicle.speed: must be one value beside a table")
-
-
-def test_what_neither_table_nor_file_gives_is_missing(messages_of):
-    (message,) = messages_of("boulder_length_m,boulder_width_m,embedment_depth_m\n1,1,1\n")
-    assert message == "grid.yaml:2:1: boulder.height: is required and missing"
+@pytest.mark.parametrize(
+    ("content", "old", "new", "messages"),
+    [
+        (
+            HEADER + ROWS,
+            "2600}}\n",
+            "2600, height: 3}}\nsite: {{embedment_ratio: 0.5}}\n",
+            [f"2:26: {GIVEN}", f"3:1: site.embedment_depth: {BOTH}"],
+        ),
+        (HEADER + ROWS, "13.4", "[13.4, 20]", ["4:30: vehicle.speed: must be one value beside a table"]),
+        (
+            "boulder_length_m,boulder_width_m,embedment_depth_m\n1,1,1\n",
+            *("", "", ["2:1: boulder.height: is required and missing"]),
+        ),
+    ],
+)
+def test_table_and_file_give_every_input_once(messages_of, content, old, new, messages):
+    found = messages_of(content, grid=GRID.replace(old, new, 1))
+    assert len(found) == len(messages)
+    for one, message in zip(found, messages, strict=True):
+        assert one.startswith(f"grid.yaml:{message}")
 
 
 def test_a_relative_name_begins_at_the_file_and_behind_set_at_the_working_directory(tmp_path, monkeypatch, load_table):

@@ -50,23 +50,36 @@ def ply(
     more: bool = False,
     line: str = "\n",
 ) -> bytes:
-    """A PLY file, binary in an order of bytes or a text for none; with `more`, with properties that are passed over."""
+    """A PLY file, binary in an order of bytes or a text for none; with `more`, with properties that are passed over.
+
+    Polygons of several sizes are cut into triangles, but in a plain text.
+    """
+    if (order or more) and len({len(one) for one in polygons}) > 1:
+        polygons = triangles(polygons).tolist()
     name = {"<": "binary_little_endian", ">": "binary_big_endian", "": "ascii"}[order]
     extra = {"property uchar red": ("u1", 7)} if more else {}
-    after = {f"property list uchar {TYPES[real]} texcoord": (real, [0.5] * 6)} if more else {}
+    after = [f"property list uchar {TYPES[real]} texcoord"] if more else []
     head = ["ply", f"format {name} 1.0", "comment xend_header element face 99", f"element vertex {len(points)}"]
     head += [*extra, *(f"property {TYPES[real]} {axis}" for axis in "xyz")]
-    head += [f"element face {len(polygons)}", *extra]
-    head += [f"property list {TYPES[count]} {TYPES[number]} {'vertex_index' if more else 'vertex_indices'}", *after]
-    head += ["element edge 1", "property int vertex1", "end_header"] if more else ["end_header"]
+    head += [f"element face {len(polygons)}"]
+    head += [f"property list {TYPES[count]} {TYPES[number]} {'vertex_index' if more else 'vertex_indices'}"]
+    head += [*extra, *after]
+    head += (
+        ["element camera 1", "property int vertex1", "property int vertex2", "end_header"] if more else ["end_header"]
+    )
     rows: list[list[tuple[str, Sequence[float]]]] = []
     first: list[tuple[str, Sequence[float]]] = [(kind, [value]) for kind, value in extra.values()]
     rows += [[*first, (real, list(point))] for point in points]
     rows += [
-        [*first, (count, [len(one)]), (number, list(one)), *([("u1", [6]), (real, [0.5] * 6)] if more else [])]
+        [
+            (count, [len(one)]),
+            (number, list(one)),
+            *first,
+            *([("u1", [2 * len(one)]), (real, [0.5] * 2 * len(one))] if more else []),
+        ]
         for one in polygons
     ]
-    rows += [[("i4", [3])]] if more else []
+    rows += [[("i4", [3, 4])]] if more else []
     if order:
         body = b"".join(np.array(values, order + kind).tobytes() for row in rows for kind, values in row)
     else:

@@ -195,19 +195,6 @@ def test_nothing_to_draw_is_reported(tmp_path: Path, name: str) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    ("file", "message"),
-    [
-        ("picture.jpeg", r"must end in \.png, \.svg, \.pdf"),
-        ("picture", "must end in"),
-        ("missing/picture.png", "does not exist"),
-    ],
-)
-def test_wrong_names_are_refused(held: Trajectory, tmp_path: Path, file: str, message: str) -> None:
-    with pytest.raises(PictureError, match=message):
-        held.plot(tmp_path / file)
-
-
 def test_a_folder_in_the_way_is_reported(held: Trajectory, tmp_path: Path) -> None:
     (tmp_path / "picture.png").mkdir()
     with pytest.raises(PictureError, match="cannot be written"):
