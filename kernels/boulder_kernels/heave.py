@@ -28,7 +28,6 @@ import numpy as np
 
 from ._jit import inlined, kernel, overload
 from .design import (
-    Body,
     Constants,
     Design,
     G,
@@ -110,9 +109,7 @@ class HeaveConstants(NamedTuple):
     M_second: float
     """Sum of m_n d_n^2 [kg m^2]."""
     L: float
-    """Length of the foot [m]."""
-    l_near: float
-    """Near face right of the common centre of mass [m]."""
+    """Length of the boulder [m]."""
     out: float
     """Rise at which no soil holds the boulder any more [m]."""
     pieces: int
@@ -198,24 +195,20 @@ def heave_constants(design: Design, c: Constants, form: HeaveOptions, base: Base
     fineness
         1 for 16 pieces, up to `FINEST`; their number grows by its square.
     """
-    m_b = boulder_mass(design)
-    J_box = m_b / 12.0 * (design.H * design.H + design.L * design.L)
-    body = Body(m_b, J_box, 0.5 * design.L, 0.5 * design.H, design.L, 0.5 * design.L, 0.0)
     density = design.rho_s - (WATER if base.water <= 0.0 else 0.0)
     friction = friction_of(design.phi, form)
     side = 2.0 * friction * (1.0 - math.sin(design.phi)) * density * G * design.L * design.d
     bed = Bed(soil_mass(design, 0), design.rho_s, design.phi, density * G * design.d, side, 3.0)
-    return constants_on(bed, design, body, c, form, base, fineness)
+    return constants_on(bed, design, c, form, base, fineness)
 
 
 @kernel
-def constants_on(
-    bed: Bed, design: Design, body: Body, c: Any, form: HeaveOptions, base: Base, fineness: int
-) -> HeaveConstants:
+def constants_on(bed: Bed, design: Design, c: Any, form: HeaveOptions, base: Base, fineness: int) -> HeaveConstants:
     """Constants of the motion with heave and friction (Eqs 131-134) on a bed; see `heave_constants`."""
-    m_b = body.m_b
+    m_b = boulder_mass(design)
     soil = bed.mass
-    a_b, b_b = body.x - c.c_x, body.y - c.c_y
+    a_b, b_b = 0.5 * design.L - c.c_x, 0.5 * design.H - c.c_y
+    J_box = m_b / 12.0 * (design.H * design.H + design.L * design.L)
     foot = design.W * design.L
     s_0 = m_b * G / (base.stiffness * foot)
     return HeaveConstants(
@@ -224,12 +217,11 @@ def constants_on(
         m_b,
         a_b,
         b_b,
-        body.J + m_b * (a_b * a_b + b_b * b_b),
+        J_box + m_b * (a_b * a_b + b_b * b_b),
         soil.mass,
         c.c_y * soil.mass - soil.first,
         c.c_y * c.c_y * soil.mass - 2.0 * c.c_y * soil.first + soil.second,
         design.L,
-        c.l_n - design.L,
         design.L + bed.deep * c.d + s_0,
         GROUP * fineness * fineness,
         base.stiffness * foot,
@@ -306,7 +298,7 @@ def edge_of(n: int, count: int, parts: np.ndarray) -> float:
 
 @kernel
 def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces, f: HeaveConstants) -> None:
-    """Write the parts of a soil in pieces into a workspace that `prepare` has filled (Eqs 148, 149).
+    """Write the parts of a soil beside a box into a workspace that `prepare` has filled (Eq 149).
 
     Strength and stiffness of a part at alpha follow a rise or fall of the face to the depth z as
     1 + f (z - alpha)/alpha, where f is the largest number from 0 to 1 by which they nowhere down to the foot exceed the
@@ -331,17 +323,15 @@ def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces,
     for n in range(f.pieces):
         low, to = edge_of(n, f.pieces, parts), edge_of(n + 1, f.pieces, parts)
         r, inverse = 0.5 * (low + to), 1.0 / (to - low)
-        spring = ultimate = drag = stiffness = strength = 0.0
+        spring = ultimate = drag = 0.0
         for m in range(len(parts)):
-            K, P_0, P_1, R, w_0, w_1 = parts[m, 2], parts[m, 4], parts[m, 5], parts[m, 6], parts[m, 7], parts[m, 8]
             start, end = max(parts[m, 0], low), min(parts[m, 1], to)
             if start < end:
                 i = combined(powers_of(end), -1.0, powers_of(start))
-                spring += K * (w_0 * i.two + w_1 * i.three)
-                ultimate += P_0 * (w_0 * i.one + w_1 * i.two) + P_1 * (w_0 * i.two + w_1 * i.three)
-                drag += R * (w_0 * i.one + w_1 * i.two)
-                stiffness += K * i.two * inverse
-                strength += (P_0 * i.one + P_1 * i.two) * inverse
+                spring += parts[m, 2] * i.two
+                ultimate += parts[m, 4] * i.one + parts[m, 5] * i.two
+                drag += parts[m, 6] * i.one
+        stiffness, strength = spring * inverse, ultimate * inverse
         # The steepest line through stiffness and strength at rest that neither exceeds deeper down to the foot.
         slope = 1.0 / r
         for m in range(len(parts)):
@@ -565,14 +555,14 @@ def soil_element(
     ratio = part.ratio
     u, v = k.A - k.slope_x * ratio, k.B - k.slope_v * ratio
     alpha = c.d * ratio
-    d_n = alpha - c.z_0
+    d_n, l_near = alpha - c.z_0, c.l_n - f.L
     drag = -part.drag * v * abs(v)
     z = alpha - f.heave * (y_b + d_n * versin)
     far = pressed(u, drag, z + f.heave * c.l_n * sin, alpha, part, f)
-    near = pressed(-u, drag, z + f.heave * f.l_near * sin, alpha, part, f)
+    near = pressed(-u, drag, z + f.heave * l_near * sin, alpha, part, f)
     F_far, F_near = far.drag - far.spring, near.drag + near.spring
     lift = far.lift + near.lift
-    turning = lift * d_n * sin - (far.lift * c.l_n + near.lift * f.l_near) * (1.0 - versin)
+    turning = lift * d_n * sin - (far.lift * c.l_n + near.lift * l_near) * (1.0 - versin)
     turning -= (F_far + F_near) * (k.lever_d * ratio + k.q) + (far.widening + near.widening) * part.slope_w
     return Element(near.spring - far.spring, F_far, F_near, turning, lift, far.energy + near.energy, part.roughness)
 
@@ -673,10 +663,10 @@ def forces(
     # The faces slip along themselves, each with one speed all over.
     along = v_b * sin + w_b * cos
     F_far = -f.friction * far * slipping(along - omega_b * c.l_n, f)
-    F_near = -f.friction * near * slipping(along - omega_b * f.l_near, f)
+    F_near = -f.friction * near * slipping(along + omega_b * (f.L - c.l_n), f)
     Q_x = summed(work, ALONG_X, f.pieces) + (F_far + F_near) * sin
     Q_y = summed(work, LIFTING, f.pieces) + (F_far + F_near) * cos
-    Q_theta = summed(work, TURNING, f.pieces) + -F_near * f.l_near - F_far * c.l_n
+    Q_theta = summed(work, TURNING, f.pieces) + F_near * (f.L - c.l_n) - F_far * c.l_n
     weight = f.m_b * G
     if f.heave > 0.0:
         Q_theta += weight * (f.a_b * cos + f.b_b * sin)

@@ -13,13 +13,12 @@ never reaches the limit.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import inlined, is_none, kernel, overload, plain
-from .design import Constants, Design, DesignTable, G, body_with, constants_of, corrected, design_in, is_computable
+from ._jit import inlined, kernel
+from .design import Constants, Design, DesignTable, G, body_of_box, constants_of, corrected, design_in, is_computable
 from .dormand_prince import displacement_at, slope_at, turning_point
 from .dynamics import empty_soil
 from .heave import (
@@ -382,23 +381,21 @@ def simulate_heave(
 
 
 @kernel
-def prepare_in_pieces(
+def prepare_in_layers(
     design: Design,
-    row: int,
     layers: np.ndarray,
-    outlines: np.ndarray,
     soil: ManyPieces,
     form: HeaveOptions,
     base: Base,
     fineness: int,
     work: np.ndarray,
 ) -> HeaveConstants:
-    """Fill the workspace for a design whose soil is in pieces, and return its constants."""
-    lumped, body = fill_pieces(design, layers[row], outlines[row], soil), body_with(design, outlines[row])
-    c = constants_in_soil(design, READINGS, body, lumped, None)
-    f = constants_on(bed_of(design, lumped.mass, layers[row], form, base), design, body, c, form, base, fineness)
+    """Fill the workspace for a box in layers, shape (M, 6), and return its constants; the pieces are filled anew."""
+    lumped = fill_pieces(design, layers, np.empty((0, 4)), soil)
+    c = constants_in_soil(design, READINGS, body_of_box(design), lumped, None)
+    f = constants_on(bed_of(design, lumped.mass, layers, form, base), design, c, form, base, fineness)
     prepare(work, f)
-    lay_soil(work, layers[row], base, soil, f)
+    lay_soil(work, layers, base, soil, f)
     return f
 
 
@@ -412,41 +409,10 @@ def prepare_in_uniform_soil(
     return f
 
 
-def prepare_design(
-    design: Design,
-    row: int,
-    layers: np.ndarray | None,
-    outlines: np.ndarray | None,
-    soil: ManyPieces | None,
-    form: HeaveOptions,
-    base: Base,
-    fineness: int,
-    work: np.ndarray,
-) -> HeaveConstants:
-    """Fill the workspace for a design of a table, and return its constants; arguments: see `run_second_opinions`."""
-    if layers is None:
-        return prepare_in_uniform_soil(design, form, base, fineness, work)
-    return plain(prepare_in_pieces)(design, row, layers, outlines, soil, form, base, fineness, work)
-
-
-@overload(prepare_design)
-def _prepare_design(
-    design: Any, row: Any, layers: Any, outlines: Any, soil: Any, form: Any, base: Any, fineness: Any, work: Any
-) -> Callable[..., HeaveConstants]:
-    if is_none(layers):
-        return lambda design, row, layers, outlines, soil, form, base, fineness, work: prepare_in_uniform_soil(
-            design, form, base, fineness, work
-        )
-    return lambda design, row, layers, outlines, soil, form, base, fineness, work: prepare_in_pieces(
-        design, row, layers, outlines, soil, form, base, fineness, work
-    )
-
-
 @kernel
 def run_second_opinions(
     designs: np.ndarray,
     layers: np.ndarray | None,
-    outlines: np.ndarray | None,
     soil: ManyPieces | None,
     form: HeaveOptions,
     base: Base,
@@ -457,12 +423,15 @@ def run_second_opinions(
 ) -> None:
     """Simulate designs one by one; see `second_opinions`.
 
-    Layers, outlines and the pieces that every design fills anew are None for boxes in uniform soils.
+    Layers, shape (n, M, 6), and the pieces that every design fills anew are None in uniform soils.
     """
     for row in range(designs.shape[1]):
         design = design_in(designs, row)
         outcome = HeaveOutcome(Status.INVALID.value, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, 0.0)
-        f = prepare_design(design, row, layers, outlines, soil, form, base, control.fineness, work)
+        if layers is None:  # decides which lines are compiled: constants have different types
+            f = prepare_in_uniform_soil(design, form, base, control.fineness, work)
+        else:
+            f = prepare_in_layers(design, layers[row], soil, form, base, control.fineness, work)
         # A boulder that the base cannot carry is not at rest at first, and no depth of it is the least energy.
         if is_computable(f.c) and (not form.heave or f.k_foot * f.s_0 < f.q_foot):
             outcome = simulate_heave(f, design.m_v, control, work, record)
@@ -501,10 +470,9 @@ def second_opinions(
     if not 1 <= control.fineness <= FINEST:
         raise ValueError(f"the fineness is 1 to {FINEST}, not {control.fineness}")
     layers: np.ndarray | None = getattr(table, "layers", None)
-    outlines: np.ndarray | None = getattr(table, "outlines", None)
-    soil = None if layers is None or outlines is None else empty_soil(layers.shape[1], outlines.shape[1], 0)
+    soil = None if layers is None else empty_soil(layers.shape[1], 0, 0)
     designs = np.stack(table[: len(DesignTable._fields)])
     out = np.full((len(HeaveOutcome._fields), designs.shape[1]), np.nan)
     work, kept = np.empty(WORKSPACE), record or no_heave_record()
-    run_second_opinions(designs, layers, outlines, soil, form, base, control, work, kept, out)
+    run_second_opinions(designs, layers, soil, form, base, control, work, kept, out)
     return HeaveOutcome(out[0].astype(np.int8), *out[1:])

@@ -34,7 +34,7 @@ from boulder_kernels.second_opinion import (
     kinetic_energy,
     least_energy,
     potential_energy,
-    prepare_in_pieces,
+    prepare_in_layers,
     second_opinions,
     simulate_heave,
 )
@@ -89,7 +89,7 @@ def prepared(
     """Constants and workspace of the only design of a table."""
     design, work = bk.Design(*(column[0] for column in table[:15])), np.full(WORKSPACE, np.nan)
     soil = empty_soil(table.layers.shape[1], 0, 0)
-    return prepare_in_pieces(design, 0, table.layers, NO_OUTLINE, soil, form, base, fineness, work), work, design
+    return prepare_in_layers(design, table.layers[0], soil, form, base, fineness, work), work, design
 
 
 def some_grounds(count: int, seed: int) -> list[tuple[bk.Design, Ground]]:
