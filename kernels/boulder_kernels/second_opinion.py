@@ -13,11 +13,12 @@ never reaches the limit.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import inlined, kernel
+from ._jit import inlined, is_none, kernel, overload
 from .design import Constants, Design, DesignTable, G, body_of_box, constants_of, corrected, design_in, is_computable
 from .dormand_prince import displacement_at, slope_at, turning_point
 from .dynamics import empty_soil
@@ -409,6 +410,35 @@ def prepare_in_uniform_soil(
     return f
 
 
+def prepare_design(
+    design: Design,
+    row: int,
+    layers: np.ndarray | None,
+    soil: Any,
+    form: HeaveOptions,
+    base: Base,
+    fineness: int,
+    work: np.ndarray,
+) -> HeaveConstants:
+    """Fill the workspace for a design of a table, and return its constants; arguments: see `run_second_opinions`."""
+    if layers is None:
+        return prepare_in_uniform_soil(design, form, base, fineness, work)
+    return prepare_in_layers(design, layers[row], soil, form, base, fineness, work)
+
+
+@overload(prepare_design)
+def _prepare_design(
+    design: Any, row: Any, layers: Any, soil: Any, form: Any, base: Any, fineness: Any, work: Any
+) -> Callable[..., HeaveConstants]:
+    if is_none(layers):
+        return lambda design, row, layers, soil, form, base, fineness, work: prepare_in_uniform_soil(
+            design, form, base, fineness, work
+        )
+    return lambda design, row, layers, soil, form, base, fineness, work: prepare_in_layers(
+        design, layers[row], soil, form, base, fineness, work
+    )
+
+
 @kernel
 def run_second_opinions(
     designs: np.ndarray,
@@ -428,10 +458,7 @@ def run_second_opinions(
     for row in range(designs.shape[1]):
         design = design_in(designs, row)
         outcome = HeaveOutcome(Status.INVALID.value, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, 0.0)
-        if layers is None:  # decides which lines are compiled: constants have different types
-            f = prepare_in_uniform_soil(design, form, base, control.fineness, work)
-        else:
-            f = prepare_in_layers(design, layers[row], soil, form, base, control.fineness, work)
+        f = prepare_design(design, row, layers, soil, form, base, control.fineness, work)
         # A boulder that the base cannot carry is not at rest at first, and no depth of it is the least energy.
         if is_computable(f.c) and (not form.heave or f.k_foot * f.s_0 < f.q_foot):
             outcome = simulate_heave(f, design.m_v, control, work, record)
