@@ -56,6 +56,8 @@ ROOM = 19 * ROW
 """Numbers in the workspace."""
 LEAST_FOLLOWING = 0.1
 """What follows a rise or fall by less counts as not following it, so that every boulder leaves the soil somewhere."""
+REACH = 0.342
+"""Rise of the near face at a rotation of 20 degrees, the most that passes, over the length of the boulder: sin 20°."""
 SIDE_POINTS = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262)
 """Gauss's four points of a length 1: the sides are four points by four."""
 SIDE_WEIGHTS = (0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692)
@@ -302,8 +304,8 @@ def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces,
 
     Strength and stiffness of a part at alpha follow a rise or fall of the face to the depth z as
     1 + f (z - alpha)/alpha, where f is the largest number from 0 to 1 by which they nowhere down to the foot exceed the
-    soil there. Uniform soil has f = 1. Cohesion gives no friction. The boulder's buoyancy and the soil below the foot
-    are left out.
+    soil there; and they are no more than the soil above, as far as a face may rise, has for its depth. One line keeps
+    the energy convex. Cohesion gives no friction. The boulder's buoyancy and the soil below the foot are left out.
 
     Parameters
     ----------
@@ -342,11 +344,18 @@ def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces,
                 slope = min(slope, ((P_0 + P_1 * start) / strength - 1.0) / (start - r))
                 slope = min(slope, ((P_0 + P_1 * end) / strength - 1.0) / (end - r))
         follows = slope * r
+        soft, weak, reach = 1.0, 1.0, f.heave * REACH * f.L / d
+        for m in range(len(parts)):
+            P_0 = parts[m, 4]
+            start, end = max(parts[m, 0], r - reach), min(parts[m, 1], r)
+            if start < end:
+                soft = min(soft, parts[m, 2] * r / stiffness)
+                weak = min(weak, (P_0 / (start if P_0 < 0.0 else end) + parts[m, 5]) * r / strength)
         put(work, RATIO, n, r)
         put(work, HEIGHT, n, (to - low) * f.pieces)
         put(work, INVERSE_HEIGHT, n, inverse / f.pieces)
-        put(work, STIFFNESS, n, spring / (r * d))
-        put(work, YIELD, n, ultimate / spring)
+        put(work, STIFFNESS, n, soft * spring / (r * d))
+        put(work, YIELD, n, weak * ultimate / (soft * spring))
         put(work, DRAG, n, drag)
         put(work, STAYS, n, 1.0 - follows if follows >= LEAST_FOLLOWING else 1.0)
         top = rough = 0.0

@@ -132,6 +132,7 @@ MUTATIONS = (
     Mutation((148,), _HEAVE, "(low - top) - WATER * max(", "(low - top) + WATER * max("),
     Mutation((149,), _HEAVE, "((P_0 + P_1 * start) / strength - 1.0)", "((P_0 + P_1 * start) / strength)"),
     Mutation((149,), _HEAVE, "z - times(part.stays, z - alpha)", "z"),
+    Mutation((149,), _HEAVE, "f.heave * REACH * f.L / d", "0.0"),
     Mutation((133,), _STEPS, "and at_end < 0.0 and reach > capacity", "and at_end > 0.0 and reach > capacity"),
     Mutation((134,), _HEAVE, "return v / math.sqrt(v * v + f.v_s * f.v_s)", "return v / (abs(v) + f.v_s)"),
     Mutation((134,), _HEAVE, "along - omega_b * c.l_n", "along + omega_b * c.l_n"),

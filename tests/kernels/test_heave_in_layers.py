@@ -17,6 +17,8 @@ from boulder_kernels.ground import Ground as KernelGround
 from boulder_kernels.heave import (
     FINEST,
     STAYS,
+    STIFFNESS,
+    YIELD,
     Base,
     HeaveConstants,
     HeaveOptions,
@@ -286,6 +288,21 @@ def test_strength_follows_a_fall_no_further_than_the_soil_below_has_it() -> None
     assert weak[0] > 0.5
     assert weak[2:8] == pytest.approx(np.ones(6), abs=1e-12)
     assert weak[8:] == pytest.approx(np.zeros(8), abs=1e-12)
+
+
+def test_strong_soil_counts_where_no_face_rises_out_of_it() -> None:
+    """Within 0.342 of the length below weaker soil it has the strength and stiffness of that soil (Eq 149)."""
+    design = random_designs(1, seed=466)[0]._replace(L=1.0, d=2.0)
+    weak, strong = Layer(0.0, 1900.0, 0.55, 30.0), Layer(1.0, 1900.0, 0.7, 60.0)
+
+    def laid(*layers: Layer) -> np.ndarray:
+        _, work, _ = prepared(in_ground(design, Ground(layers)), BOTH, Base())
+        stiffness = work[STIFFNESS : STIFFNESS + 16]
+        return np.array([stiffness, stiffness * work[YIELD : YIELD + 16]])
+
+    both, above, below = laid(weak, strong), laid(weak), laid(replace(strong, top=0.0))
+    middles = 2.0 * (np.arange(16) + 0.5) / 16
+    assert both == pytest.approx(np.where(middles < 1.342, above, below), rel=1e-9)
 
 
 def test_a_row_is_the_same_alone_and_in_company() -> None:

@@ -102,7 +102,7 @@ class Body:
         ground = ground_of(inputs)
         friction = np.array([tan(layer_at(ground, float(z)).phi * 2 / 3) for z in depth])
         pressure = [(1 - sin(layer_at(ground, float(z)).phi)) * vertical_stress(ground, float(z)) / z for z in depth]
-        parts = parts_of(inputs, levels)
+        parts = parts_of(inputs, levels, 0.342 * inputs.L if self.heave else 0.0)
         for name, value in {
             "constants": c,
             "own": np.array([[inputs.L / 2 - c.c_x, inputs.H / 2 - c.c_y]]),
@@ -207,7 +207,7 @@ def edges_of(inputs: Inputs, pieces: int) -> Array:
     return edges
 
 
-def parts_of(inputs: Inputs, edges: Array) -> Array:
+def parts_of(inputs: Inputs, edges: Array, reach: float) -> Array:
     """Stiffness and ultimate force per metre of depth, drag, what follows a rise, and friction of the parts, (5, n)."""
     height, middles = np.diff(edges), (edges[1:] + edges[:-1]) / 2
     unit = np.ones(len(height))
@@ -215,11 +215,12 @@ def parts_of(inputs: Inputs, edges: Array) -> Array:
         of = [each(inputs, unit, unit * height) for each in (spring_constants, ultimate_forces)]
         return np.stack((*of, unit * inputs.rho_s * inputs.W * height, unit, unit * tan(inputs.phi * 2 / 3)))
     return np.stack(
-        [_part_in(inputs, inputs.ground, alpha, height) for alpha, height in zip(middles, height, strict=True)], axis=1
+        [_part_in(inputs, inputs.ground, alpha, height, reach) for alpha, height in zip(middles, height, strict=True)],
+        axis=1,
     )
 
 
-def _part_in(inputs: Inputs, ground: Ground, alpha: float, height: float) -> Array:
+def _part_in(inputs: Inputs, ground: Ground, alpha: float, height: float, reach: float) -> Array:
     """One part of layers of soil, about the depth `alpha`: see `parts_of`."""
 
     def stiffness(z: float) -> float:
@@ -239,6 +240,10 @@ def _part_in(inputs: Inputs, ground: Ground, alpha: float, height: float) -> Arr
     deeper += [ground.water] if to <= ground.water <= inputs.d else []
     rises = [(of(z) / mean - 1) / (z - alpha) for of, mean in ((stiffness, k), (strength, p)) for z in deeper]
     follows = min(1.0, min(rises) * alpha)
+    top = max(alpha - reach, 1e-9)
+    within = [z for z in (*(layer.top for layer in ground.layers), ground.water) if top < z < alpha]
+    above = (top, alpha - 1e-12, *within, *(z - 1e-12 for z in within))
+    k, p = (min(mean, *(of(z) * alpha / z for z in above)) for of, mean in ((stiffness, k), (strength, p)))
     return np.array(
         [
             k * inputs.W * height / alpha,
