@@ -26,7 +26,7 @@ def grid_lines(sweep: Sweep) -> list[str]:
     soil = sweep.model.ground.words_in(shown_unit("m", sweep.units), shown_unit("kPa", sweep.units))
     ground = [f"  {words}" for words in (soil, sweep.model.shape.words) if words]
     if sweep.depth_sought:
-        ground.insert(0, f"  {'embedment_depth_m':<26}{TO_BE_FOUND:>15}")
+        ground.insert(0, f"  {shown_column('embedment_depth_m', sweep.units).name:<26}{TO_BE_FOUND:>15}")
     if sweep.table is not None:
         carried = f", with {', '.join(sweep.table.labels)}" if sweep.table.labels else ""
         return [f"{sweep.name}: {count} from {sweep.table.file}{carried}", *_uncertain_lines(sweep), *ground]

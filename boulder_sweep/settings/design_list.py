@@ -420,13 +420,8 @@ def _column(name: str) -> TableColumn | str:
         return "designs are numbered in their order; rename or remove this column"
     if name in OUTCOME_COLUMNS:
         return f"is an outcome of a run ({TABLE_COLUMNS[name].meaning}), not an input; remove this column"
-    for stem, field in _STEMS.items():
-        if name == field.name:
-            return TableColumn(name, field)
-        if name.startswith(f"{stem}_"):
-            unit = suffix_unit(name.removeprefix(f"{stem}_"), field.unit)
-            if unit:
-                return TableColumn(name, field, factor(unit, field.unit))
+    if column := _input_column(name):
+        return column
     if name in _STEMS:
         return f"the unit is missing at the end of the name, such as {name}{name_suffix(_STEMS[name].unit)}"
     meant = "" if _ID.fullmatch(name) else _meant(name)
@@ -435,6 +430,18 @@ def _column(name: str) -> TableColumn | str:
     if not _LABEL.fullmatch(name):
         return "the name of a text column may hold letters, digits, spaces and _ . + - / ( ) #"
     return TableColumn(name, None)
+
+
+def _input_column(name: str) -> TableColumn | None:
+    """Return the column of an input, if its name is one with its unit at the end."""
+    for stem, field in _STEMS.items():
+        if name == field.name:
+            return TableColumn(name, field)
+        if name.startswith(f"{stem}_"):
+            unit = suffix_unit(name.removeprefix(f"{stem}_"), field.unit)
+            if unit:
+                return TableColumn(name, field, factor(unit, field.unit))
+    return None
 
 
 def check_numbers(column: TableColumn, position: Position, problems: ProblemList) -> bool:
@@ -450,6 +457,10 @@ def check_numbers(column: TableColumn, position: Position, problems: ProblemList
 def _meant(name: str) -> str:
     """Return the input that a misspelled name stands for, with the unit it was given; empty if there is none near."""
     word = name.lower()
+    plain = "_".join(re.findall(r"[^\W_]+", word))  # a quarry writes "Length (m)"
+    for likely in (plain, f"boulder_{plain}"):
+        if _input_column(likely):
+            return likely
     for cut in [i for i, sign in enumerate(name) if sign == "_"] + [len(name)]:
         stem, suffix = name[:cut], name[cut + 1 :]
         near = nearest(stem, _STEMS, cutoff=0.8)

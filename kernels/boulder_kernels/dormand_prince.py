@@ -118,7 +118,7 @@ class Stages(NamedTuple):
     y: State
     """State of the last one."""
     k: Acceleration
-    """Acceleration there."""
+    """Acceleration at that state."""
     a_b: tuple[float, ...]
     alpha_b: tuple[float, ...]
     a_v: tuple[float, ...]

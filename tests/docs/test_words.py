@@ -131,7 +131,7 @@ def faults(source: str) -> list[tuple[int, str]]:
 @pytest.mark.parametrize("package", ["boulder_sweep", "kernels"])
 def test_words_in_code_are_plain(package: str) -> None:
     files = {file: faults(file.read_text(encoding="utf-8")) for file in sorted((ROOT / package).rglob("*.py"))}
-    assert len(files) > 20
+    assert len(files) > 10
     assert {file.relative_to(ROOT).as_posix(): found for file, found in files.items() if found} == {}
 
 

@@ -250,6 +250,8 @@ def test_a_column_may_be_in_any_unit_that_fits(load_table, name, value, column, 
 @pytest.mark.parametrize(
     ("name", "words"),
     [
+        ("Length (m)", "did you mean boulder_length_m?"),
+        ("mass [t]", "did you mean boulder_mass_t?"),
         ("boulder_lenght_ft", "did you mean boulder_length_ft?"),
         ("boulder_lenght_m", "did you mean boulder_length_m?"),
         ("impact_spede_mph", "did you mean impact_speed_mph?"),
