@@ -242,8 +242,8 @@ def _part_in(inputs: Inputs, ground: Ground, alpha: float, height: float, reach:
     follows = min(1.0, min(rises) * alpha)
     top = max(alpha - reach, 1e-9)
     within = [z for z in (*(layer.top for layer in ground.layers), ground.water) if top < z < alpha]
-    above = (top, alpha - 1e-12, *within, *(z - 1e-12 for z in within))
-    k, p = (min(mean, *(of(z) * alpha / z for z in above)) for of, mean in ((stiffness, k), (strength, p)))
+    above = (top, alpha - 1e-12, *within, *(z - 1e-12 for z in within)) if reach else ()
+    k, p = (min([mean, *(of(z) * alpha / z for z in above)]) for of, mean in ((stiffness, k), (strength, p)))
     return np.array(
         [
             k * inputs.W * height / alpha,
