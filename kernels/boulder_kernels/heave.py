@@ -39,7 +39,7 @@ from .design import (
 from .dynamics import contact_displacement, contact_lever, spring_compression, type_of
 from .ground import WATER
 from .numerics import field, put, sine_versine
-from .pieces import DENSITY, FRICTION, TO, ManyPieces, SoilConstants, combined, powers_of, times
+from .pieces import DENSITY, FRICTION, TO, ManyPieces, SoilConstants, combined, powers_of
 from .soil import TINY, Kinematics, soil_kinematics
 
 GROUP, FINEST = 16, 4
@@ -50,14 +50,13 @@ ROW = MOST + GROUP
 SETS, FOOT, STRIP, SIDE_A, SIDE_DEPTH, SIDE, ALONG_X, TURNING, LIFTING, FAR, NEAR = (ROW * n for n in range(11))
 """Offsets in the workspace: sets of the strips, where they lie along the foot, and their shares of it; points of the
 sides, and their friction per depth; what all pieces have of five sums."""
-RATIO, HEIGHT, INVERSE_HEIGHT, STIFFNESS, YIELD, DRAG, STAYS, ROUGHNESS = (ROW * n for n in range(11, 19))
+RATIO, HEIGHT, INVERSE_HEIGHT, STIFFNESS, YIELD, DRAG, ROUGHNESS = (ROW * n for n in range(11, 18))
 """Offsets of what only the parts of a soil that is not uniform keep there: see `lay_soil`."""
-ROOM = 19 * ROW
+ROOM = 18 * ROW
 """Numbers in the workspace."""
-LEAST_FOLLOWING = 0.1
-"""What follows a rise or fall by less counts as not following it, so that every boulder leaves the soil somewhere."""
-REACH = 0.342
-"""Rise of the near face at a rotation of 20 degrees, the most that passes, over the length of the boulder: sin 20°."""
+RISE, FALL = 0.45, 0.25
+"""How far a face rises and falls at most while it presses on the soil, over the length of the boulder: 0.41 and 0.22 of
+600 boulders that turn by up to 20 degrees."""
 SIDE_POINTS = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262)
 """Gauss's four points of a length 1: the sides are four points by four."""
 SIDE_WEIGHTS = (0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692)
@@ -112,8 +111,6 @@ class HeaveConstants(NamedTuple):
     """Sum of m_n d_n^2 [kg m^2]."""
     L: float
     """Length of the boulder [m]."""
-    out: float
-    """Rise at which no soil holds the boulder any more [m]."""
     pieces: int
     """Parts of the soil, strips of the foot, and points of the sides: 16, 64, 144 or 256."""
     k_foot: float
@@ -170,8 +167,6 @@ class Bed(NamedTuple):
     """Effective vertical stress at the depth of the foot [Pa]."""
     side: float
     """Friction of both sides per mean depth of their points [N/m]; what `lay_soil` multiplies for it in other soil."""
-    deep: float
-    """Depths of embedment by which a boulder must rise beyond itself until no soil holds it."""
 
 
 @inlined
@@ -200,7 +195,7 @@ def heave_constants(design: Design, c: Constants, form: HeaveOptions, base: Base
     density = design.rho_s - (WATER if base.water <= 0.0 else 0.0)
     friction = friction_of(design.phi, form)
     side = 2.0 * friction * (1.0 - math.sin(design.phi)) * density * G * design.L * design.d
-    bed = Bed(soil_mass(design, 0), design.rho_s, design.phi, density * G * design.d, side, 3.0)
+    bed = Bed(soil_mass(design, 0), design.rho_s, design.phi, density * G * design.d, side)
     return constants_on(bed, design, c, form, base, fineness)
 
 
@@ -212,7 +207,6 @@ def constants_on(bed: Bed, design: Design, c: Any, form: HeaveOptions, base: Bas
     a_b, b_b = 0.5 * design.L - c.c_x, 0.5 * design.H - c.c_y
     J_box = m_b / 12.0 * (design.H * design.H + design.L * design.L)
     foot = design.W * design.L
-    s_0 = m_b * G / (base.stiffness * foot)
     return HeaveConstants(
         c,
         1.0 if form.heave else 0.0,
@@ -224,12 +218,11 @@ def constants_on(bed: Bed, design: Design, c: Any, form: HeaveOptions, base: Bas
         c.c_y * soil.mass - soil.first,
         c.c_y * c.c_y * soil.mass - 2.0 * c.c_y * soil.first + soil.second,
         design.L,
-        design.L + bed.deep * c.d + s_0,
         GROUP * fineness * fineness,
         base.stiffness * foot,
         bed.density * base.wave_speed * foot,
         bed.stress * bearing_capacity_factor(bed.phi) * falling_ground_factor(base.slope) * foot,
-        s_0,
+        m_b * G / (base.stiffness * foot),
         friction_of(bed.phi, form),
         bed.side,
         base.slip_speed,
@@ -282,7 +275,7 @@ def bed_of(design: Design, mass: SoilMass, layers: np.ndarray, form: HeaveOption
     under = layer_under(design.d, layers)
     phi, stress = layers[under, FRICTION], vertical_stress(design.d, layers, base.water)
     side = 2.0 * friction_of(phi, form) * design.L * design.d
-    return Bed(mass, layers[under, DENSITY], phi, stress, side, 3.0 + 1.0 / LEAST_FOLLOWING)
+    return Bed(mass, layers[under, DENSITY], phi, stress, side)
 
 
 @inlined
@@ -302,10 +295,10 @@ def edge_of(n: int, count: int, parts: np.ndarray) -> float:
 def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces, f: HeaveConstants) -> None:
     """Write the parts of a soil beside a box into a workspace that `prepare` has filled (Eq 149).
 
-    Strength and stiffness of a part at alpha follow a rise or fall of the face to the depth z as
-    1 + f (z - alpha)/alpha, where f is the largest number from 0 to 1 by which they nowhere down to the foot exceed the
-    soil there; and they are no more than the soil above, as far as a face may rise, has for its depth. One line keeps
-    the energy convex. Cohesion gives no friction. The boulder's buoyancy and the soil below the foot are left out.
+    As a face rises or falls, the parts that it presses on have the soil of another depth. Strength and stiffness grow in
+    proportion to the depth, as in uniform soil, and are nowhere more than the soil has from `FALL` below a part to
+    `RISE` above it: each takes the weakest and the softest there, for its depth. Cohesion gives no friction. The
+    boulder's buoyancy and the soil below the foot are left out.
 
     Parameters
     ----------
@@ -333,31 +326,18 @@ def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces,
                 spring += parts[m, 2] * i.two
                 ultimate += parts[m, 4] * i.one + parts[m, 5] * i.two
                 drag += parts[m, 6] * i.one
-        stiffness, strength = spring * inverse, ultimate * inverse
-        # The steepest line through stiffness and strength at rest that neither exceeds deeper down to the foot.
-        slope = 1.0 / r
+        soft, weak, length = spring * inverse / r, ultimate * inverse / r, f.heave * f.L / d
         for m in range(len(parts)):
             K, P_0, P_1 = parts[m, 2], parts[m, 4], parts[m, 5]
-            start, end = max(parts[m, 0], to), parts[m, 1]
-            if start <= end and parts[m, 0] < end:
-                slope = min(slope, (K * start / stiffness - 1.0) / (start - r))
-                slope = min(slope, ((P_0 + P_1 * start) / strength - 1.0) / (start - r))
-                slope = min(slope, ((P_0 + P_1 * end) / strength - 1.0) / (end - r))
-        follows = slope * r
-        soft, weak, reach = 1.0, 1.0, f.heave * REACH * f.L / d
-        for m in range(len(parts)):
-            P_0 = parts[m, 4]
-            start, end = max(parts[m, 0], r - reach), min(parts[m, 1], r)
+            start, end = max(parts[m, 0], r - RISE * length), min(parts[m, 1], r + FALL * length)
             if start < end:
-                soft = min(soft, parts[m, 2] * r / stiffness)
-                weak = min(weak, (P_0 / (start if P_0 < 0.0 else end) + parts[m, 5]) * r / strength)
+                soft, weak = min(soft, K), min(weak, P_0 / (start if P_0 < 0.0 else end) + P_1)
         put(work, RATIO, n, r)
         put(work, HEIGHT, n, (to - low) * f.pieces)
         put(work, INVERSE_HEIGHT, n, inverse / f.pieces)
-        put(work, STIFFNESS, n, soft * spring / (r * d))
-        put(work, YIELD, n, weak * ultimate / (soft * spring))
+        put(work, STIFFNESS, n, soft * (to - low) / d)
+        put(work, YIELD, n, weak / soft)
         put(work, DRAG, n, drag)
-        put(work, STAYS, n, 1.0 - follows if follows >= LEAST_FOLLOWING else 1.0)
         top = rough = 0.0
         for m in range(len(layers)):
             bottom = layers[m, TO] / d if m < len(layers) - 1 else 1.0
@@ -438,8 +418,6 @@ class Part(NamedTuple):
     """Its drag at a velocity of 1 m/s [N s^2/m^2]."""
     inverse_cover: float
     """What its depth is multiplied by for the share of its drag, see `Parts` [1/m]."""
-    stays: float
-    """Share of a rise or fall of the face that the depth of the part does not follow, 0 ... 1 (Eq 149)."""
     roughness: float
     """Coefficient of its friction over the foot's [-]."""
 
@@ -460,7 +438,7 @@ def _part_of_soil(n: Any, work: Any, p: Any, f: Any) -> Callable[..., Part]:
 def uniform_part(n: int, p: Parts, f: HeaveConstants) -> Part:
     """Return part n of a uniform soil."""
     ratio = (n + 0.5) * p.share
-    return Part(ratio, p.w, p.inverse_w, p.slope_w, p.stiffness, f.c.x_yield, p.drag, p.inverse_cover, 0.0, 1.0)
+    return Part(ratio, p.w, p.inverse_w, p.slope_w, p.stiffness, f.c.x_yield, p.drag, p.inverse_cover, 1.0)
 
 
 @inlined
@@ -476,7 +454,6 @@ def laid_part(n: int, work: np.ndarray, p: Parts) -> Part:
         field(work, YIELD, n),
         field(work, DRAG, n),
         p.inverse_cover * inverse,
-        field(work, STAYS, n),
         field(work, ROUGHNESS, n),
     )
 
@@ -520,18 +497,17 @@ class FaceForces(NamedTuple):
 
 
 @inlined
-def pressed(u: float, drag: float, z: float, alpha: float, part: Part, f: HeaveConstants) -> FaceForces:
-    """Return what a part does to a face that presses on it where u > 0 and is in soil z deep, alpha at rest."""
+def pressed(u: float, drag: float, z: float, part: Part, f: HeaveConstants) -> FaceForces:
+    """Return what a part does to a face that presses on it where u > 0 and is in soil z deep, by its middle."""
     all_of_it, yielded = beyond(u, 0.0, part), beyond(u, part.x_yield, part)
-    counted = z - times(part.stays, z - alpha)
-    depth = max(counted, 0.0)
+    depth = max(z, 0.0)
     energy = part.stiffness * (all_of_it.energy - yielded.energy)
-    covered = min(max(z, 0.0) * part.inverse_cover, 1.0)
+    covered = min(depth * part.inverse_cover, 1.0)
     return FaceForces(
         part.stiffness * depth * (all_of_it.slope - yielded.slope),
         all_of_it.share * covered * drag,
         part.stiffness * depth * (all_of_it.widening - yielded.widening),
-        f.heave * (energy - times(part.stays, energy)) if counted > 0.0 else 0.0,
+        f.heave * energy if z > 0.0 else 0.0,
         energy * depth,
     )
 
@@ -567,8 +543,8 @@ def soil_element(
     d_n, l_near = alpha - c.z_0, c.l_n - f.L
     drag = -part.drag * v * abs(v)
     z = alpha - f.heave * (y_b + d_n * versin)
-    far = pressed(u, drag, z + f.heave * c.l_n * sin, alpha, part, f)
-    near = pressed(-u, drag, z + f.heave * l_near * sin, alpha, part, f)
+    far = pressed(u, drag, z + f.heave * c.l_n * sin, part, f)
+    near = pressed(-u, drag, z + f.heave * l_near * sin, part, f)
     F_far, F_near = far.drag - far.spring, near.drag + near.spring
     lift = far.lift + near.lift
     turning = lift * d_n * sin - (far.lift * c.l_n + near.lift * l_near) * (1.0 - versin)

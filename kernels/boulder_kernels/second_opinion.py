@@ -215,7 +215,7 @@ def least_energy(theta: float, work: np.ndarray, f: HeaveConstants) -> float:
     sin, versin = sine_versine(theta)
     upper = f.c.l_n * versin - f.c.z_0 * sin
     left, right = min(upper, upper + f.c.d * sin), max(upper, upper + f.c.d * sin)
-    bottom, top = 0.0, f.out
+    bottom, top = 0.0, f.L + 3.0 * f.c.d + f.s_0
     for n in range(f.pieces):
         bottom = min(bottom, strip_depth(work, n, 0.0, sin, versin, f) - f.q_foot / f.k_foot)
     least = np.inf
