@@ -15,8 +15,9 @@ from boulder_kernels.dynamics import empty_soil
 from boulder_kernels.ground import BROMS, KP_SQUARED, WIDTH_CAPPED, put_soil
 from boulder_kernels.ground import Ground as KernelGround
 from boulder_kernels.heave import (
+    FALL,
     FINEST,
-    STAYS,
+    RISE,
     STIFFNESS,
     YIELD,
     Base,
@@ -124,7 +125,7 @@ def test_forces_accelerations_and_energies_are_those_of_the_oracle(form: HeaveOp
                 still = known_energy(body, q, np.zeros(3), sets)
                 assert held == pytest.approx(still, rel=1e-8)
                 moving = kinetic_energy(y.v_b, y.theta_b, y.omega_b, rate, f)
-                assert moving == pytest.approx(known_energy(body, q, rates, sets) - still, rel=1e-8, abs=1e-9 * still)
+                assert moving == pytest.approx(known_energy(body, q, rates, sets) - still, rel=1e-8, abs=1e-9 * abs(still))
 
 
 @pytest.mark.parametrize("form", FORMS[1::2], ids=NAMES[1::2])
@@ -252,7 +253,7 @@ def test_what_weakens_the_soil_never_lets_a_boulder_turn_less() -> None:
             turned[name].append(-found if name == "cohesion" else found)
     for name, more in turned.items():
         assert len(more) >= 6
-        assert min(more) > -1e-4, name
+        assert min(more) > -5e-4, name
         assert np.median(more) > radians(0.05), name
 
 
@@ -269,40 +270,45 @@ def test_the_foot_stands_on_the_soil_under_it() -> None:
     assert f.friction == pytest.approx(np.tan(0.4), rel=1e-12)
 
 
-def test_strength_follows_a_fall_no_further_than_the_soil_below_has_it() -> None:
-    """In proportion in uniform soil, by a share with cohesion, not at all over a weaker layer (Eq 149)."""
-    design = random_designs(1, seed=464)[0]
-    top = Layer(0.0, 1900.0, 0.7, 60.0)
-
-    def stays(*layers: Layer) -> np.ndarray:
-        _, work, _ = prepared(in_ground(design, Ground(layers)), BOTH, Base())
-        return work[STAYS : STAYS + 16]
-
-    assert stays(top) == pytest.approx(np.zeros(16), abs=1e-12)
-    held = stays(replace(top, cohesion=1e4))
-    K_p = np.tan(np.pi / 4 + 0.35) ** 2
-    by_depth = K_p * 1900.0 * bk.design.G * design.d * (np.arange(16) + 0.5) / 16
-    follows = by_depth / (by_depth + 2e4 * np.sqrt(K_p))
-    assert held == pytest.approx(np.where(follows < 0.1, 1.0, 1.0 - follows), abs=1e-9)
-    weak = stays(top, Layer(0.5 * design.d, 1900.0, 0.5, 20.0))
-    assert weak[0] > 0.5
-    assert weak[2:8] == pytest.approx(np.ones(6), abs=1e-12)
-    assert weak[8:] == pytest.approx(np.zeros(8), abs=1e-12)
-
-
-def test_strong_soil_counts_where_no_face_rises_out_of_it() -> None:
-    """Within 0.342 of the length below weaker soil it has the strength and stiffness of that soil (Eq 149)."""
-    design = random_designs(1, seed=466)[0]._replace(L=1.0, d=2.0)
-    weak, strong = Layer(0.0, 1900.0, 0.55, 30.0), Layer(1.0, 1900.0, 0.7, 60.0)
+def test_parts_have_the_weakest_and_softest_soil_that_a_face_may_meet() -> None:
+    """For its depth, from 0.25 of the length below them to 0.45 above: of layers, and of cohesion (Eq 149)."""
+    design = random_designs(1, seed=464)[0]._replace(L=1.0, d=2.0)
+    middles = 2.0 * (np.arange(16) + 0.5) / 16
 
     def laid(*layers: Layer) -> np.ndarray:
         _, work, _ = prepared(in_ground(design, Ground(layers)), BOTH, Base())
         stiffness = work[STIFFNESS : STIFFNESS + 16]
         return np.array([stiffness, stiffness * work[YIELD : YIELD + 16]])
 
-    both, above, below = laid(weak, strong), laid(weak), laid(replace(strong, top=0.0))
-    middles = 2.0 * (np.arange(16) + 0.5) / 16
-    assert both == pytest.approx(np.where(middles < 1.342, above, below), rel=1e-9)
+    weak, strong = Layer(0.0, 1900.0, 0.55, 30.0), Layer(0.0, 1900.0, 0.7, 60.0)
+    under, over = replace(strong, top=1.0), replace(weak, top=1.0)
+    assert laid(weak, under) == pytest.approx(np.where(middles < 1.45, laid(weak), laid(strong)), rel=1e-9)
+    assert laid(strong, over) == pytest.approx(np.where(middles < 0.75, laid(strong), laid(weak)), rel=1e-9)
+    K_p, (stiffness, strength) = np.tan(np.pi / 4 + 0.35) ** 2, laid(strong)
+    held = laid(replace(strong, cohesion=1e4))
+    deepest = np.minimum(middles + 0.25, 2.0)
+    assert held[0] == pytest.approx(stiffness, rel=1e-9)
+    weight = 1900.0 * bk.design.G
+    assert held[1] == pytest.approx(strength * (1.0 + 2e4 / (np.sqrt(K_p) * weight * deepest)), rel=1e-9)
+
+
+@pytest.mark.compiled
+def test_faces_rise_and_fall_no_further_than_parts_allow_for() -> None:
+    """While they press on the soil and turn by no more than 20 degrees."""
+    furthest = []
+    for design, ground in some_grounds(60, seed=467):
+        f, work, _ = prepared(in_ground(design, ground, "width_capped"), BOTH, base_in(ground))
+        record = HeaveRecord(np.linspace(0.0, 0.5, 251), np.full((251, 8), nan), np.full(251, nan))
+        simulate_heave(f, design.m_v, HeaveControl(radians(20.0), 0.5), work, record)
+        x, theta, y = record.states[np.isfinite(record.states[:, 0]), :3].T
+        d_n = np.linspace(0.0, design.d, 21)[:, None] - f.c.z_0
+        sideways = x + f.c.l_n * (np.cos(theta) - 1.0) - d_n * np.sin(theta)
+        for a, side in ((f.c.l_n, 1.0), (f.c.l_n - design.L, -1.0)):
+            risen = (y + d_n * (1.0 - np.cos(theta)) - a * np.sin(theta))[side * sideways > 0.0] / design.L
+            furthest.append([risen.max(initial=0.0), -risen.min(initial=0.0)])
+    rise, fall = np.max(furthest, axis=0)
+    assert 0.5 * RISE < rise < RISE
+    assert 0.5 * FALL < fall < FALL
 
 
 def test_a_row_is_the_same_alone_and_in_company() -> None:

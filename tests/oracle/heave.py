@@ -32,6 +32,8 @@ _GAUSS = np.polynomial.legendre.leggauss(4)
 _LONGEST_STEP = 1e-3  # [s]: what is pressed in for good is noted after each
 _ABSOLUTE = np.array([1e-11, 1e-11, 1e-11, 1e-10, 1e-10, 1e-10, 1e-11, 1e-10, 1e-8])
 _SAMPLES = 8
+RISE, FALL = 0.45, 0.25
+"""How far a face rises and falls at most, over the length of the boulder (Eq 149)."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +80,6 @@ class Body:
     """Ultimate force of the parts per metre of depth [N/m]."""
     drags: Array = field(init=False)
     """Drag of the parts over the velocity squared [kg/m]."""
-    follows: Array = field(init=False)
-    """Share of a rise that the depth of the parts follows."""
     frictions: Array = field(init=False)
     """Coefficients of friction of the parts."""
     side_pressure: Array = field(init=False)
@@ -102,7 +102,7 @@ class Body:
         ground = ground_of(inputs)
         friction = np.array([tan(layer_at(ground, float(z)).phi * 2 / 3) for z in depth])
         pressure = [(1 - sin(layer_at(ground, float(z)).phi)) * vertical_stress(ground, float(z)) / z for z in depth]
-        parts = parts_of(inputs, levels, 0.342 * inputs.L if self.heave else 0.0)
+        parts = parts_of(inputs, levels, inputs.L if self.heave else 0.0)
         for name, value in {
             "constants": c,
             "own": np.array([[inputs.L / 2 - c.c_x, inputs.H / 2 - c.c_y]]),
@@ -119,8 +119,7 @@ class Body:
             "springs": parts[0],
             "limits": parts[1],
             "drags": parts[2],
-            "follows": parts[3],
-            "frictions": parts[4] if self.friction else np.zeros(pieces),
+            "frictions": parts[3] if self.friction else np.zeros(pieces),
             "side_pressure": friction * pressure if self.friction else np.zeros(len(depth)),
         }.items():
             object.__setattr__(self, name, value)
@@ -207,20 +206,20 @@ def edges_of(inputs: Inputs, pieces: int) -> Array:
     return edges
 
 
-def parts_of(inputs: Inputs, edges: Array, reach: float) -> Array:
-    """Stiffness and ultimate force per metre of depth, drag, what follows a rise, and friction of the parts, (5, n)."""
+def parts_of(inputs: Inputs, edges: Array, length: float) -> Array:
+    """Stiffness and ultimate force per metre of depth, drag, and friction of the parts, (4, n), Eq 149."""
     height, middles = np.diff(edges), (edges[1:] + edges[:-1]) / 2
     unit = np.ones(len(height))
     if inputs.ground is None:
         of = [each(inputs, unit, unit * height) for each in (spring_constants, ultimate_forces)]
-        return np.stack((*of, unit * inputs.rho_s * inputs.W * height, unit, unit * tan(inputs.phi * 2 / 3)))
+        return np.stack((*of, unit * inputs.rho_s * inputs.W * height, unit * tan(inputs.phi * 2 / 3)))
     return np.stack(
-        [_part_in(inputs, inputs.ground, alpha, height, reach) for alpha, height in zip(middles, height, strict=True)],
+        [_part_in(inputs, inputs.ground, alpha, height, length) for alpha, height in zip(middles, height, strict=True)],
         axis=1,
     )
 
 
-def _part_in(inputs: Inputs, ground: Ground, alpha: float, height: float, reach: float) -> Array:
+def _part_in(inputs: Inputs, ground: Ground, alpha: float, height: float, length: float) -> Array:
     """One part of layers of soil, about the depth `alpha`: see `parts_of`."""
 
     def stiffness(z: float) -> float:
@@ -230,26 +229,20 @@ def _part_in(inputs: Inputs, ground: Ground, alpha: float, height: float, reach:
     def strength(z: float) -> float:
         return ultimate_pressure(inputs, ground, z)
 
-    to = alpha + height / 2
-    depths, weights = stretched(inputs, alpha - height / 2, to)
-    k, p = (weights @ [of(float(z)) for z in depths] / height for of in (stiffness, strength))
+    depths, weights = stretched(inputs, alpha - height / 2, alpha + height / 2)
     layers = [layer_at(ground, float(z)) for z in depths]
-    tops = [layer.top for layer in ground.layers if to <= layer.top <= inputs.d]
-    deeper = [z for z in {to, inputs.d, *(z - 1e-12 for z in (to, inputs.d, *tops)), *tops} if z <= inputs.d]
-    # Strength has kinks at the water table, too.
-    deeper += [ground.water] if to <= ground.water <= inputs.d else []
-    rises = [(of(z) / mean - 1) / (z - alpha) for of, mean in ((stiffness, k), (strength, p)) for z in deeper]
-    follows = min(1.0, min(rises) * alpha)
-    top = max(alpha - reach, 1e-9)
-    within = [z for z in (*(layer.top for layer in ground.layers), ground.water) if top < z < alpha]
-    above = (top, alpha - 1e-12, *within, *(z - 1e-12 for z in within)) if reach else ()
-    k, p = (min([mean, *(of(z) * alpha / z for z in above)]) for of, mean in ((stiffness, k), (strength, p)))
+    top, bottom = max(alpha - RISE * length, 1e-9), min(alpha + FALL * length, inputs.d)
+    changes = [z for z in (*(layer.top for layer in ground.layers), ground.water) if top < z < bottom]
+    near = (top, bottom, *changes, *(z - 1e-12 for z in changes)) if length else ()
+    k, p = (
+        min([weights @ [of(float(z)) for z in depths] / height / alpha, *(of(z) / z for z in near)])
+        for of in (stiffness, strength)
+    )
     return np.array(
         [
-            k * inputs.W * height / alpha,
-            p * inputs.W * height / alpha,
+            k * inputs.W * height,
+            p * inputs.W * height,
             weights @ [layer.rho_s for layer in layers] * inputs.W,
-            follows if follows >= 0.1 else 0.0,
             weights @ [tan(layer.phi * 2 / 3) for layer in layers] / height,
         ]
     )
@@ -309,8 +302,6 @@ class Stretches:
     """Middles of the parts on either face, shape (2, parts, 2)."""
     depth: Array
     """Depths of the soil there [m], shape (2, parts), Eq 132."""
-    counted: Array
-    """The same as strength and stiffness follow it [m], Eq 149."""
 
 
 def stretches(body: Body, q: Array) -> Stretches:
@@ -338,8 +329,7 @@ def stretches(body: Body, q: Array) -> Stretches:
     dx = displacement(alpha)
     faces = np.stack([np.column_stack((np.full_like(body.d_n, a), -body.d_n)) for a in (l_n, l_n - inputs.L)])
     risen = np.stack([rises(face, q) for face in faces]) if body.heave else np.zeros((2, len(cuts)))
-    counted = np.maximum(body.alpha - body.follows * risen, 0.0)
-    return Stretches(points, share, dx, dx > 0, faces, np.maximum(body.alpha - risen, 0.0), counted)
+    return Stretches(points, share, dx, dx > 0, faces, np.maximum(body.alpha - risen, 0.0))
 
 
 def springs_per_depth(body: Body, dx: Array, *, energy: bool) -> Array:
@@ -356,8 +346,8 @@ def soil_loads(body: Body, q: Array, rates: Array) -> Array:
     drag = body.drags * v * np.abs(v)
     found, pressed = np.zeros(3), np.zeros(2)
     for side, mine in enumerate((soil.is_far, ~soil.is_far)):
-        weights, depth, counted = np.where(mine, soil.weights, 0.0), soil.depth[side], soil.counted[side]
-        spring = weights * springs_per_depth(body, soil.dx, energy=False) * counted[:, None]
+        weights, depth = np.where(mine, soil.weights, 0.0), soil.depth[side]
+        spring = weights * springs_per_depth(body, soil.dx, energy=False) * depth[:, None]
         along_x = np.stack((-spring, np.zeros_like(spring)), axis=-1)
         found += generalised(soil.points.reshape(-1, 2), along_x.reshape(-1, 2), q[1])
         resisted = -weights.sum(axis=1) * drag * np.minimum(depth / (body.height / 2), 1.0)
@@ -365,7 +355,7 @@ def soil_loads(body: Body, q: Array, rates: Array) -> Array:
         F_n = resisted - spring.sum(axis=1)
         pressed += [-np.minimum(F_n, 0) @ body.frictions, np.maximum(F_n, 0) @ body.frictions]
         if body.heave:  # energy of a part per depth, as vertical force on the face that presses on it
-            lift = (weights * springs_per_depth(body, soil.dx, energy=True)).sum(axis=1) * body.follows * (counted > 0)
+            lift = (weights * springs_per_depth(body, soil.dx, energy=True)).sum(axis=1) * (depth > 0)
             found += generalised(soil.faces[side], np.column_stack((np.zeros_like(lift), lift)), q[1])
     along = turned(np.array([[0.0, 1.0]]), q[1])
     for a, normal in zip((l_n, l_n - inputs.L), pressed, strict=True):
@@ -467,7 +457,7 @@ def energy(body: Body, q: Array, rates: Array, sets: Array) -> float:
     M, _ = inertia(body, q, rates)
     moving = np.where([True, True, body.heave], rates, 0.0)
     soil = stretches(body, q)
-    depth = np.where(soil.is_far, soil.counted[0][:, None], soil.counted[1][:, None])
+    depth = np.where(soil.is_far, soil.depth[0][:, None], soil.depth[1][:, None])
     held = soil.weights * depth * springs_per_depth(body, soil.dx, energy=True)
     found = float(moving @ M @ moving / 2 + held.sum())
     if body.heave:
