@@ -321,9 +321,7 @@ class _Words:
         outside = [BY_FLAG[name].meaning for name in Design(rows).flags if name in UNSTUDIED]
         if not can_be_asked(self.need.sweep):
             return f"Not graded: {MEANINGS['open']}."
-        if not self.need.sweep.model.ground.is_usual:
-            outside.insert(0, "soil with layers, water, cohesion or slope")
-        if all(row["stands_under"] is None for row in rows):
+        if not outside:
             return f"Not graded: {NOT_ASKED}."
         some = f" in {len(rows)} of {len(design.rows)} cases" if len(rows) < len(design.rows) else ""
         return f"Not graded{some}: no study of second opinions covers {listed(tuple(outside))}."

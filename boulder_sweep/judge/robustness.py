@@ -59,8 +59,8 @@ MEANINGS = {
 }
 """What a grade means of a pass of which second opinions were asked, if they could be."""
 UNSTUDIED_IN_WORDS = (
-    "stands under the second opinions that were asked, but outside their study: in soil with layers, water, cohesion "
-    f"or slope, or beyond its ranges, as flags say ({', '.join(UNSTUDIED)})"
+    "stands under the second opinions that were asked, but outside the ranges of their study, as its flags say "
+    f"({', '.join(UNSTUDIED)})"
 )
 """Explanation of the grade ``open`` where second opinions were asked."""
 GIVES_WAY = (
@@ -262,7 +262,7 @@ def with_second_opinions(
                 ask(law, np.flatnonzero(turned | weaker if told else weaker & ~turned))
     grade[passing[turned]] = SENSITIVE
     if DECISIVE in laws:
-        studied = are_studied(passes, limits) & model.ground.is_usual
+        studied = are_studied(passes, limits)
         grade[passing[~turned & studied]] = ROBUST
         grade[passing[~turned & ~studied]] = OPEN
     columns: dict[str, Any] = judged.columns | {"robustness": grade, "stands_under": under}

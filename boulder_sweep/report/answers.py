@@ -233,8 +233,7 @@ def _grades(rows: ResultRows, n: int) -> Sentence:
     robust, sensitive, left = (rows.grades.get(grade, 0) for grade in GRADES)
     if left == n:
         asked = rows.kind in (NEED, CAPACITY) or "second_opinion" in rows.finished.identity["settings"]["model"]
-        known = f"{MEANINGS['open'].capitalize()}, and their study covers dry, level, uniform soil within its ranges"
-        reason = known if asked else "No second opinion was asked for"
+        reason = MEANINGS["open"].capitalize() if asked else "No second opinion was asked for"
         return (f"{reason}; whether a pass stands under another form of the model is open.",)
     parts = ((robust, f"robust ({IN_WORDS})"), (sensitive, f"sensitive ({SENSITIVE_IN_WORDS})"), (left, "open"))
     by_grade = listed(tuple(f"{count:,} {verb(count, 'are', 'is')} {words}" for count, words in parts if count))

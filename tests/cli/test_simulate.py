@@ -52,7 +52,7 @@ def test_a_pass_has_its_second_opinion_before_any_caution(sweep, tmp_path):
     out = sweep("simulate", CONFIGS / "rwg.yaml", "--set", "soil.friction_angle=41 deg")[1]
     assert out.index("\nsensitive: a second opinion overturns it") < out.index("\ncaution: ")
     wet = sweep("simulate", CONFIGS / "rwg.yaml", "--set", "soil.water_table=1.5 m")[1]
-    assert "\nopen: stands under the second opinions that were asked, but outside their study" in wet
+    assert "\nsensitive: a second opinion overturns it" in wet
     assert "robust" not in sweep("simulate", CONFIGS / "abg.yaml")[1]
 
 

@@ -125,7 +125,9 @@ def test_forces_accelerations_and_energies_are_those_of_the_oracle(form: HeaveOp
                 still = known_energy(body, q, np.zeros(3), sets)
                 assert held == pytest.approx(still, rel=1e-8)
                 moving = kinetic_energy(y.v_b, y.theta_b, y.omega_b, rate, f)
-                assert moving == pytest.approx(known_energy(body, q, rates, sets) - still, rel=1e-8, abs=1e-9 * abs(still))
+                assert moving == pytest.approx(
+                    known_energy(body, q, rates, sets) - still, rel=1e-8, abs=1e-9 * abs(still)
+                )
 
 
 @pytest.mark.parametrize("form", FORMS[1::2], ids=NAMES[1::2])

@@ -57,6 +57,8 @@ class Body:
     friction: bool
     base: Base
     fineness: int = 1
+    as_it_lies: bool = False
+    """Whether faces press on the soil at their present depth, as it lies there; by Eq 149 if not."""
     constants: Constants = field(init=False)
     own: Array = field(init=False)
     """The boulder's own centre."""
@@ -82,6 +84,8 @@ class Body:
     """Drag of the parts over the velocity squared [kg/m]."""
     frictions: Array = field(init=False)
     """Coefficients of friction of the parts."""
+    profile: Array = field(init=False)
+    """Depths [m] with stiffness and ultimate pressure of the soil added up down to them, shape (3, n)."""
     side_pressure: Array = field(init=False)
     """Friction per area and metre of depth at the points of the sides [N/m^3]."""
 
@@ -120,6 +124,7 @@ class Body:
             "limits": parts[1],
             "drags": parts[2],
             "frictions": parts[3] if self.friction else np.zeros(pieces),
+            "profile": profile_of(inputs, ground) if self.as_it_lies else np.zeros((3, 1)),
             "side_pressure": friction * pressure if self.friction else np.zeros(len(depth)),
         }.items():
             object.__setattr__(self, name, value)
@@ -219,25 +224,28 @@ def parts_of(inputs: Inputs, edges: Array, length: float) -> Array:
     )
 
 
+def soil_at(inputs: Inputs, ground: Ground, z: float) -> Array:
+    """Stiffness per area [N/m^3] and ultimate pressure [Pa] of the soil at a depth."""
+    layer = layer_at(ground, z)
+    return np.array([1e6 * layer.beta * tan(layer.phi) / inputs.d * z, ultimate_pressure(inputs, ground, z)])
+
+
+def profile_of(inputs: Inputs, ground: Ground) -> Array:
+    """See `Body.profile`; to twice the depth of the foot, by the midpoints of millimetres or so."""
+    z = np.linspace(0.0, 2 * inputs.d, 4001)
+    of = [soil_at(inputs, ground, float(middle)) for middle in (z[1:] + z[:-1]) / 2]
+    return np.vstack((z, np.cumsum([np.zeros(2), *of], axis=0).T * z[1]))
+
+
 def _part_in(inputs: Inputs, ground: Ground, alpha: float, height: float, length: float) -> Array:
     """One part of layers of soil, about the depth `alpha`: see `parts_of`."""
-
-    def stiffness(z: float) -> float:
-        layer = layer_at(ground, z)
-        return 1e6 * layer.beta * tan(layer.phi) / inputs.d * z
-
-    def strength(z: float) -> float:
-        return ultimate_pressure(inputs, ground, z)
-
     depths, weights = stretched(inputs, alpha - height / 2, alpha + height / 2)
     layers = [layer_at(ground, float(z)) for z in depths]
     top, bottom = max(alpha - RISE * length, 1e-9), min(alpha + FALL * length, inputs.d)
     changes = [z for z in (*(layer.top for layer in ground.layers), ground.water) if top < z < bottom]
     near = (top, bottom, *changes, *(z - 1e-12 for z in changes)) if length else ()
-    k, p = (
-        min([weights @ [of(float(z)) for z in depths] / height / alpha, *(of(z) / z for z in near)])
-        for of in (stiffness, strength)
-    )
+    mean = weights @ [soil_at(inputs, ground, float(z)) for z in depths] / height / alpha
+    k, p = np.min([mean, *(soil_at(inputs, ground, z) / z for z in near)], axis=0)
     return np.array(
         [
             k * inputs.W * height,
@@ -302,6 +310,17 @@ class Stretches:
     """Middles of the parts on either face, shape (2, parts, 2)."""
     depth: Array
     """Depths of the soil there [m], shape (2, parts), Eq 132."""
+    springs: Array
+    """Stiffness [N/m] and ultimate force [N] of the soil there, shape (2, 2, parts)."""
+
+
+def springs_at(body: Body, depth: Array) -> Array:
+    """Stiffness [N/m] and ultimate force [N] of the parts where faces are at some depths, shape (..., parts), first."""
+    if not body.as_it_lies:
+        return np.stack((depth * body.springs, depth * body.limits))
+    z, *sums = body.profile
+    ends = np.maximum(depth[..., None] + body.height[:, None] / 2 * np.array([-1.0, 1.0]), 0.0)
+    return np.stack([body.inputs.W * np.diff(np.interp(ends, z, of))[..., 0] for of in sums])
 
 
 def stretches(body: Body, q: Array) -> Stretches:
@@ -313,12 +332,16 @@ def stretches(body: Body, q: Array) -> Stretches:
         points = np.stack((np.full_like(alpha, l_n), -(alpha + surface)), axis=-1)
         return np.asarray(q[0] + turned(points, q[1])[..., 0] - l_n)
 
-    x_yield = (body.limits / body.springs)[:, None]
+    faces = np.stack([np.column_stack((np.full_like(body.d_n, a), -body.d_n)) for a in (l_n, l_n - inputs.L)])
+    risen = np.stack([rises(face, q) for face in faces]) if body.heave else np.zeros((2, len(body.alpha)))
+    depth = np.maximum(body.alpha - risen, 0.0)
+    springs = springs_at(body, depth)
+    far, near = springs[1] / np.maximum(springs[0], 1e-9)
     top = displacement(np.zeros(1))[0]
     slope = displacement(np.ones(1))[0] - top
     ends = body.alpha[:, None] + body.height[:, None] / 2 * np.array([-1.0, 1.0])
     with np.errstate(divide="ignore", invalid="ignore"):
-        cuts = (x_yield * np.array([-1.0, 0.0, 1.0]) - top) / slope
+        cuts = (np.stack((-near, np.zeros_like(near), far), axis=1) - top) / slope
     cuts = np.sort(np.clip(np.nan_to_num(cuts), ends[:, :1], ends[:, 1:]), axis=1)
     cuts = np.hstack((ends[:, :1], cuts, ends[:, 1:]))
     nodes, weights = np.polynomial.legendre.leggauss(3)
@@ -327,15 +350,14 @@ def stretches(body: Body, q: Array) -> Stretches:
     points = np.stack((np.full_like(alpha, l_n), -(alpha + surface)), axis=-1)
     share = (halves[..., None] * weights / body.height[:, None, None]).reshape(len(cuts), -1)
     dx = displacement(alpha)
-    faces = np.stack([np.column_stack((np.full_like(body.d_n, a), -body.d_n)) for a in (l_n, l_n - inputs.L)])
-    risen = np.stack([rises(face, q) for face in faces]) if body.heave else np.zeros((2, len(cuts)))
-    return Stretches(points, share, dx, dx > 0, faces, np.maximum(body.alpha - risen, 0.0))
+    return Stretches(points, share, dx, dx > 0, faces, depth, springs)
 
 
-def springs_per_depth(body: Body, dx: Array, *, energy: bool) -> Array:
-    """Forces, or energies, of a part of the soil by its displacement per metre of depth."""
-    of = spring_energies if energy else spring_forces
-    return np.asarray(of(body.springs[:, None], body.limits[:, None], dx))
+def lifts(body: Body, dx: Array, weights: Array, depth: Array) -> Array:
+    """What the energy of the parts loses per rise of a face at some depths, shape (parts,): force upwards [N]."""
+    step = 1e-4
+    k_n, F_u = np.maximum(springs_at(body, np.stack((depth - step, depth + step))), 1e-9)[..., None]
+    return np.diff((weights * spring_energies(k_n, F_u, dx)).sum(axis=-1), axis=0)[0] / (2 * step) * (depth > 0)
 
 
 def soil_loads(body: Body, q: Array, rates: Array) -> Array:
@@ -347,7 +369,7 @@ def soil_loads(body: Body, q: Array, rates: Array) -> Array:
     found, pressed = np.zeros(3), np.zeros(2)
     for side, mine in enumerate((soil.is_far, ~soil.is_far)):
         weights, depth = np.where(mine, soil.weights, 0.0), soil.depth[side]
-        spring = weights * springs_per_depth(body, soil.dx, energy=False) * depth[:, None]
+        spring = weights * spring_forces(*soil.springs[:, side, :, None], soil.dx)
         along_x = np.stack((-spring, np.zeros_like(spring)), axis=-1)
         found += generalised(soil.points.reshape(-1, 2), along_x.reshape(-1, 2), q[1])
         resisted = -weights.sum(axis=1) * drag * np.minimum(depth / (body.height / 2), 1.0)
@@ -355,7 +377,7 @@ def soil_loads(body: Body, q: Array, rates: Array) -> Array:
         F_n = resisted - spring.sum(axis=1)
         pressed += [-np.minimum(F_n, 0) @ body.frictions, np.maximum(F_n, 0) @ body.frictions]
         if body.heave:  # energy of a part per depth, as vertical force on the face that presses on it
-            lift = (weights * springs_per_depth(body, soil.dx, energy=True)).sum(axis=1) * (depth > 0)
+            lift = lifts(body, soil.dx, weights, depth)
             found += generalised(soil.faces[side], np.column_stack((np.zeros_like(lift), lift)), q[1])
     along = turned(np.array([[0.0, 1.0]]), q[1])
     for a, normal in zip((l_n, l_n - inputs.L), pressed, strict=True):
@@ -457,8 +479,8 @@ def energy(body: Body, q: Array, rates: Array, sets: Array) -> float:
     M, _ = inertia(body, q, rates)
     moving = np.where([True, True, body.heave], rates, 0.0)
     soil = stretches(body, q)
-    depth = np.where(soil.is_far, soil.depth[0][:, None], soil.depth[1][:, None])
-    held = soil.weights * depth * springs_per_depth(body, soil.dx, energy=True)
+    k_n, F_u = np.where(soil.is_far, soil.springs[:, 0, :, None], soil.springs[:, 1, :, None])
+    held = soil.weights * spring_energies(np.maximum(k_n, 1e-9), F_u, soil.dx)
     found = float(moving @ M @ moving / 2 + held.sum())
     if body.heave:
         found += body.weight * float(rises(body.own, q)[0])
@@ -496,12 +518,13 @@ def simulate_heave(
     friction: bool = True,
     base: Base = Base(),
     fineness: int = 1,
+    as_it_lies: bool = False,
     horizon: float = 0.4,
     limit: float = pi,
     rtol: float = 1e-8,
 ) -> HeaveImpact:
     """Simulate one impact to the horizon [s], or to the limit of rotation [rad], whichever comes first."""
-    return _Run(Body(inputs, heave, friction, base, fineness), horizon, limit, rtol).run()
+    return _Run(Body(inputs, heave, friction, base, fineness, as_it_lies), horizon, limit, rtol).run()
 
 
 class _Run:
