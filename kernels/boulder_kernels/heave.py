@@ -295,10 +295,10 @@ def edge_of(n: int, count: int, parts: np.ndarray) -> float:
 def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces, f: HeaveConstants) -> None:
     """Write the parts of a soil beside a box into a workspace that `prepare` has filled (Eq 149).
 
-    As a face rises or falls, the parts that it presses on have the soil of another depth. Strength and stiffness grow in
-    proportion to the depth, as in uniform soil, and are nowhere more than the soil has from `FALL` below a part to
-    `RISE` above it: each takes the weakest and the softest there, for its depth. Cohesion gives no friction. The
-    boulder's buoyancy and the soil below the foot are left out.
+    As a face rises or falls, its parts press on the soil of another depth. Strength and stiffness of a part grow in
+    proportion to its depth, as in uniform soil, and nowhere exceed the soil from `FALL` below its lower end to `RISE`
+    above its upper end: for its depth, it is as weak and as soft as the weakest and the softest there. So coarse parts
+    err on the safe side. Cohesion gives no friction. The boulder's buoyancy and the soil below the foot are left out.
 
     Parameters
     ----------
@@ -326,10 +326,11 @@ def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces,
                 spring += parts[m, 2] * i.two
                 ultimate += parts[m, 4] * i.one + parts[m, 5] * i.two
                 drag += parts[m, 6] * i.one
-        soft, weak, length = spring * inverse / r, ultimate * inverse / r, f.heave * f.L / d
+        soft, weak, half = spring * inverse / r, ultimate * inverse / r, 0.5 * (to - low)
+        top, bottom = r - f.heave * (RISE * f.L / d + half), r + f.heave * (FALL * f.L / d + half)
         for m in range(len(parts)):
             K, P_0, P_1 = parts[m, 2], parts[m, 4], parts[m, 5]
-            start, end = max(parts[m, 0], r - RISE * length), min(parts[m, 1], r + FALL * length)
+            start, end = max(parts[m, 0], top), min(parts[m, 1], bottom)
             if start < end:
                 soft, weak = min(soft, K), min(weak, P_0 / (start if P_0 < 0.0 else end) + P_1)
         put(work, RATIO, n, r)
@@ -338,12 +339,12 @@ def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces,
         put(work, STIFFNESS, n, soft * (to - low) / d)
         put(work, YIELD, n, weak / soft)
         put(work, DRAG, n, drag)
-        top = rough = 0.0
+        above = rough = 0.0
         for m in range(len(layers)):
-            bottom = layers[m, TO] / d if m < len(layers) - 1 else 1.0
-            length = max(min(bottom, to) - max(top, low), 0.0)
+            below = layers[m, TO] / d if m < len(layers) - 1 else 1.0
+            length = max(min(below, to) - max(above, low), 0.0)
             rough += length * inverse * math.tan(2.0 / 3.0 * layers[m, FRICTION])
-            top = bottom
+            above = below
         put(work, ROUGHNESS, n, rough / foot)
         depth = field(work, SIDE_DEPTH, n)
         phi = layers[layer_under(depth, layers), FRICTION]

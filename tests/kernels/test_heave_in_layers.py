@@ -273,9 +273,9 @@ def test_the_foot_stands_on_the_soil_under_it() -> None:
 
 
 def test_parts_have_the_weakest_and_softest_soil_that_a_face_may_meet() -> None:
-    """For its depth, from 0.25 of the length below them to 0.45 above: of layers, and of cohesion (Eq 149)."""
+    """For their depth, from 0.25 of the length below them to 0.45 above: of layers, and of cohesion (Eq 149)."""
     design = random_designs(1, seed=464)[0]._replace(L=1.0, d=2.0)
-    middles = 2.0 * (np.arange(16) + 0.5) / 16
+    low, to = np.arange(16) / 8, np.arange(1, 17) / 8
 
     def laid(*layers: Layer) -> np.ndarray:
         _, work, _ = prepared(in_ground(design, Ground(layers)), BOTH, Base())
@@ -284,11 +284,11 @@ def test_parts_have_the_weakest_and_softest_soil_that_a_face_may_meet() -> None:
 
     weak, strong = Layer(0.0, 1900.0, 0.55, 30.0), Layer(0.0, 1900.0, 0.7, 60.0)
     under, over = replace(strong, top=1.0), replace(weak, top=1.0)
-    assert laid(weak, under) == pytest.approx(np.where(middles < 1.45, laid(weak), laid(strong)), rel=1e-9)
-    assert laid(strong, over) == pytest.approx(np.where(middles < 0.75, laid(strong), laid(weak)), rel=1e-9)
+    assert laid(weak, under) == pytest.approx(np.where(low < 1.45, laid(weak), laid(strong)), rel=1e-9)
+    assert laid(strong, over) == pytest.approx(np.where(to <= 0.75, laid(strong), laid(weak)), rel=1e-9)
     K_p, (stiffness, strength) = np.tan(np.pi / 4 + 0.35) ** 2, laid(strong)
     held = laid(replace(strong, cohesion=1e4))
-    deepest = np.minimum(middles + 0.25, 2.0)
+    deepest = np.minimum(to + 0.25, 2.0)
     assert held[0] == pytest.approx(stiffness, rel=1e-9)
     weight = 1900.0 * bk.design.G
     assert held[1] == pytest.approx(strength * (1.0 + 2e4 / (np.sqrt(K_p) * weight * deepest)), rel=1e-9)

@@ -241,7 +241,8 @@ def _part_in(inputs: Inputs, ground: Ground, alpha: float, height: float, length
     """One part of layers of soil, about the depth `alpha`: see `parts_of`."""
     depths, weights = stretched(inputs, alpha - height / 2, alpha + height / 2)
     layers = [layer_at(ground, float(z)) for z in depths]
-    top, bottom = max(alpha - RISE * length, 1e-9), min(alpha + FALL * length, inputs.d)
+    top = max(alpha - height / 2 - RISE * length, 1e-9)
+    bottom = min(alpha + height / 2 + FALL * length, inputs.d)
     changes = [z for z in (*(layer.top for layer in ground.layers), ground.water) if top < z < bottom]
     near = (top, bottom, *changes, *(z - 1e-12 for z in changes)) if length else ()
     mean = weights @ [soil_at(inputs, ground, float(z)) for z in depths] / height / alpha
