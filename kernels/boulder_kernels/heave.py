@@ -14,8 +14,8 @@ are averaged exactly, strips of the foot that are narrower at its ends, and Gaus
 added up in one order, so that every processor gives the same bits. Every force is either the slope of one potential or
 takes energy out of the motion.
 
-In uniform soil all parts have the same stiffness, yield displacement and drag. In other soil each has its own, averaged
-over it exactly (`lay_soil`); the type of the constants of the planar motion says which (`part_of_soil`).
+In uniform soil all parts have the same stiffness, yield displacement and drag. In other soil each has its own
+(`lay_soil`); the type of the constants of the planar motion says which (`part_of_soil`).
 """
 
 from __future__ import annotations
