@@ -94,6 +94,141 @@ def test_second_opinions_are_those_of_the_kernels() -> None:
             under[row] += (one.status[0] == Status.BELOW_LIMIT) << bit
     assert judged["stands_under"][passing].tolist() == under.tolist()
     words = [GRADES[code] for code in judged["robustness"][passing]]
+    studied = are_studied(designs, evaluation.limits)
+    best = np.where(studied, "robust", "open")
+    assert words == [str(grade) if bits == 3 else "sensitive" for bits, grade in zip(under, best, strict=True)]
+    assert set(words) == {"robust", "sensitive", "open"}
+    assert set(judged["stands_under"][judged.verdict != PASS].tolist()) <= {-1}
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"m_v": 2300.0, "v_0": 22.35},
+        {"m_v": 300.0, "v_0": 60.0},
+        {"k_v": 1e8, "phi": math.radians(45.0)},
+        {"v_0": 8.0, "c_v": 1e6},
+        {"phi": math.radians(60.0), "d": 1.4},
+        {"K_epsilon": 10.0, "phi": math.radians(34.0), "beta": 40.0, "d": 1.7},
+        {"d": 0.3 * 3.4, "v_0": 11.5},
+    ],
+)
+def test_outside_its_study_nothing_is_robust(changes: dict[str, float]) -> None:
+    """Whatever the second opinions say: a car on the spring of a truck, soils that nobody has seen, hardly buried."""
+    usual = {"L": 1.65, "W": 1.68, "H": 3.4, "rho_b": 2600.0, "d": 2.4, "phi": math.radians(40.0), "beta": 80.0}
+    usual |= {"rho_s": 1860.0, "m_v": 6804.0, "v_0": 13.41, "k_v": 3103.3e3, "c_v": 138.91e3, "e": 0.75}
+    evaluation = evaluation_of(grid(), accuracy_of(grid())).asked()
+    inside = evaluation.judged(plain_designs(**usual)).row(0)
+    assert (inside["verdict"], inside["robustness"]) == ("pass", "robust")
+    outside = evaluation.judged(plain_designs(**usual | changes)).row(0)
+    assert outside["robustness"] != "robust"
+    if outside["verdict"] == "pass" and outside["stands_under"] == "paper;width_capped":
+        assert outside["robustness"] == "open"
+        assert robustness.meaning_of(outside) == robustness.UNSTUDIED_IN_WORDS
+
+
+def test_near_the_limit_a_fine_solution_decides_with_its_error_taken_off() -> None:
+    """By the rotation of the finest solution: a limit that is higher by less than the error does not let it stand."""
+    sweep = grid()
+    evaluation, judged = evaluated(sweep, DECISIVE)
+    passes = designs_of(sweep.block(0, sweep.n_designs)).rows(judged["robustness"] == SENSITIVE)
+    table = with_law(passes.table, DECISIVE)
+    watched = second_opinions(table, HeaveControl(1.2, 1.0, 1e-8, FINEST, stop=False)).theta_max
+    turned = np.flatnonzero((watched > math.radians(20.0)) & (watched < 1.1))
+    assert turned.size >= 3
+    for row in turned:
+        above = {}
+        for more_deg in (-0.2, 0.5 * ERROR_DEG, 0.2):
+            limits = evaluation.limits._replace(rotation=watched[row] + math.radians(more_deg))
+            one = passes.rows(slice(row, row + 1))
+            above[more_deg] = bool(robustness.stands(one, DECISIVE, Model(), limits, evaluation.longest_s)[0])
+        assert above == {-0.2: False, 0.5 * ERROR_DEG: False, 0.2: True}
+
+
+def test_the_weakest_law_decides_and_others_are_asked_where_it_overturns() -> None:
+    sweep = grid()
+    _, both = evaluated(sweep, *SECOND_OPINIONS)
+    evaluation, decided = evaluated(sweep, DECISIVE)
+    assert evaluation.asked() == evaluation
+    assert np.array_equal(decided["robustness"], both["robustness"])
+    known = np.where(both["robustness"] == SENSITIVE, both["stands_under"], 1 << SECOND_OPINIONS.index(DECISIVE))
+    assert np.array_equal(decided["stands_under"][both.verdict == PASS], known[both.verdict == PASS])
+    passing = both.verdict == PASS
+    assert np.array_equal(standing(decided)[passing], both["robustness"][passing] != SENSITIVE)
+    assert set(decided["stands_under"][passing].tolist()) == {1, 2}
+    _, broms = evaluated(sweep, "broms")
+    assert {STANDINGS[code] for code in broms["stands_under"][passing]} <= {"paper", "paper;broms"}
+    assert ROBUST not in broms["robustness"]
+    assert np.array_equal(both["stands_under"][passing] & 1, broms["stands_under"][passing])
+
+
+def test_where_broms_resists_less_it_is_asked_too() -> None:
+    """A slender boulder deep in dense soil, which `broms` turns further than `width_capped`, beyond 20 degrees."""
+    slender = {"L": 0.96, "W": 0.816, "H": 3.893, "rho_b": 2933.6, "d": 2.857, "e": 0.768, "rho_s": 1654.0}
+    slender |= {"phi": 0.827, "beta": 174.4, "m_v": 5948.9, "v_0": 17.0, "k_v": 2764732.8, "c_v": 146707.2}
+    evaluation = evaluation_of(grid(), accuracy_of(grid())).asked()
+    row = evaluation.judged(plain_designs(**slender)).row(0)
+    assert (row["verdict"], row["stands_under"], row["robustness"]) == ("pass", "paper;width_capped", "sensitive")
+    assert not standing(evaluation.judged(plain_designs(**slender)))[0]
+
+
+def test_what_is_robust_without_asking_is_not_simulated(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the law that decides is asked, by the whole limit; with a margin it is."""
+    sweep = load("configs/m30_sizing.yaml", ["boulder.width=2.4 m", "boulder.height=[3.2, 3.4] m"])
+    evaluation, without = evaluated(sweep)
+    free = without["robustness"] == ROBUST
+    assert free.sum() >= 10
+    asked: list[int] = []
+    real = robustness.stands
+    monkeypatch.setattr(robustness, "stands", lambda designs, *how: asked.append(designs.size) or real(designs, *how))
+    block = sweep.block(0, sweep.n_designs)
+    decided = evaluation.asked()(block)
+    assert asked[0] == np.count_nonzero(without.verdict == PASS) - free.sum()
+    assert np.all(decided["robustness"][free] == ROBUST)
+    assert np.all(decided["stands_under"][free] == -1)
+    assert np.all(standing(decided)[free])
+    careful = replace(evaluation.asked(), least_margin=0.1)(block)
+    assert np.all(careful["stands_under"][free] >= 0)
+    monkeypatch.undo()
+    assert np.all(evaluated(sweep, *SECOND_OPINIONS)[1]["stands_under"][free] == 3)
+
+
+def test_other_outcomes_do_not_change() -> None:
+    _, without = evaluated(grid())
+    _, asked = evaluated(grid(), *SECOND_OPINIONS)
+    for name, values in without.columns.items():
+        if name not in ("robustness", "stands_under"):
+            assert np.array_equal(values, asked[name], equal_nan=values.dtype.kind == "f"), name
+
+
+@pytest.mark.parametrize("override", ["model.readings=as_printed", "boulder.taper=0.8"])
+def test_where_second_opinions_know_nothing_a_pass_is_open(override: str) -> None:
+    sweep = load("configs/rwg.yaml", ["model.second_opinion=[broms, width_capped]", override])
+    assert not robustness.can_be_asked(sweep)
+    evaluation = evaluation_of(sweep, accuracy_of(sweep))
+    assert evaluation.second_opinion == ()
+    assert not evaluation.limits.studied
+
+
+@pytest.mark.parametrize(
+    "override", ["soil.water_table=1.2 m", "soil.water_table=0 m", "soil.cohesion=2 kPa", "soil.slope=5 deg"]
+)
+def test_passes_in_other_soil_have_grades(override: str) -> None:
+    """As second opinions of the kernels say, with water and slope under the foot, too."""
+    sweep = load("configs/m30_sizing.yaml", [override, "boulder.width=1.8 m"])
+    _, judged = evaluated(sweep, *SECOND_OPINIONS)
+    evaluation, decided = evaluated(sweep, DECISIVE)
+    passing = np.flatnonzero(judged.verdict == PASS)
+    ground = sweep.model.ground
+    base = Base(water=ground.water_table_m if ground.water_table_m is not None else math.inf)
+    base = base._replace(slope=math.radians(ground.slope_deg))
+    how = HeaveControl(evaluation.limits.rotation, evaluation.longest_s, 1e-6, 2)
+    under = np.zeros(len(passing), dtype=int)
+    for bit, law in enumerate(SECOND_OPINIONS):
+        model = replace(sweep.model, resistance=law)
+        table = designs_of(sweep.block(0, sweep.n_designs), model=model).rows(passing).table
+        under += (second_opinions(table, how, base=base).status == Status.BELOW_LIMIT) << bit
+    assert np.mean(judged["stands_under"][passing] == under) > 0.98  # but for those next to the limit
     passes = designs_of(sweep.block(0, sweep.n_designs), model=sweep.model).rows(passing)
     grades, stand = judged["robustness"][passing], judged["stands_under"][passing] == 3
     known = np.where(are_studied(passes, evaluation.limits), ROBUST, OPEN)
