@@ -1,9 +1,11 @@
 """Grades of passes against a fine solution of each: ``python -m benchmarks.grades``.
 
-Passes of the M30 grid at 30 and at 40 mph, of random designs, of shallow boulders and of soil of 30 degrees are graded
-as `sweep run --second-opinion` grades them. Each is then simulated under every law of a second opinion with 256 parts
-of the soil, strips of the foot and points of the sides, and errors of a step of 1e-8 m. Exit code 1 if a pass that
-stands overturns in one of these.
+Passes of the M30 grid at 30 and at 40 mph, of random designs, of shallow boulders, of soil of 30 degrees, and on sites
+with layers, water, cohesion or slope are graded as `sweep run --second-opinion` grades them. Each is then simulated
+under every law of a second opinion with 256 parts of the soil, strips of the foot and points of the sides, and errors
+of a step of 1e-8 m. On each site the pass that stands nearest to the limit is simulated by an independent program, too,
+in which a face presses on the soil as it lies at its present depth. Exit code 1 if a pass that stands overturns in one
+of these.
 """
 
 from __future__ import annotations
@@ -13,12 +15,13 @@ import math
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from boulder_kernels import Status
+from boulder_kernels import Design, Status
 from boulder_kernels.heave import FINEST
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_sweep.crash_tests.tables import Table
@@ -27,10 +30,12 @@ from boulder_sweep.investigation import api_curve
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import PASS
-from boulder_sweep.judge.robustness import DECISIVE, standing, with_second_opinions
-from boulder_sweep.settings.model import SECOND_OPINIONS
-from boulder_sweep.soils import with_law
+from boulder_sweep.judge.robustness import DECISIVE, base_under, standing, with_second_opinions
+from boulder_sweep.settings.model import SECOND_OPINIONS, Ground, Layer, Model
+from boulder_sweep.soils import with_law, with_soil
 from docs.studies.forms import BUMPER_M, HOOD_M, SPEEDS, drawn_of_grid, grid_evaluation, random_designs
+from tests.oracle import heave as oracle
+from tests.oracle import inputs as known
 
 from .timing import machine, versions
 
@@ -45,6 +50,12 @@ SHALLOW = (0.15, 0.35)
 SLOW_M_S = (4.0, 13.0)
 """speeds that they stop."""
 LOOSE_DEG = 30.0
+OF_A_SITE = 25
+"""Passes of one site, which turn by at least"""
+FAR_DEG = 9.0
+"""in the planar motion."""
+WATCHED_S = 0.6
+"""How long the soil as it lies is simulated [s]."""
 SEED = 55
 
 
@@ -83,12 +94,65 @@ def sets(grid: Path, count: int) -> Iterator[tuple[str, Evaluation, Designs]]:
         yield name, evaluation, designs.rows(np.flatnonzero(evaluation.judged(designs).verdict == PASS)[:count])
 
 
+def random_ground(rng: np.random.Generator) -> Ground:
+    """Draw a site: up to two boundaries of layers, weaker or stronger, and at times water, cohesion and a slope."""
+    angles, tops = rng.uniform(28.0, 46.0, 2), np.sort(rng.uniform(0.2, 2.0, 2))
+    cohesions, some = rng.uniform(0.0, 10.0, 3), rng.uniform(size=6) < 0.5
+    layers = [
+        Layer(float(top), rng.uniform(1600.0, 2200.0), float(angle), float(api_curve(angle)), float(cohesion))
+        for top, angle, cohesion in zip(tops, angles, cohesions[1:] * some[1:3], strict=True)
+    ]
+    water, slope = rng.uniform(0.2, 2.0) if some[4] else None, rng.uniform(2.0, 15.0) if some[5] else 0.0
+    return Ground(tuple(layers[: rng.integers(3)]), float(cohesions[0] * some[0]), water, slope)
+
+
+def sites(evaluation: Evaluation, count: int) -> Iterator[tuple[Evaluation, Designs]]:
+    """Yield how the designs of random sites are judged, and passes of them that turn far."""
+    rng = np.random.default_rng(SEED)
+    for site in range(max(count // OF_A_SITE, 1)):
+        model = Model(**random_ground(rng).fields())
+        here, drawn = replace(evaluation, model=model), random_designs(DRAWN * OF_A_SITE, SEED + site)
+        designs = drawn._replace(table=with_soil(drawn.table, model.resistance, model.ground))
+        judged = here.judged(designs)
+        far = (judged.verdict == PASS) & (judged["max_rotation_deg"] >= FAR_DEG)
+        yield here, designs.rows(np.flatnonzero(far)[: min(OF_A_SITE, count)])
+
+
+def overturned_as_it_lies(passes: Designs, stand: np.ndarray, evaluation: Evaluation) -> np.ndarray:
+    """Return which passes the soil as it lies overturns, bool, (n,); asks of those that stand the one nearest to it."""
+    found, table = np.zeros(passes.size, dtype=bool), with_law(passes.table, DECISIVE)
+    if not (stand.any() and hasattr(table, "layers")):
+        return found
+    ground, control = evaluation.model.ground, HeaveControl(evaluation.limits.rotation, WATCHED_S, stop=False)
+    turned = second_opinions(table, control, base=base_under(ground)).theta_max
+    row = int(np.argmax(np.where(stand, turned, 0.0)))
+    given = Design(*(float(column[row]) for column in passes.table[: len(Design._fields)]))._asdict()
+    del given["e_bumper"]
+    top = known.Layer(0.0, given["rho_s"], given["phi"], given["beta"], 1e3 * ground.cohesion_kPa)
+    deeper = [
+        known.Layer(
+            layer.from_m,
+            layer.density_kg_m3,
+            math.radians(layer.friction_angle_deg),
+            layer.subgrade_reaction_MN_m3,
+            1e3 * layer.cohesion_kPa,
+        )
+        for layer in ground.layers
+    ]
+    water = math.inf if ground.water_table_m is None else ground.water_table_m
+    lies = known.Ground((top, *deeper), water, math.radians(ground.slope_deg))
+    inputs, limit = known.Inputs(**given, ground=lies, resistance=DECISIVE), evaluation.limits.rotation
+    impact = oracle.simulate_heave(inputs, as_it_lies=True, fineness=2, horizon=WATCHED_S, limit=limit, rtol=1e-6)
+    found[row] = math.isfinite(impact.t_limit)
+    return found
+
+
 def overturned(passes: Designs, evaluation: Evaluation) -> np.ndarray:
     """Return which passes a fine solution under one of the laws overturns, bool, shape (n,)."""
     control = HeaveControl(evaluation.limits.rotation, evaluation.longest_s, TOLERANCE_M, FINEST)
     found = np.zeros(passes.size, dtype=bool)
     for law in SECOND_OPINIONS:
-        outcome = second_opinions(with_law(passes.table, law), control)
+        outcome = second_opinions(with_law(passes.table, law), control, base=base_under(evaluation.model.ground))
         penetration = outcome.x_v_max - passes.bed_offset - passes.table.L
         found |= (outcome.status == Status.LIMIT.value) | ~(penetration <= evaluation.limits.penetration)
     return found
@@ -96,20 +160,23 @@ def overturned(passes: Designs, evaluation: Evaluation) -> np.ndarray:
 
 def held(evaluation: Evaluation, passes: Designs) -> GradeCounts:
     """Grade passes, and hold the grades to fine solutions."""
-    judged, model = evaluation.judged(passes), evaluation.model
+    judged = evaluation.judged(passes)
     begun = time.process_time()
     graded = with_second_opinions(
-        judged, passes, (DECISIVE,), model.resistance, evaluation.limits, evaluation.longest_s
+        judged, passes, (DECISIVE,), evaluation.model, evaluation.limits, evaluation.longest_s
     )
     cpu_s = time.process_time() - begun
-    stand, lost = standing(graded), overturned(passes, evaluation)
+    stand = standing(graded)
+    lost = overturned(passes, evaluation) | overturned_as_it_lies(passes, stand, evaluation)
     unsafe, cautious = (int(np.count_nonzero(which)) for which in (stand & lost, ~stand & ~lost))
     return GradeCounts(passes.size, int(np.count_nonzero(stand)), unsafe, cautious, cpu_s)
 
 
 def grades(grid: Path = GRID, count: int = PASSES) -> dict[str, GradeCounts]:
     """Hold the grades of all sets to fine solutions."""
-    return {name: held(evaluation, passes) for name, evaluation, passes in sets(grid, count)}
+    found = {name: held(evaluation, passes) for name, evaluation, passes in sets(grid, count)}
+    each = [held(evaluation, passes) for evaluation, passes in sites(grid_evaluation(grid), count)]
+    return found | {"sites": GradeCounts(*map(sum, zip(*each, strict=True)))}
 
 
 def grades_table(found: dict[str, GradeCounts], *, cpu: bool = False) -> Table:

@@ -12,7 +12,7 @@ import numpy as np
 
 from boulder_kernels import DesignTable
 from boulder_kernels import ground as kernels
-from boulder_kernels.pieces import PiecewiseTable
+from boulder_kernels.pieces import FRICTION, PRESSURE, PiecewiseTable
 from boulder_kernels.table import some_rows
 from boulder_sweep.settings.model import RESISTANCES, Ground
 from boulder_sweep.settings.shape import BOX, ProfilePoint, Shape
@@ -29,13 +29,13 @@ def coefficients(table: DesignTable, law: str) -> np.ndarray:
     return values
 
 
-def with_law(table: DesignTable, law: str, present: str = RESISTANCES[0]) -> DesignTable:
+def with_law(table: Any, law: str, present: str = RESISTANCES[0]) -> Any:
     """Return n designs with the ultimate resistance of another law.
 
     Parameters
     ----------
     table
-        The designs, SI.
+        The designs, SI, boxes.
     law
         A name of `boulder_sweep.settings.model.RESISTANCES`.
     present
@@ -43,12 +43,33 @@ def with_law(table: DesignTable, law: str, present: str = RESISTANCES[0]) -> Des
 
     Returns
     -------
-    DesignTable
+    DesignTable or PiecewiseTable
         The designs themselves where the law is the present one.
     """
     if law == present:
         return table
-    return table._replace(K_epsilon=table.K_epsilon * (coefficients(table, law) / coefficients(table, present)))
+    ratios = layer_coefficients(table, law) / layer_coefficients(table, present)
+    if not isinstance(table, PiecewiseTable):
+        return table._replace(K_epsilon=table.K_epsilon * ratios[:, 0])
+    layers = table.layers.copy()
+    layers[:, :, PRESSURE:] *= ratios[:, :, None]
+    return table._replace(layers=layers)
+
+
+def layer_coefficients(table: Any, law: str) -> np.ndarray:
+    """Return the coefficient K of a law [-] in every layer of n designs, shape (n, M); M is 1 of a uniform soil.
+
+    Parameters
+    ----------
+    table
+        The designs, SI.
+    law
+        See `with_law`.
+    """
+    if not isinstance(table, PiecewiseTable):
+        return coefficients(table, law)[:, None]
+    angles = np.moveaxis(table.layers[:, :, FRICTION], 1, 0)
+    return np.stack([coefficients(plain(table)._replace(phi=phi.copy()), law) for phi in angles], axis=-1)
 
 
 def ground_of(law: str, ground: Ground, turned: float = 0.0) -> kernels.Ground:

@@ -175,7 +175,7 @@ class Evaluation:
         limits = self.limits._replace(rotation=(1.0 - self.least_margin) * self.limits.rotation)
         passes = designs.rows(judged.verdict == PASS)
         asked, told = self.second_opinion, not self.deciding_laws_only
-        return with_second_opinions(judged, passes, asked, self.model.resistance, limits, self.longest_s, told=told)
+        return with_second_opinions(judged, passes, asked, self.model, limits, self.longest_s, told=told)
 
     def _worst_shapes(self, designs: Designs) -> Judged:
         """Judge boulders as taped and weighed by the worst of their shapes; by the first in which one fails."""
@@ -232,7 +232,7 @@ class Evaluation:
         if not self.askable or not passing.any():
             return judged
         passes = self.designs(block, passing)
-        return with_second_opinions(judged, passes, (DECISIVE,), self.model.resistance, self.limits, self.longest_s)
+        return with_second_opinions(judged, passes, (DECISIVE,), self.model, self.limits, self.longest_s)
 
     @property
     def longest_s(self) -> float:
@@ -267,7 +267,7 @@ class Evaluation:
         table = with_soil(PLAIN_DESIGN, model.resistance, model.ground, shape=model.shape)
         self.simulate(table, self.readings, self.control._replace(horizon=self.control.h))
         if self.second_opinion:
-            second_opinions(PLAIN_DESIGN, HeaveControl(self.limits.rotation, self.control.h))
+            second_opinions(table, HeaveControl(self.limits.rotation, self.control.h))
 
 
 PLAIN_DESIGN = DesignTable(

@@ -23,21 +23,22 @@ import numpy as np
 
 from boulder_kernels import Status
 from boulder_kernels._jit import plain
-from boulder_kernels.heave import bearing_capacity_factor
+from boulder_kernels.heave import Base, bearing_capacity_factor
 from boulder_kernels.rules import UNSTUDIED
-from boulder_kernels.second_opinion import HeaveControl, second_opinions
+from boulder_kernels.second_opinion import USUAL_BASE, HeaveControl, second_opinions
 from boulder_kernels.table import some_rows
 from boulder_sweep.columns import GRADES
 from boulder_sweep.investigation import family_bounds
 from boulder_sweep.judge.judged import PASS, Judged
 from boulder_sweep.judge.validity import VEHICLE, are_studied
 from boulder_sweep.settings.model import RESISTANCES, SECOND_OPINIONS
-from boulder_sweep.soils import with_law
+from boulder_sweep.soils import layer_coefficients, with_law
 
 if TYPE_CHECKING:
     from boulder_kernels import DesignTable
     from boulder_sweep.judge.inputs import Designs
     from boulder_sweep.settings import Sweep
+    from boulder_sweep.settings.model import Ground, Model
 
 ROBUST, SENSITIVE, OPEN = range(len(GRADES))
 DECISIVE = "width_capped"
@@ -54,7 +55,7 @@ SENSITIVE_IN_WORDS = (
 MEANINGS = {
     "robust": IN_WORDS,
     "sensitive": SENSITIVE_IN_WORDS,
-    "open": "second opinions know boxes of rock of given density, dry, level, uniform soil and corrected readings only",
+    "open": "second opinions know boxes of rock of given density and corrected readings only",
 }
 """What a grade means of a pass of which second opinions were asked, if they could be."""
 UNSTUDIED_IN_WORDS = (
@@ -105,11 +106,11 @@ AT_ONCE = 400
 def can_be_asked(sweep: Sweep) -> bool:
     """Return whether the designs of a sweep are such as second opinions know.
 
-    They know boxes, plain dry soil and corrected readings, and are not asked of assumed rock.
+    They know boxes and corrected readings, and are not asked of assumed rock.
     """
     model = sweep.model
     known = model.shape.is_box and not model.rock_assumed and not any(case.is_taped for case in (sweep, *sweep.cases))
-    return model.ground.is_usual and known and model.preset == "corrected"
+    return known and model.preset == "corrected"
 
 
 def meaning_of(row: Mapping[str, Any]) -> str | None:
@@ -158,7 +159,13 @@ def is_free(table: DesignTable) -> np.ndarray:
     return np.logical_and.reduce(inside)
 
 
-def stands(designs: Designs, law: str, present: str, limits: Any, longest_s: float) -> np.ndarray:
+def base_under(ground: Ground) -> Base:
+    """Return what second opinions ask of the soil as it lies beside its resistance."""
+    water = math.inf if ground.water_table_m is None else ground.water_table_m
+    return USUAL_BASE._replace(water=water, slope=math.radians(ground.slope_deg))
+
+
+def stands(designs: Designs, law: str, model: Model, limits: Any, longest_s: float) -> np.ndarray:
     """Return which of n designs pass by a second opinion, bool, shape (n,).
 
     Parameters
@@ -167,21 +174,21 @@ def stands(designs: Designs, law: str, present: str, limits: Any, longest_s: flo
         The designs, all of which the vehicle hits.
     law
         Soil model of the second opinion, one of `SECOND_OPINIONS`.
-    present
-        Soil model of the designs.
+    model
+        Soil model and ground of the designs.
     limits
         Limits of the criterion (`boulder_sweep.judge.verdict.Limits`).
     longest_s
         Longest simulated time; what is not proved to stand by then does not.
     """
-    table = with_law(designs.table, law, present)
+    table, base = with_law(designs.table, law, model.resistance), base_under(model.ground)
     usual = HeaveControl(limits.rotation, longest_s, QUICK_M, margin=math.radians(NEAR_DEG))
     fine = HeaveControl(limits.rotation - math.radians(ERROR_DEG), longest_s, TOLERANCE_M, FINENESS)
     passes = np.empty(designs.size, dtype=bool)
 
     def below(some: np.ndarray, control: HeaveControl) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return which of some designs stay below the limit of rotation, how far they turn, and how far in."""
-        outcome = second_opinions(some_rows(table, some), control)
+        outcome = second_opinions(some_rows(table, some), control, base=base)
         penetration = outcome.x_v_max - designs.bed_offset[some] - table.L[some]
         return np.equal(outcome.status, Status.BELOW_LIMIT.value), np.asarray(outcome.theta_max), penetration
 
@@ -207,7 +214,7 @@ def with_second_opinions(
     judged: Judged,
     passes: Designs,
     laws: tuple[str, ...],
-    present: str,
+    model: Model,
     limits: Any,
     longest_s: float,
     *,
@@ -225,7 +232,7 @@ def with_second_opinions(
         The rows.
     passes
         Designs of those that pass.
-    laws, present, limits, longest_s
+    laws, model, limits, longest_s
         See `stands`.
     told
         Whether passes that `DECISIVE` overturns are simulated under another law, only to tell whether they stand there.
@@ -241,17 +248,17 @@ def with_second_opinions(
 
     def ask(law: str, rows: np.ndarray) -> None:
         """Note which of some passes stand under a law."""
-        there = stands(passes.rows(rows), law, present, limits, longest_s)
+        there = stands(passes.rows(rows), law, model, limits, longest_s)
         under[passing[rows[there]]] += 1 << SECOND_OPINIONS.index(law)
         turned[rows[~there]] = True
 
     for law in laws:
         ask(law, np.arange(len(passing)))
     if laws == (DECISIVE,):
-        resistance = with_law(passes.table, DECISIVE, present).K_epsilon
+        resistance = layer_coefficients(passes.table, DECISIVE)
         for law in SECOND_OPINIONS:
             if law != DECISIVE:
-                weaker = with_law(passes.table, law, present).K_epsilon < resistance
+                weaker = (layer_coefficients(passes.table, law) < resistance).any(axis=1)
                 ask(law, np.flatnonzero(turned | weaker if told else weaker & ~turned))
     grade[passing[turned]] = SENSITIVE
     if DECISIVE in laws:
@@ -263,5 +270,6 @@ def with_second_opinions(
 
 
 def is_studied(sweep: Sweep) -> bool:
-    """Return whether a sweep has the study's model: the paper's law, and what second opinions know."""
-    return sweep.model.resistance == RESISTANCES[0] and can_be_asked(sweep)
+    """Return whether a sweep has the study's model: the paper's law, its plain soil, and what second opinions know."""
+    model = sweep.model
+    return model.resistance == RESISTANCES[0] and model.ground.is_usual and can_be_asked(sweep)

@@ -13,19 +13,33 @@ Soil, foot and sides are sums over as many pieces each, of which 16 are enough: 
 are averaged exactly, strips of the foot that are narrower at its ends, and Gauss's points of the sides. Pieces are
 added up in one order, so that every processor gives the same bits. Every force is either the slope of one potential or
 takes energy out of the motion.
+
+In uniform soil all parts have the same stiffness, yield displacement and drag. In other soil each has its own
+(`lay_soil`); the type of the constants of the planar motion says which (`part_of_soil`).
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import inlined, kernel
-from .design import Constants, Design, G, boulder_mass, passive_pressure_coefficient, soil_mass
-from .dynamics import contact_displacement, contact_lever, spring_compression
+from ._jit import inlined, kernel, overload
+from .design import (
+    Constants,
+    Design,
+    G,
+    SoilMass,
+    boulder_mass,
+    passive_pressure_coefficient,
+    soil_mass,
+)
+from .dynamics import contact_displacement, contact_lever, spring_compression, type_of
+from .ground import WATER
 from .numerics import field, put, sine_versine
+from .pieces import DENSITY, FRICTION, TO, ManyPieces, SoilConstants, combined, powers_of
 from .soil import TINY, Kinematics, soil_kinematics
 
 GROUP, FINEST = 16, 4
@@ -36,8 +50,13 @@ ROW = MOST + GROUP
 SETS, FOOT, STRIP, SIDE_A, SIDE_DEPTH, SIDE, ALONG_X, TURNING, LIFTING, FAR, NEAR = (ROW * n for n in range(11))
 """Offsets in the workspace: sets of the strips, where they lie along the foot, and their shares of it; points of the
 sides, and their friction per depth; what all pieces have of five sums."""
-ROOM = 11 * ROW
+RATIO, HEIGHT, INVERSE_HEIGHT, STIFFNESS, YIELD, DRAG, ROUGHNESS = (ROW * n for n in range(11, 18))
+"""Offsets of what only the parts of a soil that is not uniform keep there: see `lay_soil`."""
+ROOM = 18 * ROW
 """Numbers in the workspace."""
+RISE, FALL = 0.45, 0.25
+"""How far a face rises and falls at most while it presses on the soil, over the length of the boulder: 0.41 and 0.22 of
+600 boulders that turn by up to 20 degrees."""
 SIDE_POINTS = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262)
 """Gauss's four points of a length 1: the sides are four points by four."""
 SIDE_WEIGHTS = (0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692)
@@ -53,6 +72,10 @@ class Base(NamedTuple):
     """Speed c_P of a compression wave, whose impedance rho_s c_P damps the foot [m/s]."""
     slip_speed: float = 0.02
     """Speed of slip v_s at which friction has 0.71 of its full value [m/s]."""
+    water: float = math.inf
+    """Depth of the water table [m], below which soil presses on foot and sides by its weight under water."""
+    slope: float = 0.0
+    """Angle at which the ground falls away behind the boulder [rad]."""
 
 
 class HeaveOptions(NamedTuple):
@@ -67,8 +90,9 @@ class HeaveOptions(NamedTuple):
 class HeaveConstants(NamedTuple):
     """What the motion of one design depends on."""
 
-    c: Constants
-    """Constants of the planar motion, with corrected readings and the soil in closed form."""
+    c: Any
+    """Constants of the planar motion, with corrected readings and the soil in closed form: `Constants` in uniform soil
+    beside a box, `SoilConstants` where the workspace holds the parts of the soil."""
     heave: float
     """1 where the boulder may rise, else 0."""
     m_b: float
@@ -125,8 +149,35 @@ def bearing_capacity_factor(phi: float) -> float:
 
 
 @kernel
+def falling_ground_factor(slope: float) -> float:
+    """Bearing capacity where the ground falls by a slope [rad] over its value where it is level, by Vesic (Eq 148)."""
+    return max(1.0 - math.tan(slope), 0.0) ** 2
+
+
+class Bed(NamedTuple):
+    """What a boulder stands on and in."""
+
+    mass: SoilMass
+    """The soil lumped on it."""
+    density: float
+    """Density of the soil at the foot [kg/m^3]."""
+    phi: float
+    """Friction angle of the soil at the foot [rad]."""
+    stress: float
+    """Effective vertical stress at the depth of the foot [Pa]."""
+    side: float
+    """Friction of both sides per mean depth of their points [N/m]; what `lay_soil` multiplies for it in other soil."""
+
+
+@inlined
+def friction_of(phi: float, form: HeaveOptions) -> float:
+    """Coefficient of friction tan(2/3 phi) between boulder and soil (Eq 134), zero without friction."""
+    return math.tan(2.0 / 3.0 * phi) if form.friction else 0.0
+
+
+@kernel
 def heave_constants(design: Design, c: Constants, form: HeaveOptions, base: Base, fineness: int) -> HeaveConstants:
-    """Constants of the motion with heave and friction (Eqs 131-134).
+    """Constants of the motion of a box in uniform soil with heave and friction (Eqs 131-134).
 
     Parameters
     ----------
@@ -141,14 +192,21 @@ def heave_constants(design: Design, c: Constants, form: HeaveOptions, base: Base
     fineness
         1 for 16 pieces, up to `FINEST`; their number grows by its square.
     """
+    density = design.rho_s - (WATER if base.water <= 0.0 else 0.0)
+    friction = friction_of(design.phi, form)
+    side = 2.0 * friction * (1.0 - math.sin(design.phi)) * density * G * design.L * design.d
+    bed = Bed(soil_mass(design, 0), design.rho_s, design.phi, density * G * design.d, side)
+    return constants_on(bed, design, c, form, base, fineness)
+
+
+@kernel
+def constants_on(bed: Bed, design: Design, c: Any, form: HeaveOptions, base: Base, fineness: int) -> HeaveConstants:
+    """Constants of the motion with heave and friction (Eqs 131-134) on a bed; see `heave_constants`."""
     m_b = boulder_mass(design)
-    soil = soil_mass(design, 0)
+    soil = bed.mass
     a_b, b_b = 0.5 * design.L - c.c_x, 0.5 * design.H - c.c_y
     J_box = m_b / 12.0 * (design.H * design.H + design.L * design.L)
     foot = design.W * design.L
-    capacity = bearing_capacity_factor(design.phi)
-    friction = math.tan(2.0 / 3.0 * design.phi) if form.friction else 0.0
-    at_rest = 1.0 - math.sin(design.phi)
     return HeaveConstants(
         c,
         1.0 if form.heave else 0.0,
@@ -162,11 +220,11 @@ def heave_constants(design: Design, c: Constants, form: HeaveOptions, base: Base
         design.L,
         GROUP * fineness * fineness,
         base.stiffness * foot,
-        design.rho_s * base.wave_speed * foot,
-        design.rho_s * G * design.d * capacity * foot,
+        bed.density * base.wave_speed * foot,
+        bed.stress * bearing_capacity_factor(bed.phi) * falling_ground_factor(base.slope) * foot,
         m_b * G / (base.stiffness * foot),
-        friction,
-        2.0 * friction * at_rest * design.rho_s * G * design.L * design.d,
+        friction_of(bed.phi, form),
+        bed.side,
         base.slip_speed,
     )
 
@@ -189,6 +247,109 @@ def prepare(work: np.ndarray, f: HeaveConstants) -> None:
         put(work, SIDE_A, n, f.L * ((square % fineness + SIDE_POINTS[column]) / fineness) - c.c_x)
         put(work, SIDE_DEPTH, n, c.d * ((square // fineness + SIDE_POINTS[row]) / fineness))
         put(work, SIDE, n, f.side * SIDE_WEIGHTS[row] * SIDE_WEIGHTS[column] * GROUP / f.pieces)
+
+
+@inlined
+def vertical_stress(depth: float, layers: np.ndarray, water: float) -> float:
+    """Effective vertical stress at a depth [Pa] (Eq 106); the last layer reaches down without end."""
+    stress = top = 0.0
+    for m in range(len(layers)):
+        low = max(min(layers[m, TO], depth), top)
+        stress += G * (layers[m, DENSITY] * (low - top) - WATER * max(low - max(top, water), 0.0))
+        top = low
+    return stress
+
+
+@inlined
+def layer_under(depth: float, layers: np.ndarray) -> int:
+    """Return the number of the layer that lies under a depth [m]."""
+    m = 0
+    while m < len(layers) - 1 and layers[m, TO] <= depth:
+        m += 1
+    return m
+
+
+@kernel
+def bed_of(design: Design, mass: SoilMass, layers: np.ndarray, form: HeaveOptions, base: Base) -> Bed:
+    """Return what a boulder in layers of soil, shape (M, 6), stands on (Eq 148)."""
+    under = layer_under(design.d, layers)
+    phi, stress = layers[under, FRICTION], vertical_stress(design.d, layers, base.water)
+    side = 2.0 * friction_of(phi, form) * design.L * design.d
+    return Bed(mass, layers[under, DENSITY], phi, stress, side)
+
+
+@inlined
+def edge_of(n: int, count: int, parts: np.ndarray) -> float:
+    """Return the ratio of the depth at which part n of so many begins: a boundary of pieces, (M, 9), if one is nearest.
+
+    A part that a boundary cuts would yield as a whole, and not one side of it after the other.
+    """
+    for m in range(len(parts) - 1):
+        if 0 < n < count and int(parts[m, 1] * count + 0.5) == n:
+            edge: float = parts[m, 1]
+            return edge
+    return n / count
+
+
+@kernel
+def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces, f: HeaveConstants) -> None:
+    """Write the parts of a soil beside a box into a workspace that `prepare` has filled (Eq 149).
+
+    As a face rises or falls, its parts press on the soil of another depth. Strength and stiffness of a part grow in
+    proportion to its depth, as in uniform soil, and nowhere exceed the soil from `FALL` below its lower end to `RISE`
+    above its upper end: for its depth, it is as weak and as soft as the weakest and the softest there. So coarse parts
+    err on the safe side. Cohesion gives no friction. The boulder's buoyancy and the soil below the foot are left out.
+
+    Parameters
+    ----------
+    work
+        The workspace.
+    layers
+        Layers of the design, shape (M, 6).
+    base
+        The ground under the foot, with its water.
+    soil
+        Pieces of the soil beside the boulder, filled.
+    f
+        Constants of the design.
+    """
+    d, parts = f.c.d, soil.pieces
+    foot = math.tan(2.0 / 3.0 * layers[layer_under(d, layers), FRICTION])
+    for n in range(f.pieces):
+        low, to = edge_of(n, f.pieces, parts), edge_of(n + 1, f.pieces, parts)
+        r, inverse = 0.5 * (low + to), 1.0 / (to - low)
+        spring = ultimate = drag = 0.0
+        for m in range(len(parts)):
+            start, end = max(parts[m, 0], low), min(parts[m, 1], to)
+            if start < end:
+                i = combined(powers_of(end), -1.0, powers_of(start))
+                spring += parts[m, 2] * i.two
+                ultimate += parts[m, 4] * i.one + parts[m, 5] * i.two
+                drag += parts[m, 6] * i.one
+        soft, weak, half = spring * inverse / r, ultimate * inverse / r, 0.5 * (to - low)
+        top, bottom = r - f.heave * (RISE * f.L / d + half), r + f.heave * (FALL * f.L / d + half)
+        for m in range(len(parts)):
+            K, P_0, P_1 = parts[m, 2], parts[m, 4], parts[m, 5]
+            start, end = max(parts[m, 0], top), min(parts[m, 1], bottom)
+            if start < end:
+                soft, weak = min(soft, K), min(weak, P_0 / (start if P_0 < 0.0 else end) + P_1)
+        put(work, RATIO, n, r)
+        put(work, HEIGHT, n, (to - low) * f.pieces)
+        put(work, INVERSE_HEIGHT, n, inverse / f.pieces)
+        put(work, STIFFNESS, n, soft * (to - low) / d)
+        put(work, YIELD, n, weak / soft)
+        put(work, DRAG, n, drag)
+        above = rough = 0.0
+        for m in range(len(layers)):
+            below = layers[m, TO] / d if m < len(layers) - 1 else 1.0
+            length = max(min(below, to) - max(above, low), 0.0)
+            rough += length * inverse * math.tan(2.0 / 3.0 * layers[m, FRICTION])
+            above = below
+        put(work, ROUGHNESS, n, rough / foot)
+        depth = field(work, SIDE_DEPTH, n)
+        phi = layers[layer_under(depth, layers), FRICTION]
+        pressure = (1.0 - math.sin(phi)) * vertical_stress(depth, layers, base.water) / depth
+        put(work, SIDE, n, field(work, SIDE, n) * pressure * math.tan(2.0 / 3.0 * phi) / foot)
 
 
 @inlined
@@ -241,6 +402,63 @@ def parts_of_soil(sin: float, k: Kinematics, f: HeaveConstants) -> Parts:
     )
 
 
+class Part(NamedTuple):
+    """What one part of the soil is like at a state."""
+
+    ratio: float
+    """Depth of its middle over the embedment depth [-]."""
+    w: float
+    inverse_w: float
+    slope_w: float
+    """What `Parts` says of the parts of a uniform soil, for this one."""
+    stiffness: float
+    """Stiffness of its springs per depth [N/m^2]."""
+    x_yield: float
+    """Displacement at which it reaches its ultimate resistance [m]."""
+    drag: float
+    """Its drag at a velocity of 1 m/s [N s^2/m^2]."""
+    inverse_cover: float
+    """What its depth is multiplied by for the share of its drag, see `Parts` [1/m]."""
+    roughness: float
+    """Coefficient of its friction over the foot's [-]."""
+
+
+def part_of_soil(n: int, work: np.ndarray, p: Parts, f: HeaveConstants) -> Part:
+    """Return part n of the soil: from the workspace, but in uniform soil beside a box, where all are alike."""
+    return laid_part(n, work, p) if type(f.c) is SoilConstants else uniform_part(n, p, f)
+
+
+@overload(part_of_soil)
+def _part_of_soil(n: Any, work: Any, p: Any, f: Any) -> Callable[..., Part]:
+    if type_of(f[0]) is SoilConstants:
+        return lambda n, work, p, f: laid_part(n, work, p)
+    return lambda n, work, p, f: uniform_part(n, p, f)
+
+
+@inlined
+def uniform_part(n: int, p: Parts, f: HeaveConstants) -> Part:
+    """Return part n of a uniform soil."""
+    ratio = (n + 0.5) * p.share
+    return Part(ratio, p.w, p.inverse_w, p.slope_w, p.stiffness, f.c.x_yield, p.drag, p.inverse_cover, 1.0)
+
+
+@inlined
+def laid_part(n: int, work: np.ndarray, p: Parts) -> Part:
+    """Return part n of the soil that `lay_soil` has written."""
+    height, inverse = field(work, HEIGHT, n), field(work, INVERSE_HEIGHT, n)
+    return Part(
+        field(work, RATIO, n),
+        p.w * height,
+        p.inverse_w * inverse,
+        p.slope_w * height,
+        field(work, STIFFNESS, n),
+        field(work, YIELD, n),
+        field(work, DRAG, n),
+        p.inverse_cover * inverse,
+        field(work, ROUGHNESS, n),
+    )
+
+
 class Beyond(NamedTuple):
     """Averages along a part of the soil in which u goes in a line from u - w/2 to u + w/2 (Eq 132)."""
 
@@ -255,7 +473,7 @@ class Beyond(NamedTuple):
 
 
 @inlined
-def beyond(u: float, q: float, p: Parts) -> Beyond:
+def beyond(u: float, q: float, p: Part) -> Beyond:
     """Return the averages beyond q, exactly, without a branch and without a difference of large numbers."""
     over = max(u - q + 0.5 * p.w, 0.0)
     length = min(over, p.w)
@@ -280,16 +498,16 @@ class FaceForces(NamedTuple):
 
 
 @inlined
-def pressed(u: float, drag: float, z: float, p: Parts, f: HeaveConstants) -> FaceForces:
+def pressed(u: float, drag: float, z: float, part: Part, f: HeaveConstants) -> FaceForces:
     """Return what a part does to a face that presses on it where u > 0 and is in soil z deep, by its middle."""
-    all_of_it, yielded = beyond(u, 0.0, p), beyond(u, f.c.x_yield, p)
+    all_of_it, yielded = beyond(u, 0.0, part), beyond(u, part.x_yield, part)
     depth = max(z, 0.0)
-    energy = p.stiffness * (all_of_it.energy - yielded.energy)
-    covered = min(depth * p.inverse_cover, 1.0)
+    energy = part.stiffness * (all_of_it.energy - yielded.energy)
+    covered = min(depth * part.inverse_cover, 1.0)
     return FaceForces(
-        p.stiffness * depth * (all_of_it.slope - yielded.slope),
+        part.stiffness * depth * (all_of_it.slope - yielded.slope),
         all_of_it.share * covered * drag,
-        p.stiffness * depth * (all_of_it.widening - yielded.widening),
+        part.stiffness * depth * (all_of_it.widening - yielded.widening),
         f.heave * energy if z > 0.0 else 0.0,
         energy * depth,
     )
@@ -310,25 +528,29 @@ class Element(NamedTuple):
     """Vertical force on the boulder [N]."""
     energy: float
     """Energy in its springs [J]."""
+    roughness: float
+    """Coefficient of its friction over the foot's [-]."""
 
 
 @inlined
-def soil_element(n: int, y_b: float, sin: float, versin: float, k: Kinematics, p: Parts, f: HeaveConstants) -> Element:
+def soil_element(
+    n: int, y_b: float, sin: float, versin: float, k: Kinematics, p: Parts, work: np.ndarray, f: HeaveConstants
+) -> Element:
     """Forces and energy of part n of the soil: its depth follows the rise of the faces that press on it (Eq 132)."""
-    c = f.c
-    ratio = (n + 0.5) * p.share
+    c, part = f.c, part_of_soil(n, work, p, f)
+    ratio = part.ratio
     u, v = k.A - k.slope_x * ratio, k.B - k.slope_v * ratio
     alpha = c.d * ratio
     d_n, l_near = alpha - c.z_0, c.l_n - f.L
-    drag = -p.drag * v * abs(v)
+    drag = -part.drag * v * abs(v)
     z = alpha - f.heave * (y_b + d_n * versin)
-    far = pressed(u, drag, z + f.heave * c.l_n * sin, p, f)
-    near = pressed(-u, drag, z + f.heave * l_near * sin, p, f)
+    far = pressed(u, drag, z + f.heave * c.l_n * sin, part, f)
+    near = pressed(-u, drag, z + f.heave * l_near * sin, part, f)
     F_far, F_near = far.drag - far.spring, near.drag + near.spring
     lift = far.lift + near.lift
     turning = lift * d_n * sin - (far.lift * c.l_n + near.lift * l_near) * (1.0 - versin)
-    turning -= (F_far + F_near) * (k.lever_d * ratio + k.q) + (far.widening + near.widening) * p.slope_w
-    return Element(near.spring - far.spring, F_far, F_near, turning, lift, far.energy + near.energy)
+    turning -= (F_far + F_near) * (k.lever_d * ratio + k.q) + (far.widening + near.widening) * part.slope_w
+    return Element(near.spring - far.spring, F_far, F_near, turning, lift, far.energy + near.energy, part.roughness)
 
 
 class Strip(NamedTuple):
@@ -404,7 +626,7 @@ def forces(
     k = soil_kinematics(x_b, v_b, omega_b, sin, versin, c)
     p = parts_of_soil(sin, k, f)
     for n in range(f.pieces):
-        e = soil_element(n, y_b, sin, versin, k, p, f)
+        e = soil_element(n, y_b, sin, versin, k, p, work, f)
         a, depth = field(work, SIDE_A, n), field(work, SIDE_DEPTH, n)
         b = c.z_0 - depth
         X, Y = a * cos + b * sin, b * cos - a * sin
@@ -421,8 +643,8 @@ def forces(
         put(work, ALONG_X, n, e.far + e.near + share * v_x + rub)
         put(work, TURNING, n, e.turning + share * (v_x * Y - v_y * X) + rub * s.Y - push * s.X)
         put(work, LIFTING, n, e.lift + share * v_y + push)
-        put(work, FAR, n, max(-e.far, 0.0) + max(-e.near, 0.0))
-        put(work, NEAR, n, max(e.far, 0.0) + max(e.near, 0.0))
+        put(work, FAR, n, e.roughness * (max(-e.far, 0.0) + max(-e.near, 0.0)))
+        put(work, NEAR, n, e.roughness * (max(e.far, 0.0) + max(e.near, 0.0)))
     far, near = summed(work, FAR, f.pieces), summed(work, NEAR, f.pieces)
     # The faces slip along themselves, each with one speed all over.
     along = v_b * sin + w_b * cos

@@ -13,13 +13,15 @@ never reaches the limit.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import inlined, kernel
-from .design import Constants, G, constants_of, corrected, design_in, is_computable
+from ._jit import by_types, inlined, is_none, kernel
+from .design import Constants, Design, DesignTable, G, body_of_box, constants_of, corrected, design_in, is_computable
 from .dormand_prince import displacement_at, slope_at, time_of_limit, turning_point
+from .dynamics import empty_soil
 from .heave import (
     ALONG_X,
     FINEST,
@@ -30,8 +32,11 @@ from .heave import (
     Forces,
     HeaveConstants,
     HeaveOptions,
+    bed_of,
+    constants_on,
     heave_constants,
     inertia_at,
+    lay_soil,
     parts_of_soil,
     prepare,
     seated_sine,
@@ -41,6 +46,7 @@ from .heave import (
 )
 from .numerics import ITERATIONS, Bracket, field, narrowed, next_guess, put, sine_versine
 from .outcomes import Status
+from .pieces import ManyPieces, constants_in_soil, fill_pieces
 from .runge_kutta import (
     AXES,
     RATES,
@@ -161,7 +167,7 @@ def potential_energy(x_b: float, theta_b: float, y_b: float, work: np.ndarray, f
     k = soil_kinematics(x_b, 0.0, 0.0, sin, versin, f.c)
     p = parts_of_soil(sin, k, f)
     for n in range(f.pieces):
-        e = soil_element(n, y_b, sin, versin, k, p, f)
+        e = soil_element(n, y_b, sin, versin, k, p, work, f)
         depth = max(strip_depth(work, n, y_b, sin, versin, f), 0.0)
         elastic = min(f.k_foot * depth, f.q_foot)
         share = f.heave * field(work, STRIP, n)
@@ -282,12 +288,11 @@ def simulate_heave(
     control
         Limit, horizon and tolerance.
     work
-        Workspace, shape (WORKSPACE,).
+        Workspace, shape (WORKSPACE,), of a design at rest: what `boulder_kernels.heave.prepare` has filled.
     record
         Filled with the time history at the times it names.
     """
     c = f.c
-    prepare(work, f)
     for axis in range(2 * AXES):
         put(work, START, axis, 0.0)
     put(work, START, 7, c.v_0)
@@ -376,8 +381,53 @@ def simulate_heave(
 
 
 @kernel
+def prepare_in_layers(
+    design: Design,
+    layers: np.ndarray,
+    soil: ManyPieces,
+    form: HeaveOptions,
+    base: Base,
+    fineness: int,
+    work: np.ndarray,
+) -> HeaveConstants:
+    """Fill the workspace for a box in layers, shape (M, 6), and return its constants; the pieces are filled anew."""
+    lumped = fill_pieces(design, layers, np.empty((0, 4)), soil)
+    c = constants_in_soil(design, READINGS, body_of_box(design), lumped, None)
+    f = constants_on(bed_of(design, lumped.mass, layers, form, base), design, c, form, base, fineness)
+    prepare(work, f)
+    lay_soil(work, layers, base, soil, f)
+    return f
+
+
+@kernel
+def prepare_in_uniform_soil(
+    design: Design, form: HeaveOptions, base: Base, fineness: int, work: np.ndarray
+) -> HeaveConstants:
+    """Fill the workspace for a box in uniform soil, and return its constants."""
+    f = heave_constants(design, constants_of(design, READINGS, 0), form, base, fineness)
+    prepare(work, f)
+    return f
+
+
+@by_types
+def prepare_design(
+    design: Any, row: Any, layers: Any, soil: Any, form: Any, base: Any, fineness: Any, work: Any
+) -> Callable[..., HeaveConstants]:
+    """Return what fills the workspace for a design of a table; arguments: see `run_second_opinions`."""
+    if is_none(layers):
+        return lambda design, row, layers, soil, form, base, fineness, work: prepare_in_uniform_soil(
+            design, form, base, fineness, work
+        )
+    return lambda design, row, layers, soil, form, base, fineness, work: prepare_in_layers(
+        design, layers[row], soil, form, base, fineness, work
+    )
+
+
+@kernel
 def run_second_opinions(
     designs: np.ndarray,
+    layers: np.ndarray | None,
+    soil: ManyPieces | None,
     form: HeaveOptions,
     base: Base,
     control: HeaveControl,
@@ -385,16 +435,17 @@ def run_second_opinions(
     record: HeaveRecord,
     out: np.ndarray,
 ) -> None:
-    """Simulate designs one by one; see `second_opinions`."""
+    """Simulate designs one by one; see `second_opinions`.
+
+    Layers, shape (n, M, 6), and the pieces that every design fills anew are None in uniform soils.
+    """
     for row in range(designs.shape[1]):
         design = design_in(designs, row)
-        c = constants_of(design, READINGS, 0)
         outcome = HeaveOutcome(Status.INVALID.value, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, 0.0)
-        if is_computable(c):
-            f = heave_constants(design, c, form, base, control.fineness)
-            # A boulder that the base cannot carry is not at rest at first, and no depth of it is the least energy.
-            if not form.heave or f.k_foot * f.s_0 < f.q_foot:
-                outcome = simulate_heave(f, design.m_v, control, work, record)
+        f = prepare_design(design, row, layers, soil, form, base, control.fineness, work)
+        # A boulder that the base cannot carry is not at rest at first, and no depth of it is the least energy.
+        if is_computable(f.c) and (not form.heave or f.k_foot * f.s_0 < f.q_foot):
+            outcome = simulate_heave(f, design.m_v, control, work, record)
         o = outcome
         out[0, row], out[1, row], out[2, row], out[3, row] = o.status, o.theta_max, o.x_b_max, o.y_b_max
         out[4, row], out[5, row], out[6, row], out[7, row] = o.x_v_max, o.t_limit, o.t_end, o.attempts
@@ -412,7 +463,7 @@ def second_opinions(
     Parameters
     ----------
     table
-        `boulder_kernels.DesignTable` of n designs that the truck hits.
+        `boulder_kernels.DesignTable` of n designs that the truck hits, or a `PiecewiseTable` of boxes.
     control
         Limit, horizon and tolerance.
     form
@@ -429,7 +480,10 @@ def second_opinions(
     """
     if not 1 <= control.fineness <= FINEST:
         raise ValueError(f"the fineness is 1 to {FINEST}, not {control.fineness}")
-    designs = np.stack(table)
+    layers: np.ndarray | None = getattr(table, "layers", None)
+    soil = None if layers is None else empty_soil(layers.shape[1], 0, 0)
+    designs = np.stack(table[: len(DesignTable._fields)])
     out = np.full((len(HeaveOutcome._fields), designs.shape[1]), np.nan)
-    run_second_opinions(designs, form, base, control, np.empty(WORKSPACE), record or no_heave_record(), out)
+    work, kept = np.empty(WORKSPACE), record or no_heave_record()
+    run_second_opinions(designs, layers, soil, form, base, control, work, kept, out)
     return HeaveOutcome(out[0].astype(np.int8), *out[1:])

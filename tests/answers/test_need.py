@@ -370,11 +370,11 @@ def test_robust_costs_depth_and_answers_are_graded_without_asking() -> None:
 
 
 def test_what_second_opinions_do_not_know_is_refused_in_words() -> None:
-    wet = site()
-    wet = replace(wet, model=replace(wet.model, water_table_m=0.5))
-    with pytest.raises(QuestionError, match="dry, level, uniform soil"):
-        bare_need(wet, robust=True)
-    assert set(bare_need(wet).arrow["robustness"].to_pylist()) <= {"open", None}
+    assumed = site()
+    assumed = replace(assumed, model=replace(assumed.model, rock_assumed=True))
+    with pytest.raises(QuestionError, match="second opinions know boxes"):
+        bare_need(assumed, robust=True)
+    assert set(bare_need(assumed).arrow["robustness"].to_pylist()) <= {"open", None}
 
 
 def test_no_grade_stands_beside_a_probability() -> None:

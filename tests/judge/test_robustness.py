@@ -10,7 +10,7 @@ import pytest
 
 import boulder_sweep
 from boulder_kernels import Status
-from boulder_kernels.heave import FINEST
+from boulder_kernels.heave import FINEST, Base
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_sweep.columns import GRADES, STANDINGS
 from boulder_sweep.judge import robustness
@@ -24,6 +24,7 @@ from boulder_sweep.judge.robustness import (
     FINENESS,
     FREE,
     NEAR_DEG,
+    OPEN,
     ROBUST,
     SENSITIVE,
     TOLERANCE_M,
@@ -33,7 +34,7 @@ from boulder_sweep.judge.robustness import (
 from boulder_sweep.judge.validity import are_studied
 from boulder_sweep.judge.verdict import Limits, judge
 from boulder_sweep.settings import load
-from boulder_sweep.settings.model import SECOND_OPINIONS
+from boulder_sweep.settings.model import SECOND_OPINIONS, Model
 from boulder_sweep.soils import with_law
 from tests.judge.plain import plain_designs
 from tests.judge.test_verdict import outcome
@@ -140,7 +141,7 @@ def test_near_the_limit_a_fine_solution_decides_with_its_error_taken_off() -> No
         for more_deg in (-0.2, 0.5 * ERROR_DEG, 0.2):
             limits = evaluation.limits._replace(rotation=watched[row] + math.radians(more_deg))
             one = passes.rows(slice(row, row + 1))
-            above[more_deg] = bool(robustness.stands(one, DECISIVE, "kp_squared", limits, evaluation.longest_s)[0])
+            above[more_deg] = bool(robustness.stands(one, DECISIVE, Model(), limits, evaluation.longest_s)[0])
         assert above == {-0.2: False, 0.5 * ERROR_DEG: False, 0.2: True}
 
 
@@ -200,13 +201,41 @@ def test_other_outcomes_do_not_change() -> None:
             assert np.array_equal(values, asked[name], equal_nan=values.dtype.kind == "f"), name
 
 
-@pytest.mark.parametrize("override", ["model.readings=as_printed", "soil.water_table=0.5 m", "soil.cohesion=5 kPa"])
+@pytest.mark.parametrize("override", ["model.readings=as_printed", "boulder.taper=0.8"])
 def test_where_second_opinions_know_nothing_a_pass_is_open(override: str) -> None:
     sweep = load("configs/rwg.yaml", ["model.second_opinion=[broms, width_capped]", override])
     assert not robustness.can_be_asked(sweep)
     evaluation = evaluation_of(sweep, accuracy_of(sweep))
     assert evaluation.second_opinion == ()
     assert not evaluation.limits.studied
+
+
+@pytest.mark.parametrize(
+    "override", ["soil.water_table=1.2 m", "soil.water_table=0 m", "soil.cohesion=2 kPa", "soil.slope=5 deg"]
+)
+def test_passes_in_other_soil_have_grades(override: str) -> None:
+    """As second opinions of the kernels say, with water and slope under the foot, too."""
+    sweep = load("configs/m30_sizing.yaml", [override, "boulder.width=1.8 m"])
+    _, judged = evaluated(sweep, *SECOND_OPINIONS)
+    evaluation, decided = evaluated(sweep, DECISIVE)
+    passing = np.flatnonzero(judged.verdict == PASS)
+    ground = sweep.model.ground
+    base = Base(water=ground.water_table_m if ground.water_table_m is not None else math.inf)
+    base = base._replace(slope=math.radians(ground.slope_deg))
+    how = HeaveControl(evaluation.limits.rotation, evaluation.longest_s, 1e-6, 2)
+    under = np.zeros(len(passing), dtype=int)
+    for bit, law in enumerate(SECOND_OPINIONS):
+        model = replace(sweep.model, resistance=law)
+        table = designs_of(sweep.block(0, sweep.n_designs), model=model).rows(passing).table
+        under += (second_opinions(table, how, base=base).status == Status.BELOW_LIMIT) << bit
+    assert np.mean(judged["stands_under"][passing] == under) > 0.98  # but for those next to the limit
+    passes = designs_of(sweep.block(0, sweep.n_designs), model=sweep.model).rows(passing)
+    grades, stand = judged["robustness"][passing], judged["stands_under"][passing] == 3
+    known = np.where(are_studied(passes, evaluation.limits), ROBUST, OPEN)
+    assert np.array_equal(grades, np.where(stand, known, SENSITIVE))
+    assert {ROBUST, SENSITIVE} <= set(grades)
+    assert np.array_equal(judged["robustness"], decided["robustness"])
+    assert np.array_equal(standing(decided)[passing], stand)
 
 
 def test_another_law_of_the_file_keeps_its_second_opinions() -> None:
@@ -248,7 +277,7 @@ def test_a_margin_is_asked_of_second_opinions_too() -> None:
     reduced = careful(block)
     passing = designs_of(block).rows(judged.verdict == PASS)
     limits = evaluation.limits._replace(rotation=0.6 * evaluation.limits.rotation)
-    known = [robustness.stands(passing, law, "kp_squared", limits, evaluation.longest_s) for law in SECOND_OPINIONS]
+    known = [robustness.stands(passing, law, Model(), limits, evaluation.longest_s) for law in SECOND_OPINIONS]
     found = reduced["stands_under"][judged.verdict == PASS]
     assert np.array_equal(found, known[0] + 2 * known[1])
     assert not np.array_equal(found, judged["stands_under"][judged.verdict == PASS])
@@ -260,6 +289,6 @@ def test_a_penetration_beyond_the_rating_overturns_a_pass() -> None:
     evaluation, judged = evaluated(sweep, *SECOND_OPINIONS)
     passing = designs_of(sweep.block(0, sweep.n_designs)).rows(judged.verdict == PASS)
     near = passing._replace(bed_offset=np.full(passing.size, -30.0))
-    stands = robustness.stands(near, "broms", "kp_squared", evaluation.limits, 10.0)
+    stands = robustness.stands(near, "broms", Model(), evaluation.limits, 10.0)
     assert not stands.any()
     assert GRADES.index("sensitive") == SENSITIVE

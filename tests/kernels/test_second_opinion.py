@@ -94,6 +94,7 @@ def simulate(
     c = constants_of(design, bk.corrected(), 0)._replace(**(planar or {}))
     f = heave_constants(design, c, form, base, how.fineness)._replace(**changes)
     work = np.full(WORKSPACE, np.nan)
+    prepare(work, f)
     return Motion(simulate_heave(f, design.m_v, how, work, record or no_heave_record()), f, work)
 
 

@@ -3,23 +3,25 @@
 Written from `docs/model.md`. Every force acts at a point of the boulder, and generalised forces are the sum of
 transposed Jacobians times forces. The masses, too, are points: the boulder's own centre, which also turns, and three
 points of lumped soil, whose sums of m_n, m_n d_n and m_n d_n^2 are the integrals over the depth. The truck is
-the jerk of Eq 45.
+the jerk of Eq 45. In layers of soil its parts have values of their own (Eqs 148, 149), and each stretch between two
+boundaries has three points.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from math import cos, exp, pi, sin, tan
+from math import atan2, cos, exp, hypot, pi, sin, tan
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
-from .constants import Constants, constants, element_depths, impact_lever, shear_wedge_angle
-from .inputs import CORRECTED, GRAVITY, Inputs
-from .soil import drag_forces, spring_constants, spring_energies, spring_forces, ultimate_forces
+from .constants import Constants, constants, impact_lever, shear_wedge_angle
+from .ground import ultimate_pressure, vertical_stress
+from .inputs import CORRECTED, GRAVITY, Ground, Inputs, Layer, layer_at
+from .soil import spring_constants, spring_energies, spring_forces, ultimate_forces
 from .vehicle import crush_force, jerk
 
 Array = NDArray[np.float64]
@@ -30,6 +32,8 @@ _GAUSS = np.polynomial.legendre.leggauss(4)
 _LONGEST_STEP = 1e-3  # [s]: what is pressed in for good is noted after each
 _ABSOLUTE = np.array([1e-11, 1e-11, 1e-11, 1e-10, 1e-10, 1e-10, 1e-11, 1e-10, 1e-8])
 _SAMPLES = 8
+RISE, FALL = 0.45, 0.25
+"""How far a face rises and falls at most, over the length of the boulder (Eq 149)."""
 
 
 @dataclass(frozen=True)
@@ -53,12 +57,15 @@ class Body:
     friction: bool
     base: Base
     fineness: int = 1
+    as_it_lies: bool = False
+    """Whether faces press on the soil at their present depth, as it lies there; by Eq 149 if not."""
     constants: Constants = field(init=False)
     own: Array = field(init=False)
     """The boulder's own centre."""
     alpha: Array = field(init=False)
     """Depths of the middles of the parts of the soil [m]."""
-    height: float = field(init=False)
+    height: Array = field(init=False)
+    """Their heights [m]."""
     d_n: Array = field(init=False)
     foot: Array = field(init=False)
     strips: Array = field(init=False)
@@ -69,12 +76,25 @@ class Body:
     """Areas of one side that its points stand for [m^2]."""
     soil_masses: Array = field(init=False)
     soil_points: Array = field(init=False)
+    springs: Array = field(init=False)
+    """Stiffness of the parts of the soil per metre of depth [N/m^2]."""
+    limits: Array = field(init=False)
+    """Ultimate force of the parts per metre of depth [N/m]."""
+    drags: Array = field(init=False)
+    """Drag of the parts over the velocity squared [kg/m]."""
+    frictions: Array = field(init=False)
+    """Coefficients of friction of the parts."""
+    profile: Array = field(init=False)
+    """Depths [m] with stiffness and ultimate pressure of the soil added up down to them, shape (3, n)."""
+    side_pressure: Array = field(init=False)
+    """Friction per area and metre of depth at the points of the sides [N/m^3]."""
 
     def __post_init__(self) -> None:
         inputs = self.inputs
-        c = constants(inputs, CORRECTED)
+        c = constants_in(inputs)
         pieces = GROUP * self.fineness**2
-        alpha = element_depths(inputs.d, pieces)
+        levels = edges_of(inputs, pieces)
+        alpha = (levels[1:] + levels[:-1]) / 2
         cells = np.arange(self.fineness)[:, None] + (_GAUSS[0] + 1) / 2
         share = np.tile(_GAUSS[1] / 2, self.fineness) / self.fineness
         depth, along = np.meshgrid(inputs.d / self.fineness * cells, inputs.L / self.fineness * cells, indexing="ij")
@@ -82,22 +102,30 @@ class Body:
         surface = inputs.d - c.c_y  # soil line over the centre of mass
         edges = inputs.L / 2 * (1 - np.cos(np.linspace(0, pi, pieces + 1)))
         strips = (edges[1:] + edges[:-1]) / 2
-        nodes, weights = np.polynomial.legendre.leggauss(3)
-        where = inputs.d * (nodes + 1) / 2
-        wedge = inputs.rho_s * inputs.W * tan(shear_wedge_angle(inputs.phi)) * (inputs.d - where)  # Eq 2 per height
+        where, masses = lumped_points(inputs)
+        ground = ground_of(inputs)
+        friction = np.array([tan(layer_at(ground, float(z)).phi * 2 / 3) for z in depth])
+        pressure = [(1 - sin(layer_at(ground, float(z)).phi)) * vertical_stress(ground, float(z)) / z for z in depth]
+        parts = parts_of(inputs, levels, inputs.L if self.heave else 0.0)
         for name, value in {
             "constants": c,
             "own": np.array([[inputs.L / 2 - c.c_x, inputs.H / 2 - c.c_y]]),
             "alpha": alpha,
-            "height": inputs.d / pieces,
+            "height": np.diff(levels),
             "d_n": alpha - surface,
             "foot": np.column_stack((strips - c.c_x, np.full(pieces, -c.c_y))),
             "strips": inputs.W * np.diff(edges),
             "sides": np.column_stack((along - c.c_x, surface - depth)),
             "side_depth": depth,
             "side_area": inputs.L * inputs.d * np.outer(share, share).ravel(),
-            "soil_masses": weights * inputs.d / 2 * wedge,
-            "soil_points": np.column_stack((np.full(3, c.l_n), surface - where)),
+            "soil_masses": masses,
+            "soil_points": np.column_stack((np.full(len(where), c.l_n), surface - where)),
+            "springs": parts[0],
+            "limits": parts[1],
+            "drags": parts[2],
+            "frictions": parts[3] if self.friction else np.zeros(pieces),
+            "profile": profile_of(inputs, ground) if self.as_it_lies else np.zeros((3, 1)),
+            "side_pressure": friction * pressure if self.friction else np.zeros(len(depth)),
         }.items():
             object.__setattr__(self, name, value)
 
@@ -114,14 +142,119 @@ class Body:
     @property
     def bearing_capacity(self) -> float:
         """Bearing capacity q of the base [Pa]."""
-        phi = self.inputs.phi
+        phi, ground = self.under.phi, ground_of(self.inputs)
         N_q = exp(pi * tan(phi)) * (1 + sin(phi)) / (1 - sin(phi))
-        return self.inputs.rho_s * GRAVITY * self.inputs.d * N_q
+        return vertical_stress(ground, self.inputs.d) * N_q * max(1 - tan(ground.slope), 0.0) ** 2
+
+    @property
+    def under(self) -> Layer:
+        """The soil at the foot."""
+        return layer_at(ground_of(self.inputs), self.inputs.d)
 
     @property
     def tan_delta(self) -> float:
-        """Coefficient of friction."""
-        return tan(self.inputs.phi * 2 / 3) if self.friction else 0.0
+        """Coefficient of friction of the foot."""
+        return tan(self.under.phi * 2 / 3) if self.friction else 0.0
+
+
+def ground_of(inputs: Inputs) -> Ground:
+    """Return the soil in layers; a uniform soil is one."""
+    return inputs.ground or Ground((Layer(0.0, inputs.rho_s, inputs.phi, inputs.beta),))
+
+
+def stretched(inputs: Inputs, low: float, high: float) -> tuple[Array, Array]:
+    """Gauss points between two depths, three between any boundaries of soil or water, and their weights [m]."""
+    ground = ground_of(inputs)
+    within = [z for z in (*(layer.top for layer in ground.layers), ground.water) if low < z < high]
+    edges = np.array(sorted({low, high, *within}))
+    nodes, weights = np.polynomial.legendre.leggauss(3)
+    halves, middles = np.diff(edges) / 2, (edges[1:] + edges[:-1]) / 2
+    return (middles[:, None] + halves[:, None] * nodes).ravel(), (halves[:, None] * weights).ravel()
+
+
+def lumped_points(inputs: Inputs) -> tuple[Array, Array]:
+    """Depths [m] and masses [kg] of points of lumped soil, by Eq 2 per height."""
+    depths, weights = stretched(inputs, 0.0, inputs.d)
+    layers = [layer_at(ground_of(inputs), float(z)) for z in depths]
+    wedge = np.array([layer.rho_s * tan(shear_wedge_angle(layer.phi)) for layer in layers])
+    return depths, weights * inputs.W * wedge * (inputs.d - depths)
+
+
+def constants_in(inputs: Inputs) -> Constants:
+    """Constants of one impact; in layers with the centre of mass that the points of lumped soil have (Eqs 3 to 16)."""
+    c = constants(inputs, CORRECTED)
+    if inputs.ground is None:
+        return c
+    depths, masses = lumped_points(inputs)
+    M, height = masses.sum(), inputs.d - depths
+    m_eff = M + c.m_b
+    c_x = (M * inputs.L + c.m_b * inputs.L / 2) / m_eff
+    c_y = (masses @ height + c.m_b * inputs.H / 2) / m_eff
+    l_n, h = inputs.L - c_x, inputs.e + inputs.d - c_y
+    own = c.m_b / 12 * (inputs.H**2 + inputs.L**2)
+    J_b = own + c.m_b * ((c_y - inputs.H / 2) ** 2 + (c_x - inputs.L / 2) ** 2)
+    J_soil = masses @ ((height - c_y) ** 2 + l_n**2)
+    changed = {"M_soil": M, "m_eff": m_eff, "c_x": c_x, "c_y": c_y, "l_n": l_n, "h": h, "J_b": J_b}
+    changed |= {"J_soil": J_soil, "J_eff": J_b + J_soil, "R_v": hypot(h, c_x), "gamma_v": -atan2(c_x, h)}
+    return replace(c, **changed)
+
+
+def edges_of(inputs: Inputs, pieces: int) -> Array:
+    """Depths between which the parts of the soil lie [m]: evenly, the nearest moved to a boundary of soil or water."""
+    edges, moved = np.linspace(0.0, inputs.d, pieces + 1), set[int]()
+    ground = ground_of(inputs)
+    for z in sorted((*(layer.top for layer in ground.layers), ground.water)):
+        nearest = round(z / inputs.d * pieces) if z < inputs.d else pieces
+        if 0 < nearest < pieces and nearest not in moved:
+            edges[nearest] = z
+            moved.add(nearest)
+    return edges
+
+
+def parts_of(inputs: Inputs, edges: Array, length: float) -> Array:
+    """Stiffness and ultimate force per metre of depth, drag, and friction of the parts, (4, n), Eq 149."""
+    height, middles = np.diff(edges), (edges[1:] + edges[:-1]) / 2
+    unit = np.ones(len(height))
+    if inputs.ground is None:
+        of = [each(inputs, unit, unit * height) for each in (spring_constants, ultimate_forces)]
+        return np.stack((*of, unit * inputs.rho_s * inputs.W * height, unit * tan(inputs.phi * 2 / 3)))
+    return np.stack(
+        [_part_in(inputs, inputs.ground, alpha, height, length) for alpha, height in zip(middles, height, strict=True)],
+        axis=1,
+    )
+
+
+def soil_at(inputs: Inputs, ground: Ground, z: float) -> Array:
+    """Stiffness per area [N/m^3] and ultimate pressure [Pa] of the soil at a depth."""
+    layer = layer_at(ground, z)
+    return np.array([1e6 * layer.beta * tan(layer.phi) / inputs.d * z, ultimate_pressure(inputs, ground, z)])
+
+
+def profile_of(inputs: Inputs, ground: Ground) -> Array:
+    """See `Body.profile`; to twice the depth of the foot, by the midpoints of millimetres or so."""
+    z = np.linspace(0.0, 2 * inputs.d, 4001)
+    of = [soil_at(inputs, ground, float(middle)) for middle in (z[1:] + z[:-1]) / 2]
+    return np.vstack((z, np.cumsum([np.zeros(2), *of], axis=0).T * z[1]))
+
+
+def _part_in(inputs: Inputs, ground: Ground, alpha: float, height: float, length: float) -> Array:
+    """One part of layers of soil, about the depth `alpha`: see `parts_of`."""
+    depths, weights = stretched(inputs, alpha - height / 2, alpha + height / 2)
+    layers = [layer_at(ground, float(z)) for z in depths]
+    top = max(alpha - height / 2 - RISE * length, 1e-9)
+    bottom = min(alpha + height / 2 + FALL * length, inputs.d)
+    changes = [z for z in (*(layer.top for layer in ground.layers), ground.water) if top < z < bottom]
+    near = (top, bottom, *changes, *(z - 1e-12 for z in changes)) if length else ()
+    mean = weights @ [soil_at(inputs, ground, float(z)) for z in depths] / height / alpha
+    k, p = np.min([mean, *(soil_at(inputs, ground, z) / z for z in near)], axis=0)
+    return np.array(
+        [
+            k * inputs.W * height,
+            p * inputs.W * height,
+            weights @ [layer.rho_s for layer in layers] * inputs.W,
+            weights @ [tan(layer.phi * 2 / 3) for layer in layers] / height,
+        ]
+    )
 
 
 def turned(points: Array, theta: float) -> Array:
@@ -178,6 +311,17 @@ class Stretches:
     """Middles of the parts on either face, shape (2, parts, 2)."""
     depth: Array
     """Depths of the soil there [m], shape (2, parts), Eq 132."""
+    springs: Array
+    """Stiffness [N/m] and ultimate force [N] of the soil there, shape (2, 2, parts)."""
+
+
+def springs_at(body: Body, depth: Array) -> Array:
+    """Stiffness [N/m] and ultimate force [N] of the parts where faces are at some depths, shape (..., parts), first."""
+    if not body.as_it_lies:
+        return np.stack((depth * body.springs, depth * body.limits))
+    z, *sums = body.profile
+    ends = np.maximum(depth[..., None] + body.height[:, None] / 2 * np.array([-1.0, 1.0]), 0.0)
+    return np.stack([body.inputs.W * np.diff(np.interp(ends, z, of))[..., 0] for of in sums])
 
 
 def stretches(body: Body, q: Array) -> Stretches:
@@ -189,67 +333,66 @@ def stretches(body: Body, q: Array) -> Stretches:
         points = np.stack((np.full_like(alpha, l_n), -(alpha + surface)), axis=-1)
         return np.asarray(q[0] + turned(points, q[1])[..., 0] - l_n)
 
-    unit = np.ones(1)
-    k_n, F_u = (of(inputs, unit, unit)[0] for of in (spring_constants, ultimate_forces))
+    faces = np.stack([np.column_stack((np.full_like(body.d_n, a), -body.d_n)) for a in (l_n, l_n - inputs.L)])
+    risen = np.stack([rises(face, q) for face in faces]) if body.heave else np.zeros((2, len(body.alpha)))
+    depth = np.maximum(body.alpha - risen, 0.0)
+    springs = springs_at(body, depth)
+    far, near = springs[1] / np.maximum(springs[0], 1e-9)
     top = displacement(np.zeros(1))[0]
     slope = displacement(np.ones(1))[0] - top
-    ends = body.alpha[:, None] + body.height / 2 * np.array([-1.0, 1.0])
+    ends = body.alpha[:, None] + body.height[:, None] / 2 * np.array([-1.0, 1.0])
     with np.errstate(divide="ignore", invalid="ignore"):
-        cuts = (np.array([-F_u / k_n, 0.0, F_u / k_n]) - top) / slope
+        cuts = (np.stack((-near, np.zeros_like(near), far), axis=1) - top) / slope
     cuts = np.sort(np.clip(np.nan_to_num(cuts), ends[:, :1], ends[:, 1:]), axis=1)
     cuts = np.hstack((ends[:, :1], cuts, ends[:, 1:]))
     nodes, weights = np.polynomial.legendre.leggauss(3)
     middles, halves = (cuts[:, 1:] + cuts[:, :-1]) / 2, np.diff(cuts, axis=1) / 2
     alpha = (middles[..., None] + halves[..., None] * nodes).reshape(len(cuts), -1)
     points = np.stack((np.full_like(alpha, l_n), -(alpha + surface)), axis=-1)
-    share = (halves[..., None] * weights / body.height).reshape(len(cuts), -1)
+    share = (halves[..., None] * weights / body.height[:, None, None]).reshape(len(cuts), -1)
     dx = displacement(alpha)
-    faces = np.stack([np.column_stack((np.full_like(body.d_n, a), -body.d_n)) for a in (l_n, l_n - inputs.L)])
-    risen = np.stack([rises(face, q) for face in faces]) if body.heave else np.zeros((2, len(cuts)))
-    return Stretches(points, share, dx, dx > 0, faces, np.maximum(body.alpha - risen, 0.0))
+    return Stretches(points, share, dx, dx > 0, faces, depth, springs)
 
 
-def springs_per_depth(body: Body, dx: Array, *, energy: bool) -> Array:
-    """Forces, or energies, of a part of the soil by its displacement per metre of depth."""
-    unit = np.ones_like(dx)
-    of = spring_energies if energy else spring_forces
-    k_n, F_u = (each(body.inputs, unit, unit * body.height) for each in (spring_constants, ultimate_forces))
-    return np.asarray(of(k_n, F_u, dx))
+def lifts(body: Body, dx: Array, weights: Array, depth: Array) -> Array:
+    """What the energy of the parts loses per rise of a face at some depths, shape (parts,): force upwards [N]."""
+    step = 1e-4
+    k_n, F_u = np.maximum(springs_at(body, np.stack((depth - step, depth + step))), 1e-9)[..., None]
+    return np.diff((weights * spring_energies(k_n, F_u, dx)).sum(axis=-1), axis=0)[0] / (2 * step) * (depth > 0)
 
 
 def soil_loads(body: Body, q: Array, rates: Array) -> Array:
     """Generalised forces of springs, drag, and the friction of both faces, Eqs 132 and 134."""
     inputs, l_n, soil = body.inputs, body.constants.l_n, stretches(body, q)
     middles = soil.faces[0]
-    drag = drag_forces(inputs, np.full(len(middles), body.height), velocities(middles, q, rates)[:, 0])
+    v = velocities(middles, q, rates)[:, 0]
+    drag = body.drags * v * np.abs(v)
     found, pressed = np.zeros(3), np.zeros(2)
     for side, mine in enumerate((soil.is_far, ~soil.is_far)):
         weights, depth = np.where(mine, soil.weights, 0.0), soil.depth[side]
-        spring = weights * springs_per_depth(body, soil.dx, energy=False) * depth[:, None]
+        spring = weights * spring_forces(*soil.springs[:, side, :, None], soil.dx)
         along_x = np.stack((-spring, np.zeros_like(spring)), axis=-1)
         found += generalised(soil.points.reshape(-1, 2), along_x.reshape(-1, 2), q[1])
         resisted = -weights.sum(axis=1) * drag * np.minimum(depth / (body.height / 2), 1.0)
         found += generalised(middles, np.column_stack((resisted, np.zeros_like(resisted))), q[1])
         F_n = resisted - spring.sum(axis=1)
-        pressed += [-np.minimum(F_n, 0).sum(), np.maximum(F_n, 0).sum()]
+        pressed += [-np.minimum(F_n, 0) @ body.frictions, np.maximum(F_n, 0) @ body.frictions]
         if body.heave:  # energy of a part per depth, as vertical force on the face that presses on it
-            lift = (weights * springs_per_depth(body, soil.dx, energy=True)).sum(axis=1) * (depth > 0)
+            lift = lifts(body, soil.dx, weights, depth)
             found += generalised(soil.faces[side], np.column_stack((np.zeros_like(lift), lift)), q[1])
     along = turned(np.array([[0.0, 1.0]]), q[1])
     for a, normal in zip((l_n, l_n - inputs.L), pressed, strict=True):
         point = np.array([[a, 0.0]])
         slip = velocities(point, q, rates) @ along[0]
-        found += generalised(point, body.tan_delta * normal * opposing(body, slip)[:, None] * along, q[1])
+        found += generalised(point, normal * opposing(body, slip)[:, None] * along, q[1])
     return found
 
 
 def side_loads(body: Body, q: Array, rates: Array) -> Array:
     """Generalised forces of the friction of both sides, Eq 134."""
-    inputs = body.inputs
     v = velocities(body.sides, q, rates)
     depth = np.maximum(body.side_depth - (q[2] if body.heave else 0.0), 0.0)
-    pressure = (1 - sin(inputs.phi)) * inputs.rho_s * GRAVITY * depth
-    full = 2 * body.tan_delta * pressure * body.side_area
+    full = 2 * body.side_pressure * depth * body.side_area
     share = full / np.sqrt((v**2).sum(axis=1) + body.base.slip_speed**2)
     return generalised(body.sides, -share[:, None] * v, q[1])
 
@@ -268,7 +411,7 @@ def base_loads(body: Body, q: Array, rates: Array, sets: Array) -> Array:
         spring = np.clip(body.base.stiffness * pressed_in(body, q, sets), 0.0, q_u)
         share = np.minimum(spring / (body.weight / (body.inputs.L * body.inputs.W)), 1.0)
         v = velocities(foot, q, rates)
-        dashpot = -body.inputs.rho_s * body.base.wave_speed * v[:, 1] * share
+        dashpot = -body.under.rho_s * body.base.wave_speed * v[:, 1] * share
         push = np.clip(spring + dashpot, 0.0, q_u) * body.strips
     else:
         s = 6 * body.settlement / body.inputs.L
@@ -337,8 +480,8 @@ def energy(body: Body, q: Array, rates: Array, sets: Array) -> float:
     M, _ = inertia(body, q, rates)
     moving = np.where([True, True, body.heave], rates, 0.0)
     soil = stretches(body, q)
-    depth = np.where(soil.is_far, soil.depth[0][:, None], soil.depth[1][:, None])
-    held = soil.weights * depth * springs_per_depth(body, soil.dx, energy=True)
+    k_n, F_u = np.where(soil.is_far, soil.springs[:, 0, :, None], soil.springs[:, 1, :, None])
+    held = soil.weights * spring_energies(np.maximum(k_n, 1e-9), F_u, soil.dx)
     found = float(moving @ M @ moving / 2 + held.sum())
     if body.heave:
         found += body.weight * float(rises(body.own, q)[0])
@@ -376,12 +519,13 @@ def simulate_heave(
     friction: bool = True,
     base: Base = Base(),
     fineness: int = 1,
+    as_it_lies: bool = False,
     horizon: float = 0.4,
     limit: float = pi,
     rtol: float = 1e-8,
 ) -> HeaveImpact:
     """Simulate one impact to the horizon [s], or to the limit of rotation [rad], whichever comes first."""
-    return _Run(Body(inputs, heave, friction, base, fineness), horizon, limit, rtol).run()
+    return _Run(Body(inputs, heave, friction, base, fineness, as_it_lies), horizon, limit, rtol).run()
 
 
 class _Run:
