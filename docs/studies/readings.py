@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from boulder_sweep.answers.advice import listed
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.accuracy import accuracy_of
@@ -227,9 +228,9 @@ def _preset_words(printed: ReadingRow, corrected: ReadingRow, designs: int) -> s
 def _strictness_words(study: ReadingsStudy) -> str:
     """Which misprints are on the safe side."""
     rows = {switch: study.changed(study.row("corrected", switch)) for switch in SWITCHES}
-    safe = [f"`{switch}`" for switch, (gained, _) in rows.items() if gained == 0]
-    lax = [f"`{switch}`" for switch, (gained, lost) in rows.items() if gained > lost]
+    safe = tuple(f"`{switch}`" for switch, (gained, _) in rows.items() if gained == 0)
+    lax = tuple(f"`{switch}`" for switch, (gained, lost) in rows.items() if gained > lost)
     return (
-        f"One printed formula among corrected ones is safe for {', '.join(safe) or 'none'}, as only fewer designs "
-        f"stand, and unsafe for {', '.join(lax) or 'none'}, as more stand than fall."
+        f"A single printed formula among corrected ones is safe for {listed(safe)}, because fewer designs stand, "
+        f"and unsafe for {listed(lax)}, because more do."
     )
