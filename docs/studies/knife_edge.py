@@ -15,7 +15,7 @@ from boulder_kernels import (
     as_printed,
     simulate_table,
 )
-from docs.studies.coverage import HORIZON_S, LIMIT
+from docs.studies.wild import HORIZON_S, LIMIT
 
 EXAMPLE = Design(
     L=1.52,
