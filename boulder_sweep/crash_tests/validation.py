@@ -12,9 +12,7 @@ import numpy as np
 from boulder_sweep.crash_tests.cases import (
     CLOSE_UNTIL_S,
     NAMES,
-    Convergence,
     Statement,
-    convergence,
     crash_test,
     rigid_wall_test,
     statement_table,
@@ -44,15 +42,12 @@ class Validation:
         By test (``abg``, ``rwg``) and preset (``as_printed``, ``corrected``).
     wall : RigidWall
         The paper's truck against a rigid wall.
-    convergence : Convergence
-        Element sums against the closed form.
     files : list of Path
         What was written.
     """
 
     trajectories: dict[tuple[str, str], Trajectory]
     wall: RigidWall
-    convergence: Convergence
     statements: list[Statement]
     files: list[Path] = field(default_factory=list)
 
@@ -90,8 +85,7 @@ class Validation:
         """Return the report for a terminal."""
         moving = any(row["vehicle_still_moving"] for row in self.rows().values())
         footnote = ["* still moving at the end of the simulated time"] if moving else []
-        tables = [statement_table(self.statements), self.convergence.table()]
-        return "\n".join([self.table().turned().text(), *footnote, *(f"\n{table.text()}" for table in tables)])
+        return "\n".join([self.table().turned().text(), *footnote, "", statement_table(self.statements).text()])
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything but the time histories as plain data."""
@@ -102,7 +96,6 @@ class Validation:
                 for (test, preset), row in self.rows().items()
             ],
             "statements": [asdict(statement) for statement in self.statements],
-            "convergence": self.convergence.to_dict(),
             "rigid_wall": wall_figures(self.wall),
             "not_compared": NOT_COMPARED,
             "files": [str(file) for file in self.files],
@@ -123,9 +116,8 @@ def validate(out: str | Path | None = None) -> Validation:
         The folder cannot be written, or matplotlib is not installed.
     """
     trajectories = {(test, preset): simulate(crash_test(test), readings=preset) for test in NAMES for preset in PRESETS}
-    study = convergence()
     wall = rigid_wall_test()
-    result = Validation(trajectories, wall, study, statements(trajectories, study, wall))
+    result = Validation(trajectories, wall, statements(trajectories, wall))
     if out is not None:
         result.files.extend(draw("crash_curves", "write_validation", result, Path(out)))
     return result

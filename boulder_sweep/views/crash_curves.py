@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_sweep.crash_tests.cases import CLOSE_UNTIL_S, NAMES, PAPERS_N
+from boulder_sweep.crash_tests.cases import CLOSE_UNTIL_S, NAMES
 from boulder_sweep.crash_tests.measured import PULSE_UNITS
 from boulder_sweep.crash_tests.overlay import simulated_signal
 from boulder_sweep.locations import replacing
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from boulder_sweep.crash_tests.cases import Convergence
     from boulder_sweep.crash_tests.fitting import VehicleFit
     from boulder_sweep.crash_tests.measured import TimeHistory
     from boulder_sweep.crash_tests.rigid_wall import RigidWall
@@ -52,8 +51,6 @@ def write_validation(result: Validation, folder: Path) -> list[Path]:
         by_preset = {preset: t for (t_name, preset), t in result.trajectories.items() if t_name == test}
         draw_crash_test(test, by_preset, folder / name)
         written.append(folder / name)
-    draw_convergence(result.convergence, folder / "convergence.png")
-    written.append(folder / "convergence.png")
     return [*written, *_write_tables(result, folder)]
 
 
@@ -146,26 +143,8 @@ def draw_rigid_wall(wall: RigidWall, path: Path) -> None:
         pictures.headline(fig, words, size=11.0)
 
 
-def draw_convergence(study: Convergence, path: Path) -> None:
-    """Draw how element sums approach the closed form."""
-    with pictures.figure(path, 6.4, 4.0) as fig:
-        axes = fig.subplots()
-        for preset, style in STYLES.items():
-            n = np.array([n for n in study.elements if study.difference("rwg", preset, n) != 0.0])
-            gap = [abs(study.difference("rwg", preset, int(count))) for count in n]
-            order = study.order("rwg", preset)
-            words = f"{preset.replace('_', ' ')}: order {order:.1f}"
-            axes.loglog(n, gap, marker="o", markersize=4.5, label=words, **style)
-        axes.axvline(PAPERS_N, color=GREY, linewidth=0.9, linestyle=":")
-        axes.annotate("N of the paper", (PAPERS_N, axes.get_ylim()[1]), fontsize=8.5, color=GREY, ha="right", va="top")
-        axes.set_xlabel("number N of soil elements")
-        axes.set_ylabel("|largest rotation − closed form| [deg]")
-        axes.set_title("Rockville White Granite: element sums against N → ∞")
-        axes.legend()
-
-
 def _write_tables(result: Validation, folder: Path) -> list[Path]:
-    """Write figures, statements, convergence and time histories to Parquet files."""
+    """Write figures, statements and time histories to Parquet files."""
     import pandas as pd
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -175,7 +154,6 @@ def _write_tables(result: Validation, folder: Path) -> list[Path]:
     frames = {
         "crash_tests.parquet": pd.DataFrame(flat),
         "statements.parquet": pd.DataFrame(content["statements"]),
-        "convergence.parquet": pd.DataFrame(content["convergence"]["elements"]).astype({"soil_elements": str}),
     }
     written = []
     for name, frame in frames.items():
