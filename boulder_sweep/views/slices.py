@@ -25,11 +25,6 @@ if TYPE_CHECKING:
 
 DEPTH, HEIGHT = "embedment_depth_m", "boulder_height_m"
 VERDICT, REASON, VALIDITY, ROBUSTNESS = "verdict", "reason", "validity", "robustness"
-MOST_KEPT = 2_000_000
-"""Most rows kept: a dozen maps with as many cells as a map may have. Of more, only rows that differ in the picture."""
-_RASTER = 500
-"""Distinct positions along an axis of a map; more than it has pixels."""
-
 Pieces = Callable[[Sequence[str]], Iterable["pd.DataFrame"]]
 """Yields the named columns of a table, `RATIO` among them, piece by piece; further columns may come along, and
 any of `boulder_sweep.columns.OPTIONAL_COLUMNS` is left out where the table does not have it."""
@@ -79,71 +74,6 @@ def finished_pieces(finished: FinishedRows) -> Pieces:
     return pieces
 
 
-class PictureRows:
-    """The rows that a picture shows, collected piece by piece.
-
-    Parameters
-    ----------
-    across, up
-        Inputs on the axes.
-    over
-        Inputs over small multiples; None where there is none.
-    levels
-        Different values of every input, ascending.
-    """
-
-    def __init__(self, across: str, up: str, over: Sequence[str | None], levels: Mapping[str, np.ndarray]):
-        self.count = self.passing = 0
-        self.flags: Counter[str] = Counter()
-        self.grades: Counter[str] = Counter()
-        self.thinned = False
-        self._ends = {
-            name: (levels[name].min(initial=np.inf), levels[name].max(initial=-np.inf)) for name in (across, up)
-        }
-        self._over = [name for name in over if name is not None]
-        self.columns = list(dict.fromkeys([across, up, *self._over, VERDICT, REASON, VALIDITY, ROBUSTNESS]))
-        self._parts: list[pd.DataFrame] = []
-        self._held = 0
-
-    def add(self, rows: pd.DataFrame) -> None:
-        """Add rows, and thin them where they are too many."""
-        self.count += len(rows)
-        if VERDICT in rows:
-            passes = rows[VERDICT] == "pass"
-            self.passing += int(passes.sum())
-            if VALIDITY in rows:
-                for words, count in rows.loc[passes, VALIDITY].astype(str).value_counts().items():
-                    self.flags.update(dict.fromkeys(str(words).split(";"), int(count)))
-            if ROBUSTNESS in rows:
-                self.grades.update(rows.loc[passes, ROBUSTNESS].dropna().astype(str).tolist())
-        if self._held == 0:
-            self._parts = [rows]  # also without any rows, for its columns
-        elif len(rows):
-            self._parts.append(rows)
-        self._held += len(rows)
-        if self._held > MOST_KEPT:
-            self._thin()
-
-    def rows(self) -> pd.DataFrame:
-        """Return the rows, in the order of the table."""
-        import pandas as pd
-
-        if len(self._parts) != 1:
-            self._parts = [pd.concat(self._parts, ignore_index=True)]
-        return self._parts[0]
-
-    def _thin(self) -> None:
-        """Of several rows at the same position, keep the one that would be drawn last."""
-        rows = self.rows()
-        pixels = rows[self._over].copy()
-        for name, (least, most) in self._ends.items():
-            share = (rows[name].to_numpy(dtype=float) - least) / max(most - least, 1e-300)
-            pixels[name] = np.round(share * _RASTER).astype(np.int32)
-        self._parts = [rows[~pixels.duplicated(keep="last").to_numpy()]]
-        self._held = len(self._parts[0])
-        self.thinned = True
-
-
 ACROSS = (RATIO, DEPTH, "boulder_width_m", "boulder_length_m", "impact_speed_m_s")
 UP = (HEIGHT, "boulder_width_m", "boulder_length_m", "vehicle_mass_kg")
 OVER = ("friction_angle_deg", "subgrade_reaction_MN_m3", "impact_speed_m_s", "boulder_width_m")
@@ -165,8 +95,7 @@ class Slice:
     Attributes
     ----------
     rows : DataFrame
-        The rows shown, with the columns of the table and ``embedment_ratio``; where they are thinned, only rows that
-        can be told apart in a picture.
+        The rows shown, with the columns of the table and ``embedment_ratio``.
     across, up : str
         Inputs on the axes of each picture.
     columns, rows_over : str or None
@@ -177,10 +106,8 @@ class Slice:
         Inputs that vary in the table and are held, with their values here.
     constants : dict of str to float
         Inputs that have one value in the whole table.
-    total, count, passing : int
-        Rows of the table, rows in the plane, and rows in the plane that pass.
-    thinned : bool
-        Whether there were too many rows to keep them all.
+    total : int
+        Number of rows of the table.
     flags : dict of str to int
         Number of passing rows with each flag of the column ``validity``; under ``""`` those without any.
     grades : dict of str to int
@@ -201,13 +128,20 @@ class Slice:
     fixed: dict[str, float]
     constants: dict[str, float]
     total: int
-    count: int
-    passing: int
-    thinned: bool
     flags: Mapping[str, int] = field(default_factory=dict)
     grades: Mapping[str, int] = field(default_factory=dict)
     left_out: dict[str, int] = field(default_factory=dict)
     sets: Mapping[str, Sequence[str]] = field(default_factory=dict)
+
+    @property
+    def count(self) -> int:
+        """Number of rows in the plane."""
+        return len(self.rows)
+
+    @property
+    def passing(self) -> int:
+        """Number of rows in the plane that pass."""
+        return int((self.rows[VERDICT] == "pass").sum()) if VERDICT in self.rows else 0
 
 
 def plane(
@@ -227,8 +161,7 @@ def plane(
     ----------
     table
         A result table, or its input columns and whatever is to be shown; or a function that yields the columns asked
-        for piece by piece, as often as it is called. Then memory does not grow with the rows, only with the picture and
-        with how many different values the inputs have.
+        for piece by piece, as often as it is called: only the rows of the plane are kept.
     across, up
         Inputs on the axes; by default embedment and height where they vary.
     columns, rows
@@ -247,6 +180,8 @@ def plane(
         An input is unknown, is used twice, or cannot be held at a value because it has another one in every design;
         or fewer than two inputs vary.
     """
+    import pandas as pd  # heavy; most commands draw no map
+
     named = dict(sets or {})
     pieces = with_positions(pieces_of(table), named)
     levels, total = _levels_of(pieces, named)
@@ -282,20 +217,27 @@ def plane(
     admitted = [(name, [value]) for name, value in fixed.items()]
     multiples = ((chosen["columns"], shown_columns), (chosen["rows"], shown_rows))
     admitted += [(name, values) for name, values in multiples if name is not None]
-    kept = PictureRows(str(chosen["across"]), str(chosen["up"]), [chosen["columns"], chosen["rows"]], levels)
-    for piece in pieces([*{*kept.columns, *fixed}]):
+    asked = [*filter(None, chosen.values()), *fixed, VERDICT, REASON, VALIDITY, ROBUSTNESS]
+    kept = []
+    for piece in pieces(list(dict.fromkeys(asked))):
         keep = np.ones(len(piece), dtype=bool)
         for name, shown in admitted:
             column = piece[name].to_numpy(dtype=float)
             keep &= np.logical_or.reduce([_equal(column, value) for value in shown])
-        kept.add(piece[keep])
+        kept.append(piece[keep])
+    found = pd.concat(kept, ignore_index=True)
+    passes = found[found[VERDICT] == "pass"] if VERDICT in found else found[:0]
+    flags: Counter[str] = Counter()
+    for words, count in passes[VALIDITY].astype(str).value_counts().items() if VALIDITY in passes else ():
+        flags.update(dict.fromkeys(str(words).split(";"), int(count)))
+    grades = Counter(passes[ROBUSTNESS].dropna().astype(str)) if ROBUSTNESS in passes else Counter[str]()
     left_out = {
         str(chosen[role]): len(levels[str(chosen[role])])
         for role, shown in (("columns", shown_columns), ("rows", shown_rows))
         if chosen[role] and len(shown) < len(levels[str(chosen[role])])
     }
     return Slice(
-        rows=kept.rows(),
+        rows=found,
         across=str(chosen["across"]),
         up=str(chosen["up"]),
         columns=chosen["columns"],
@@ -305,11 +247,8 @@ def plane(
         fixed=fixed,
         constants={name: float(values[0]) for name, values in levels.items() if len(values) == 1},
         total=total,
-        count=kept.count,
-        passing=kept.passing,
-        thinned=kept.thinned,
-        flags=dict(kept.flags),
-        grades=dict(kept.grades),
+        flags=dict(flags),
+        grades=dict(grades),
         left_out=left_out,
         sets=named,
     )

@@ -138,12 +138,7 @@ def _panel(axes: Axes, rows: pd.DataFrame, shown: Slice, units: str) -> set[int]
     cells = np.full((len(y_levels), len(x_levels)), -1, dtype=np.int16)
     cells[y_index, x_index] = codes
     filled = len(np.unique(y_index.astype(np.int64) * max(len(x_levels), 1) + x_index))
-    gridded = (
-        not shown.thinned
-        and filled == len(rows)
-        and 2 * filled >= cells.size
-        and max(cells.shape, default=0) <= MOST_CELLS
-    )
+    gridded = filled == len(rows) and 2 * filled >= cells.size and max(cells.shape, default=0) <= MOST_CELLS
     if gridded and min(cells.shape) > 1:
         masked = np.ma.masked_less(cells, 0)
         style: dict[str, Any] = {"cmap": colours, "norm": norm, "linewidth": 0.35, "edgecolors": "white"}
