@@ -265,7 +265,7 @@ def test_answers_take_profiles_and_give_their_mass(tmp_path):
 
 def test_side_views_show_the_shape(tmp_path):
     """At first touch the boulder has the corners of the profile, struck at x = 0."""
-    from boulder_sweep.views.scene import SideView
+    from boulder_sweep.views.side_view import SideView
 
     sweep = shaped(tmp_path, f"profile: {LEANING}")
     view = SideView(boulder_sweep.simulate(sweep))

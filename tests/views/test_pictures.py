@@ -25,7 +25,7 @@ from boulder_sweep.impact.trajectory import Trajectory
 from boulder_sweep.settings import load_text
 from boulder_sweep.settings.model import Ground
 from boulder_sweep.views import pictures, side_view
-from boulder_sweep.views.scene import SLICES, STYLES, SceneItem, SideView, samples_shown
+from boulder_sweep.views.side_view import SLICES, STYLES, SceneItem, SideView, samples_shown
 from boulder_sweep.views.time_curves import AFTER_PEAK, unreliable_from
 from boulder_sweep.views.wording import ground_words
 

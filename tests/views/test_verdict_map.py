@@ -18,8 +18,16 @@ from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.errors import PictureError
 from boulder_sweep.settings import load_text
 from boulder_sweep.views import pictures
-from boulder_sweep.views.slices import Pieces, Slice, pieces_of, plane
-from boulder_sweep.views.verdict_map import CLASSES, _caption, classes_of, draw_verdict_map
+from boulder_sweep.views.verdict_map import (
+    CLASSES,
+    Pieces,
+    Slice,
+    _caption,
+    classes_of,
+    draw_verdict_map,
+    pieces_of,
+    plane,
+)
 from tests.answers.designs import bare_need
 
 GRID = """\
