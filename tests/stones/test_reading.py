@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from boulder_sweep.errors import ScanError
-from boulder_sweep.stones import formats, reading
+from boulder_sweep.stones import reading
 from boulder_sweep.stones.reading import read_scan
 from boulder_sweep.stones.solid import solid_of
 from boulder_sweep.stones.weighing import scanned
@@ -473,7 +473,7 @@ HUGE_MESH = {
     ],
 )
 def test_more_faces_than_are_read(name, content, found, file, monkeypatch):
-    monkeypatch.setattr(formats, "MAX_FACES", 20)
+    monkeypatch.setattr(reading, "MAX_FACES", 20)
     with pytest.raises(ScanError, match=rf"has {found} faces or points; at most 20 are read: reduce it first"):
         read_scan(file(name, content))
 
@@ -492,10 +492,10 @@ def test_more_faces_than_are_read(name, content, found, file, monkeypatch):
     ],
 )
 def test_texts_larger_than_are_read(name, content, words, file, monkeypatch):
-    monkeypatch.setattr(formats, "MAX_LINES", 30)
-    monkeypatch.setattr(formats, "MAX_LINE_BYTES", 100)
-    monkeypatch.setattr(formats, "MAX_JSON_BYTES", 100)
-    monkeypatch.setattr(formats, "MAX_TEXT_FACETS", 11)
+    monkeypatch.setattr(reading, "MAX_LINES", 30)
+    monkeypatch.setattr(reading, "MAX_LINE_BYTES", 100)
+    monkeypatch.setattr(reading, "MAX_JSON_BYTES", 100)
+    monkeypatch.setattr(reading, "MAX_TEXT_FACETS", 11)
     with pytest.raises(ScanError, match=words):
         read_scan(file(name, content))
 
