@@ -152,7 +152,7 @@ Empty cells are gaps in a track.
 @click.command(
     "validate", short_help="The paper's crash tests against what the paper states.", epilog=VALIDATE_EXAMPLES
 )
-@click.option("-o", "--output", "out", type=OUTPUT, metavar="DIR", help="Folder for pictures and Parquet files.")
+@click.option("-o", "--output", "out", type=OUTPUT, metavar="DIR", help="Folder for pictures and time histories.")
 @click.option(
     "--measured", type=click.Path(), metavar="FILE.csv", help="Your own test data, drawn over the simulation."
 )

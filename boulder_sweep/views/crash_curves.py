@@ -42,7 +42,7 @@ FIGURES = {"abg": ("12 to 14", "figures_12_to_14_abg.png"), "rwg": ("16 to 18", 
 
 
 def write_validation(result: Validation, folder: Path) -> list[Path]:
-    """Write pictures and Parquet files of `validate` into a folder, which is made, and return the files."""
+    """Write the pictures and the time histories of `validate` into a folder, which is made, and return the files."""
     pictures.require_matplotlib()
     pictures.make_folder(folder)
     written = [folder / "figure_10_rigid_wall.png"]
@@ -51,7 +51,9 @@ def write_validation(result: Validation, folder: Path) -> list[Path]:
         by_preset = {preset: t for (t_name, preset), t in result.trajectories.items() if t_name == test}
         draw_crash_test(test, by_preset, folder / name)
         written.append(folder / name)
-    return [*written, *_write_tables(result, folder)]
+    written.append(folder / "trajectories.parquet")
+    _write_histories(result, written[-1])
+    return written
 
 
 def draw_crash_test(
@@ -143,23 +145,11 @@ def draw_rigid_wall(wall: RigidWall, path: Path) -> None:
         pictures.headline(fig, words, size=11.0)
 
 
-def _write_tables(result: Validation, folder: Path) -> list[Path]:
-    """Write figures, statements and time histories to Parquet files."""
-    import pandas as pd
+def _write_histories(result: Validation, path: Path) -> None:
+    """Write all time histories to a Parquet file."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    content = result.to_dict()
-    flat = [{k: v for k, v in row.items() if k != "readings"} for row in content["crash_tests"]]
-    frames = {
-        "crash_tests.parquet": pd.DataFrame(flat),
-        "statements.parquet": pd.DataFrame(content["statements"]),
-    }
-    written = []
-    for name, frame in frames.items():
-        with replacing(folder / name) as file:
-            frame.to_parquet(file)
-        written.append(folder / name)
     parts = []
     for (test, preset), trajectory in result.trajectories.items():
         part = trajectory.to_arrow(energy=True).replace_schema_metadata(None)
@@ -167,9 +157,8 @@ def _write_tables(result: Validation, folder: Path) -> list[Path]:
             words = pa.array([text] * len(part)).dictionary_encode()
             part = part.add_column(0, pa.field(column, words.type, metadata={"unit": ""}), words)
         parts.append(part)
-    with replacing(folder / "trajectories.parquet") as file:
+    with replacing(path) as file:
         pq.write_table(pa.concat_tables(parts).unify_dictionaries(), file, compression="zstd")
-    return [*written, folder / "trajectories.parquet"]
 
 
 ORDER = ("displacement", "velocity", "acceleration")
