@@ -169,8 +169,8 @@ def validate(out: str | None, measured: str | None, case: str | None, as_json: b
     """
     if (measured is None) != (case is None):
         raise click.UsageError("--measured FILE.csv and --case abg|rwg|CASE.yaml go together")
-    from boulder_sweep.crash_tests.validation import NOT_COMPARED
-    from boulder_sweep.crash_tests.validation import validate as run_validation
+    from boulder_sweep.crash_tests.cases import NOT_COMPARED
+    from boulder_sweep.crash_tests.cases import validate as run_validation
 
     tested = None
     if measured is not None and case is not None:

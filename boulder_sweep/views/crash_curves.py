@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
+    from boulder_sweep.crash_tests.cases import Validation
     from boulder_sweep.crash_tests.fitting import VehicleFit
     from boulder_sweep.crash_tests.measured import TimeHistory
     from boulder_sweep.crash_tests.rigid_wall import RigidWall
-    from boulder_sweep.crash_tests.validation import Validation
     from boulder_sweep.impact.trajectory import Trajectory
 
 

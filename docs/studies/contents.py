@@ -7,9 +7,8 @@ from functools import cache
 from pathlib import Path
 
 from benchmarks.grades import grades, grades_table
-from boulder_sweep.crash_tests.cases import statement_table
+from boulder_sweep.crash_tests.cases import Validation, statement_table, validate
 from boulder_sweep.crash_tests.tables import Table
-from boulder_sweep.crash_tests.validation import Validation, validate
 from docs.site.reference import bounds_of_flags
 from docs.studies import (
     against_tests,

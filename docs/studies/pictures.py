@@ -12,10 +12,9 @@ from PIL import Image
 from playwright.sync_api import Browser, sync_playwright
 
 from boulder_sweep import load, need, read, run, uncertainty
-from boulder_sweep.crash_tests.cases import crash_test
+from boulder_sweep.crash_tests.cases import crash_test, validate
 from boulder_sweep.crash_tests.fitting import fit_pulse
 from boulder_sweep.crash_tests.measured import read_pulse
-from boulder_sweep.crash_tests.validation import validate
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.report import write_report
 from boulder_sweep.report.writing import browser

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from boulder_sweep.crash_tests.validation import Validation, validate
+from boulder_sweep.crash_tests.cases import Validation, validate
 
 
 @pytest.fixture(scope="session")

@@ -14,9 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from boulder_sweep.crash_tests.cases import crash_test, rigid_wall_test, statements
+from boulder_sweep.crash_tests.cases import Validation, crash_test, rigid_wall_test, statements
 from boulder_sweep.crash_tests.rigid_wall import RigidWall
-from boulder_sweep.crash_tests.validation import Validation
 from boulder_sweep.impact.simulation import simulate
 from tests.conftest import Command
 from tests.oracle.vehicle import WallImpact
