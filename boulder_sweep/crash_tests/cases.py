@@ -306,7 +306,7 @@ def validate(out: str | Path | None = None) -> Validation:
     Parameters
     ----------
     out
-        Folder for pictures and Parquet files; nothing is written without one.
+        Folder for pictures and time histories; nothing is written without one.
 
     Raises
     ------
