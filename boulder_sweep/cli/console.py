@@ -11,7 +11,7 @@ from boulder_sweep.columns import BY_NAME, VERDICTS, WAY_OUT
 from boulder_sweep.settings.fields import TO_BE_FOUND
 from boulder_sweep.settings.model import FOOT_WORDS, RESISTANCES
 from boulder_sweep.settings.shown_units import ShownColumn, shown_column, shown_settings, shown_unit
-from boulder_sweep.stones.taped import ROCK_KG_M3
+from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.text import counted, duration_text, size_text
 
 if TYPE_CHECKING:

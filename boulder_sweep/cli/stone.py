@@ -25,7 +25,7 @@ from boulder_sweep.cli.options import (
     set_option,
 )
 from boulder_sweep.cli.output import say, show, working
-from boulder_sweep.stones.taped import ROCK_KG_M3
+from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.text import counted
 
 if TYPE_CHECKING:

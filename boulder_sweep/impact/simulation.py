@@ -28,7 +28,7 @@ from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.fields import FIELDS
 from boulder_sweep.settings.model import Model, ReadingChoice, SolverSettings
-from boulder_sweep.stones.taped import ROCK_KG_M3
+from boulder_sweep.stones.rock import ROCK_KG_M3
 
 __all__ = ["Trajectory", "simulate"]
 

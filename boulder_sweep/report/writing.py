@@ -30,7 +30,7 @@ from boulder_sweep.settings.model import FOOT_WORDS, SolverSettings
 from boulder_sweep.settings.shown_units import check_system, quantity_text
 from boulder_sweep.settings.sweep import NO_HEADING, SECTION, Heading, derived_words, units_in, wrong_with
 from boulder_sweep.signals import end_group, undone
-from boulder_sweep.stones.taped import ROCK_KG_M3
+from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.store.folder import check_target
 from boulder_sweep.store.provenance import identity as identity_of
 from boulder_sweep.store.provenance import versions

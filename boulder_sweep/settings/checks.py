@@ -22,7 +22,7 @@ from boulder_sweep.settings.model import WATER_KG_M3, Layer, Model, SolverSettin
 from boulder_sweep.settings.problems import Position, Problem
 from boulder_sweep.settings.sweep import Sweep
 from boulder_sweep.settings.values import is_unusual, range_words
-from boulder_sweep.stones.taped import ROCK_KG_M3
+from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.text import counted
 
 SLIDES = "or the ground slides"

@@ -58,7 +58,7 @@ from boulder_sweep.settings.values import (
     split_number,
 )
 from boulder_sweep.settings.vehicle import APPROACH, unfold_approaches
-from boulder_sweep.stones.taped import ROCKS
+from boulder_sweep.stones.rock import ROCKS
 
 NAMED_SETS = ("soil", "vehicle")
 """Blocks that may be a list of named sets."""

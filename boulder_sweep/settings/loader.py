@@ -36,7 +36,7 @@ from boulder_sweep.settings.shown_units import SYSTEMS
 from boulder_sweep.settings.sweep import SECTION, UNITS, Axis, Heading, Sweep, wrong_with
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, parse, parse_node
 from boulder_sweep.settings.tree import Sequence as List
-from boulder_sweep.stones.taped import ROCK_KG_M3
+from boulder_sweep.stones.rock import ROCK_KG_M3
 
 MAX_DESIGNS = 2**63 - 1
 """Most designs of a sweep: ``design_id`` is a 64-bit number."""

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from boulder_sweep.columns import RATINGS
 from boulder_sweep.settings.shape import ProfilePoint, Scan, Shape, tapered
-from boulder_sweep.stones.taped import ROCKS
+from boulder_sweep.stones.rock import ROCKS
 
 PRESETS = ("as_printed", "corrected")
 

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import Any
 
-from boulder_sweep.stones.taped import is_flat
+from boulder_sweep.stones.rock import is_flat
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ import numpy as np
 
 from boulder_sweep.errors import ScanError
 from boulder_sweep.stones.profiles import Profile, Sections, doubled_share, fitted, sections_of, sides_of
-from boulder_sweep.stones.taped import LEAST_FOOT, is_flat
+from boulder_sweep.stones.rock import LEAST_FOOT, is_flat
 
 if TYPE_CHECKING:
     from boulder_sweep.stones.solid import Solid

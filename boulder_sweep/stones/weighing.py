@@ -11,9 +11,9 @@ from typing import Any
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import ScanError
 from boulder_sweep.stones.reading import read_scan
+from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.stones.solid import solid_of
 from boulder_sweep.stones.standing import Standing, Stone
-from boulder_sweep.stones.taped import ROCK_KG_M3
 
 POINT = ("height_m", "width_m", "near_m", "far_m")
 """Entries of a point of a profile."""

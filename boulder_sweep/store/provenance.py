@@ -35,7 +35,7 @@ _DECIDING_SOURCES = (
     "investigation.py",
     "judge/*.py",
     *(f"settings/{name}.py" for name in ("distributions", "fields", "model", "shape")),
-    "stones/taped.py",
+    *(f"stones/{name}.py" for name in ("rock", "taped")),
 )
 """Modules, in addition to the kernels, whose code determines the rows: of settings and stones what others import."""
 _JSON = {"format", "settings", "readings", "control", "accuracy", "versions"} | {

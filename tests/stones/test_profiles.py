@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from boulder_sweep.errors import ScanError
 from boulder_sweep.stones.profiles import MOST_PIECES, doubled_share, fitted, sections_of, sides_of
+from boulder_sweep.stones.rock import LEAST_FOOT
 from boulder_sweep.stones.standing import MOST_CUT, Stone, has_foot, smallest_box
-from boulder_sweep.stones.taped import LEAST_FOOT
 from tests.stones.shapes import box, cylinder, frustum, rock, solid, sphere, stone
 from tests.stones.test_solid import moved
 
