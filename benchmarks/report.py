@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 FOLDER = Path(__file__).parent
-FIGURES = FOLDER / "figures"
 README = FOLDER / "README.md"
 
 

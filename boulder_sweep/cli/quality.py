@@ -152,7 +152,7 @@ Empty cells are gaps in a track.
 @click.command(
     "validate", short_help="The paper's crash tests against what the paper states.", epilog=VALIDATE_EXAMPLES
 )
-@click.option("-o", "--output", "out", type=OUTPUT, metavar="DIR", help="Folder for pictures and Parquet files.")
+@click.option("-o", "--output", "out", type=OUTPUT, metavar="DIR", help="Folder for pictures and time histories.")
 @click.option(
     "--measured", type=click.Path(), metavar="FILE.csv", help="Your own test data, drawn over the simulation."
 )
@@ -169,8 +169,8 @@ def validate(out: str | None, measured: str | None, case: str | None, as_json: b
     """
     if (measured is None) != (case is None):
         raise click.UsageError("--measured FILE.csv and --case abg|rwg|CASE.yaml go together")
-    from boulder_sweep.crash_tests.validation import NOT_COMPARED
-    from boulder_sweep.crash_tests.validation import validate as run_validation
+    from boulder_sweep.crash_tests.cases import NOT_COMPARED
+    from boulder_sweep.crash_tests.cases import validate as run_validation
 
     tested = None
     if measured is not None and case is not None:

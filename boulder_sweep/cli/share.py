@@ -76,8 +76,7 @@ def plot(out: str, picture: str | None, at: tuple[str, ...], units: str | None, 
     from boulder_sweep.report.rows import read_rows
     from boulder_sweep.settings.sweep import units_in
     from boulder_sweep.views.pictures import checked_kind, require_matplotlib
-    from boulder_sweep.views.slices import finished_pieces
-    from boulder_sweep.views.verdict_map import draw_verdict_map
+    from boulder_sweep.views.verdict_map import draw_verdict_map, finished_pieces
     from boulder_sweep.views.wording import terms_line
 
     require_matplotlib()

@@ -22,7 +22,7 @@ from boulder_kernels.dynamics import (
 )
 from boulder_kernels.outcomes import StoredEnergies, evaluate_samples
 from boulder_kernels.pieces import ManyPieces, Piece
-from boulder_kernels.soil import drag_force, soil_kinematics, spring_force
+from boulder_kernels.soil import soil_kinematics
 
 MODE_NAMES = {
     SEATED: "seated",
@@ -170,23 +170,16 @@ def soil_profile(motion: Motion, sample: int, slices: int) -> SoilForces:
     versine = 2.0 * np.sin(0.5 * theta) ** 2
     k = soil_kinematics(x_b, v_b, omega, float(np.sin(theta)), float(versine), c)
     ratio = (np.arange(slices) + 0.5) / slices
-    displacement = k.A - k.slope_x * ratio
-    velocity = k.B - k.slope_v * ratio
-    if not isinstance(c, Constants):
-        pressed = _pressed_at(ratio, displacement, velocity, c) / slices
-        return SoilForces(ratio * c.d, -pressed)
-    height = c.d / slices
-    force = [
-        -(spring_force(float(u), float(r * c.d), height, c) + drag_force(float(v), height, c))
-        for u, v, r in zip(displacement, velocity, ratio, strict=True)
-    ]
-    return SoilForces(ratio * c.d, np.array(force))
+    pressed = _pressed_at(ratio, k.A - k.slope_x * ratio, k.B - k.slope_v * ratio, c)
+    return SoilForces(ratio * c.d, -pressed / slices)
 
 
 def _pressed_at(ratio: np.ndarray, displacement: np.ndarray, velocity: np.ndarray, c: Any) -> np.ndarray:
-    """What pieces or elements press with at ratios of the depth, per ratio [N]; of elements, those they lie in."""
-    soil = c.soil
-    if isinstance(soil, ManyPieces):
+    """What the soil presses with at ratios of the depth, per ratio [N]; of elements, those they lie in."""
+    if isinstance(c, Constants):
+        spring, drag = c.K_soil * ratio, np.full_like(ratio, c.R_soil)
+        ultimate = spring * c.x_yield
+    elif isinstance(soil := c.soil, ManyPieces):
         p = Piece(*soil.pieces[np.searchsorted(soil.pieces[:, Piece._fields.index("to")], ratio)].T)
         width = np.asarray(p.w_0 + p.w_1 * ratio)
         spring, ultimate, drag = p.K * ratio * width, (p.P_0 + p.P_1 * ratio) * width, p.R * width

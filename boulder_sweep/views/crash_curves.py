@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boulder_sweep.crash_tests.cases import CLOSE_UNTIL_S, NAMES, PAPERS_N
+from boulder_sweep.crash_tests.cases import CLOSE_UNTIL_S, NAMES
 from boulder_sweep.crash_tests.measured import PULSE_UNITS
 from boulder_sweep.crash_tests.overlay import simulated_signal
 from boulder_sweep.locations import replacing
@@ -20,11 +20,10 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from boulder_sweep.crash_tests.cases import Convergence
+    from boulder_sweep.crash_tests.cases import Validation
     from boulder_sweep.crash_tests.fitting import VehicleFit
     from boulder_sweep.crash_tests.measured import TimeHistory
     from boulder_sweep.crash_tests.rigid_wall import RigidWall
-    from boulder_sweep.crash_tests.validation import Validation
     from boulder_sweep.impact.trajectory import Trajectory
 
 
@@ -43,7 +42,7 @@ FIGURES = {"abg": ("12 to 14", "figures_12_to_14_abg.png"), "rwg": ("16 to 18", 
 
 
 def write_validation(result: Validation, folder: Path) -> list[Path]:
-    """Write pictures and Parquet files of `validate` into a folder, which is made, and return the files."""
+    """Write the pictures and the time histories of `validate` into a folder, which is made, and return the files."""
     pictures.require_matplotlib()
     pictures.make_folder(folder)
     written = [folder / "figure_10_rigid_wall.png"]
@@ -52,9 +51,9 @@ def write_validation(result: Validation, folder: Path) -> list[Path]:
         by_preset = {preset: t for (t_name, preset), t in result.trajectories.items() if t_name == test}
         draw_crash_test(test, by_preset, folder / name)
         written.append(folder / name)
-    draw_convergence(result.convergence, folder / "convergence.png")
-    written.append(folder / "convergence.png")
-    return [*written, *_write_tables(result, folder)]
+    written.append(folder / "trajectories.parquet")
+    _write_histories(result, written[-1])
+    return written
 
 
 def draw_crash_test(
@@ -146,42 +145,11 @@ def draw_rigid_wall(wall: RigidWall, path: Path) -> None:
         pictures.headline(fig, words, size=11.0)
 
 
-def draw_convergence(study: Convergence, path: Path) -> None:
-    """Draw how element sums approach the closed form."""
-    with pictures.figure(path, 6.4, 4.0) as fig:
-        axes = fig.subplots()
-        for preset, style in STYLES.items():
-            n = np.array([n for n in study.elements if study.difference("rwg", preset, n) != 0.0])
-            gap = [abs(study.difference("rwg", preset, int(count))) for count in n]
-            order = study.order("rwg", preset)
-            words = f"{preset.replace('_', ' ')}: order {order:.1f}"
-            axes.loglog(n, gap, marker="o", markersize=4.5, label=words, **style)
-        axes.axvline(PAPERS_N, color=GREY, linewidth=0.9, linestyle=":")
-        axes.annotate("N of the paper", (PAPERS_N, axes.get_ylim()[1]), fontsize=8.5, color=GREY, ha="right", va="top")
-        axes.set_xlabel("number N of soil elements")
-        axes.set_ylabel("|largest rotation − closed form| [deg]")
-        axes.set_title("Rockville White Granite: element sums against N → ∞")
-        axes.legend()
-
-
-def _write_tables(result: Validation, folder: Path) -> list[Path]:
-    """Write figures, statements, convergence and time histories to Parquet files."""
-    import pandas as pd
+def _write_histories(result: Validation, path: Path) -> None:
+    """Write all time histories to a Parquet file."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    content = result.to_dict()
-    flat = [{k: v for k, v in row.items() if k != "readings"} for row in content["crash_tests"]]
-    frames = {
-        "crash_tests.parquet": pd.DataFrame(flat),
-        "statements.parquet": pd.DataFrame(content["statements"]),
-        "convergence.parquet": pd.DataFrame(content["convergence"]["elements"]).astype({"soil_elements": str}),
-    }
-    written = []
-    for name, frame in frames.items():
-        with replacing(folder / name) as file:
-            frame.to_parquet(file)
-        written.append(folder / name)
     parts = []
     for (test, preset), trajectory in result.trajectories.items():
         part = trajectory.to_arrow(energy=True).replace_schema_metadata(None)
@@ -189,9 +157,8 @@ def _write_tables(result: Validation, folder: Path) -> list[Path]:
             words = pa.array([text] * len(part)).dictionary_encode()
             part = part.add_column(0, pa.field(column, words.type, metadata={"unit": ""}), words)
         parts.append(part)
-    with replacing(folder / "trajectories.parquet") as file:
+    with replacing(path) as file:
         pq.write_table(pa.concat_tables(parts).unify_dictionaries(), file, compression="zstd")
-    return [*written, folder / "trajectories.parquet"]
 
 
 ORDER = ("displacement", "velocity", "acceleration")

@@ -10,7 +10,7 @@ import numpy as np
 
 from boulder_sweep.errors import PictureError
 from boulder_sweep.views.pictures import BLACK, BLUE, GREY, caption, figure, headline
-from boulder_sweep.views.scene import STYLES
+from boulder_sweep.views.side_view import STYLES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,4 +1,4 @@
-"""Pages of the documentation site: those of `docs`, others of the repository, and what is made from the code.
+"""Pages of the documentation site: from `docs`, from elsewhere in the repository, and made from the code.
 
 The quick start is the README of the repository; benchmarks, changelog and contributing guide are taken from where
 they are. Reference pages are made from the code, tutorials from the notebooks with the output they were committed with.

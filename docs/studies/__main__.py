@@ -13,7 +13,7 @@ from docs.studies.example_pulse import example_pulse
 from docs.studies.example_rock import example_rock
 from docs.studies.json_schema import FILE as SCHEMA
 from docs.studies.json_schema import text as schema_text
-from docs.studies.pictures import draw_all
+from docs.studies.pictures import draw_all, opened_chromium
 
 PULSE = Path("docs/examples/rigid_wall_pulse.csv")
 ROCK = Path("docs/examples/rock.ply")
@@ -54,7 +54,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         (root / path).write_text(text(), encoding="utf-8")
     changed = write(root, compute(root))
     if not asked.no_pictures:
-        changed += draw_all(root)
+        with opened_chromium() as chromium:
+            changed += draw_all(root, chromium)
     print("\n".join(str(path) for path in changed) or "nothing changed")
     return 0
 

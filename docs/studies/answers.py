@@ -1,7 +1,9 @@
-"""Answers shown in the documentation."""
+"""What commands print for the files of the documentation, and what a partial factor is worth."""
 
 from __future__ import annotations
 
+import tempfile
+import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +13,20 @@ from boulder_sweep import load, need, uncertainty
 from boulder_sweep.answers.advice import Again
 from boulder_sweep.answers.printing import need_lines, reserve_lines, uncertainty_lines
 from boulder_sweep.answers.reserves import capacity
+from boulder_sweep.cli.quality import fit_lines
+from boulder_sweep.crash_tests.fitting import fit_pulse
+from boulder_sweep.crash_tests.measured import read_pulse
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.distributions import Distribution, SetDistributions
-from boulder_sweep.settings.sweep import DesignList
+from boulder_sweep.settings.sweep import DesignList, derived_words
+from boulder_sweep.views.log_text import log_lines
+from docs.studies.example_pulse import example_pulse
 
 SITE = Path("configs/site.yaml")
 GRID = Path("configs/m30_sizing.yaml")
 UNCERTAIN = Path("configs/uncertain_site.yaml")
+BOREHOLE, BOREHOLE_LOG = Path("configs/borehole.yaml"), Path("configs/borehole_log.yaml")
 FACTORS = (1.0, 1.05, 1.1, 1.15, 1.2, 1.25)
 TARGETS = (0.9, 0.95)
 """Chances for which a factor is told."""
@@ -85,3 +93,23 @@ def chances_with_factor(root: Path, factor: float) -> np.ndarray:
 
 def _fenced(lines: list[str]) -> str:
     return "\n".join(["```text", *lines, "```"])
+
+
+def notes_of_borehole(root: Path) -> str:
+    """Return how the inputs of the example follow, as every command prints it."""
+    notes = (f"note: {words}" for words in derived_words(load(root / BOREHOLE).derived))
+    return _fenced([line for note in notes for line in textwrap.wrap(note, 80, subsequent_indent="  ")])
+
+
+def drawing_of_log(root: Path) -> str:
+    """Return the log of the example as `sweep check` draws it."""
+    (log,) = load(root / BOREHOLE_LOG).derived["soil"]
+    return _fenced(log_lines(log))
+
+
+def vehicle_fit(_: Path) -> str:
+    """Return what ``sweep fit-vehicle`` prints for the example."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "pulse.csv"
+        file.write_text(example_pulse(), encoding="utf-8")
+        return _fenced(fit_lines(fit_pulse(read_pulse(file), 6800.0)))

@@ -7,10 +7,9 @@ from functools import cache
 from pathlib import Path
 
 from benchmarks.grades import grades, grades_table
-from boulder_sweep.crash_tests.cases import statement_table
+from boulder_sweep.crash_tests.cases import Validation, statement_table, validate
 from boulder_sweep.crash_tests.tables import Table
-from boulder_sweep.crash_tests.validation import Validation, validate
-from docs.site.settings_tables import bounds_of_flags
+from docs.site.reference import bounds_of_flags
 from docs.studies import (
     against_tests,
     answers,
@@ -21,10 +20,8 @@ from docs.studies import (
     knife_edge,
     one_face,
     readings,
-    site_data,
     soil,
     taped,
-    vehicle,
     wild,
 )
 
@@ -61,7 +58,7 @@ CONTENTS: dict[str, Callable[[Path], str | Table]] = {
     "readings-words": lambda root: readings.readings_words(readings_of_grid(root)),
     "energy-balance": lambda _: energy.balance_table(_balances()),
     "energy-audit": lambda _: energy.audit_words(),
-    "vehicle-fit": vehicle.fit_text,
+    "vehicle-fit": answers.vehicle_fit,
     "knife-edge": lambda _: knife_edge.knife_edge_words(),
     "box-shares": lambda _: extremes.box_words(),
     "validity-flags": lambda _: bounds_of_flags(),
@@ -85,8 +82,8 @@ CONTENTS: dict[str, Callable[[Path], str | Table]] = {
     "rocks": lambda _: taped.rocks_table(),
     "taped-stones": lambda root: taped.taped_table(root / GRID),
     "taped-words": lambda root: taped.taped_words(root / GRID),
-    "borehole-notes": site_data.notes_of_borehole,
-    "log-drawing": site_data.drawing_of_log,
+    "borehole-notes": answers.notes_of_borehole,
+    "log-drawing": answers.drawing_of_log,
 }
 """Function of every block by its name."""
 

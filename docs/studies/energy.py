@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from boulder_kernels import Control, Readings, Record, as_printed, constants_of, corrected, simulate_design
 from boulder_sweep.crash_tests.cases import NAMES, crash_test
 from boulder_sweep.crash_tests.tables import Table
-from boulder_sweep.impact.history import EnergyLedger, Motion, ledger_of
+from boulder_sweep.impact.history import Motion, ledger_of
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.accuracy import Steps, accuracy_of
 from boulder_sweep.settings.model import Model, ReadingChoice, SolverSettings
@@ -33,63 +33,43 @@ AUDIT_HORIZON_S = 0.5
 PRESETS: dict[str, Readings] = {"as_printed": as_printed(), "corrected": corrected()}
 
 
-@dataclass(frozen=True, eq=False)
-class Balance:
-    """The ledger of one crash test at one instant.
+class Balance(NamedTuple):
+    """The ledger of one crash test at one instant."""
 
-    Attributes
-    ----------
-    test : str
-        ``abg`` or ``rwg``.
-    when : str
-        Which instant, in words.
-    time_s : float
-        The instant.
-    parts_J : dict of str to float
-        Energies by part.
-    initial_J : float
-        Energy of the vehicle at first touch.
-    """
-
-    test: str
-    when: str
-    time_s: float
+    title: str
+    """Name of the test and the instant, in words."""
     parts_J: dict[str, float]
+    """Energies by part."""
     initial_J: float
+    """Energy of the vehicle at first touch."""
 
 
 def balances() -> list[Balance]:
     """Return the ledgers of both crash tests, corrected, at the instant that decides each."""
     found = []
-    for test in NAMES:
+    for test, name in NAMES.items():
         trajectory = simulate(crash_test(test), readings="corrected")
-        limit = trajectory.motion.outcome.t_limit
-        settled = math.isnan(limit)
-        time, when = (
-            (trajectory.motion.outcome.maxima.t_theta, "largest rotation") if settled else (limit, "20° passed")
-        )
-        found.append(_balance(test, when, time, trajectory.energy()))
+        outcome, ledger = trajectory.motion.outcome, trajectory.energy()
+        time, when = outcome.t_limit, "20° passed"
+        if math.isnan(time):
+            time, when = outcome.maxima.t_theta, "largest rotation"
+        parts = {part: float(np.interp(time, ledger.time_s, getattr(ledger, part))) for part, _ in PARTS}
+        found.append(Balance(f"{name} at {time:.3f} s ({when})", parts, ledger.initial))
     return found
 
 
 def balance_table(found: list[Balance]) -> Table:
     """Return the ledgers as a table."""
-    head = ["energy in"]
-    for balance in found:
-        head += [f"{NAMES[balance.test]} at {balance.time_s:.3f} s ({balance.when}) [kJ]", "share"]
-    table = Table(tuple(head))
+    head = (cell for balance in found for cell in (f"{balance.title} [kJ]", "share"))
+    table = Table(("energy in", *head))
+
+    def add(words: str, values_J: list[float]) -> None:
+        shares = zip(values_J, found, strict=True)
+        table.add(words, *(c for value, of in shares for c in (f"{value / 1e3:.1f}", f"{value / of.initial_J:.1%}")))
+
     for name, words in PARTS:
-        cells = [words]
-        for balance in found:
-            cells += [f"{balance.parts_J[name] / 1e3:.1f}", f"{balance.parts_J[name] / balance.initial_J:.1%}"]
-        table.add(*cells)
-    sums = []
-    for balance in found:
-        sums += [
-            f"{sum(balance.parts_J.values()) / 1e3:.1f}",
-            f"{sum(balance.parts_J.values()) / balance.initial_J:.1%}",
-        ]
-    table.add("sum", *sums)
+        add(words, [balance.parts_J[name] for balance in found])
+    add("sum", [sum(balance.parts_J.values()) for balance in found])
     return table
 
 
@@ -146,12 +126,6 @@ def reported_steps(accuracy: str, preset: str) -> Steps:
     sweep = dataclasses.replace(crash_test("rwg"), model=model, solver=solver)
     chosen = accuracy_of(sweep)
     return Steps(float(chosen.to_dict()["reported_step_s"]), chosen.steps.locate_yield)
-
-
-def _balance(test: str, when: str, time_s: float, ledger: EnergyLedger) -> Balance:
-    """Read a ledger at an instant."""
-    parts = {name: float(np.interp(time_s, ledger.time_s, getattr(ledger, name))) for name, _ in PARTS}
-    return Balance(test, when, time_s, parts, ledger.initial)
 
 
 def _blank_record() -> Record:

@@ -3,19 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from boulder_kernels import (
-    Control,
-    Design,
-    DesignTable,
-    Readings,
-    as_printed,
-    simulate_table,
-)
-from docs.studies.coverage import HORIZON_S, LIMIT
+from boulder_kernels import Control, Design, DesignTable, Readings, as_printed, simulate_table
+from docs.studies.wild import HORIZON_S, LIMIT
 
 EXAMPLE = Design(
     L=1.52,
@@ -40,26 +33,13 @@ SPAN = 0.02
 STEP_S = 2.5e-4
 
 
-@dataclass(frozen=True, eq=False)
-class KnifeEdge:
-    """Rotation of the example over the speed of impact.
+class KnifeEdge(NamedTuple):
+    """Largest rotations of the example over the speed of impact [deg], and where they jump."""
 
-    Attributes
-    ----------
-    speeds_m_s, rotations_deg : ndarray
-        Speeds of impact, and the largest rotation at each.
-    edge_m_s : float
-        Speed at which the rotation jumps.
-    width_m_s : float
-        How narrowly it was located.
-    below_deg, above_deg : float
-        Largest rotation just below and just above it.
-    """
-
-    speeds_m_s: np.ndarray
     rotations_deg: np.ndarray
     edge_m_s: float
     width_m_s: float
+    """How narrowly the jump was located."""
     below_deg: float
     above_deg: float
 
@@ -76,14 +56,8 @@ def knife_edge(readings: Readings | None = None) -> KnifeEdge:
         at = np.linspace(at[place], at[place + 1], 201)
         values = rotations_deg(at, readings)
     place = int(np.argmax(np.abs(np.diff(values))))
-    return KnifeEdge(
-        speeds,
-        rotations,
-        float(at[place]),
-        float(at[place + 1] - at[place]),
-        float(values[place]),
-        float(values[place + 1]),
-    )
+    edge, beyond = at[place : place + 2].tolist()
+    return KnifeEdge(rotations, edge, beyond - edge, *values[place : place + 2].tolist())
 
 
 def rotations_deg(speeds_m_s: np.ndarray, readings: Readings, step_s: float = STEP_S) -> np.ndarray:

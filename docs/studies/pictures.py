@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from PIL import Image
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import Browser, sync_playwright
 
 from boulder_sweep import load, need, read, run, uncertainty
-from boulder_sweep.crash_tests.cases import crash_test
+from boulder_sweep.crash_tests.cases import crash_test, validate
 from boulder_sweep.crash_tests.fitting import fit_pulse
 from boulder_sweep.crash_tests.measured import read_pulse
-from boulder_sweep.crash_tests.validation import validate
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.report import write_report
 from boulder_sweep.report.writing import browser
@@ -36,13 +37,15 @@ MARGIN = 20
 """Beside a photographed sheet [px]."""
 
 
-def draw_all(root: Path) -> list[Path]:
+def draw_all(root: Path, chromium: Browser) -> list[Path]:
     """Draw every picture of the documentation.
 
     Parameters
     ----------
     root
         Folder of the repository.
+    chromium
+        Photographs the report. Given, because Playwright runs only once in a process.
 
     Returns
     -------
@@ -79,32 +82,39 @@ def draw_all(root: Path) -> list[Path]:
         draw_verdict_map(table, named("m30_sizing.png"), title=sweep.name, terms=terms)
         need(load(root / SITE)).write(Path(scratch) / "site.parquet")
         page = write_report(Path(scratch) / "site.parquet", Path(scratch) / "page.html", units="si", heading=HEADING)
-        photograph(page, named("report_site.png"))
+        photograph(chromium, page, named("report_site.png"))
     for path in drawn:
         if path.name != FILM:
             reduce_colours(path)
     return sorted(drawn)
 
 
-def photograph(page: Path, picture: Path) -> None:
-    """Take a picture of the first sheet of a page as it is printed, but for the footer."""
+@contextmanager
+def opened_chromium() -> Iterator[Browser]:
+    """Open the browser that the reports are printed with."""
     sandbox = [] if getattr(os, "geteuid", lambda: 1)() else ["--no-sandbox"]
     with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=browser(), args=sandbox)
-        tab = opened.new_page(viewport={"width": 1200, "height": 900}, device_scale_factor=1.5, color_scheme="light")
-        tab.goto(page.resolve().as_uri())
-        tab.wait_for_selector("html[data-ready]", state="attached")
-        tab.evaluate("dispatchEvent(new Event('beforeprint'))")
-        tab.emulate_media(media="print")
-        tab.evaluate(f"document.body.style.paddingTop = '{2 * MARGIN}px'")
-        code = """(margin) => {
-          const places = ["header", ".sheet"].map((place) => document.querySelector(place));
-          const [head, sheet] = places.map((place) => place.getBoundingClientRect());
-          const [x, y] = [head.left - margin, head.top - margin];
-          return { x, y, width: sheet.width + 2 * margin, height: sheet.bottom + margin - y };
-        }"""
-        tab.screenshot(path=picture, full_page=True, clip=tab.evaluate(code, MARGIN))
-        opened.close()
+        chromium = playwright.chromium.launch(executable_path=browser(), args=sandbox)
+        yield chromium
+        chromium.close()
+
+
+def photograph(chromium: Browser, page: Path, picture: Path) -> None:
+    """Take a picture of the first sheet of a page as it is printed, but for the footer."""
+    tab = chromium.new_page(viewport={"width": 1200, "height": 900}, device_scale_factor=1.5, color_scheme="light")
+    tab.goto(page.resolve().as_uri())
+    tab.wait_for_selector("html[data-ready]", state="attached")
+    tab.evaluate("dispatchEvent(new Event('beforeprint'))")
+    tab.emulate_media(media="print")
+    tab.evaluate(f"document.body.style.paddingTop = '{2 * MARGIN}px'")
+    code = """(margin) => {
+      const places = ["header", ".sheet"].map((place) => document.querySelector(place));
+      const [head, sheet] = places.map((place) => place.getBoundingClientRect());
+      const [x, y] = [head.left - margin, head.top - margin];
+      return { x, y, width: sheet.width + 2 * margin, height: sheet.bottom + margin - y };
+    }"""
+    tab.screenshot(path=picture, full_page=True, clip=tab.evaluate(code, MARGIN))
+    tab.close()
 
 
 def reduce_colours(path: Path) -> None:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from boulder_kernels import Design
+from boulder_kernels import Design, DesignTable
 from boulder_sweep.designs import impact_height_of_face
 
 RANGES = {
@@ -52,3 +52,9 @@ def random_designs(count: int, seed: int = 0) -> list[Design]:
         e = float(impact_height_of_face(draw["H"], d, draw["e_bumper"], hood))
         found.append(Design(**draw, d=d, phi=phi, e=e))
     return found
+
+
+def random_table(count: int, seed: int) -> DesignTable:
+    """Return random realistic designs as columns."""
+    designs = random_designs(count, seed)
+    return DesignTable(*(np.array(column, dtype=float) for column in zip(*designs, strict=True)))

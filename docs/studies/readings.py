@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
+from boulder_sweep.answers.advice import listed
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.accuracy import accuracy_of
@@ -20,75 +21,26 @@ from boulder_sweep.settings.model import PRESETS, PRINTED, SWITCHES, ReadingChoi
 from docs.studies.documents import points
 
 BLOCK = 32_768
-EQUATIONS = {
-    "inertia": "16",
-    "impact_arm": "5, 6",
-    "contact": "45, 48, 52",
-    "restoring": "37–39",
-    "separation": "47",
-}
-"""Equations that each switch belongs to."""
 
 
-@dataclass(frozen=True)
-class ReadingRow:
-    """Results under one choice of readings.
-
-    Attributes
-    ----------
-    base : str
-        Preset it starts from.
-    switch : str
-        The one reading that differs from it; empty for the preset itself.
-    abg_verdict, rwg_verdict : str
-        Verdicts of the crash tests, reason included.
-    abg_time_to_limit_s : float
-        When American Black Granite passes 20 deg; NaN where never.
-    rwg_rotation_deg, rwg_displacement_m : float
-        Largest rotation and x_b of Rockville White Granite.
-    stands : ndarray of bool, shape (n,)
-        Which designs of the grid stand up to the horizon.
-    """
+class ReadingRow(NamedTuple):
+    """Results under one choice of readings."""
 
     base: str
+    """Preset it starts from."""
     switch: str
+    """The one reading that differs from it; empty for the preset itself."""
     abg_verdict: str
-    rwg_verdict: str
-    abg_time_to_limit_s: float
+    """Verdict of American Black Granite, reason included."""
     rwg_rotation_deg: float
-    rwg_displacement_m: float
+    """Largest rotation of Rockville White Granite."""
     stands: np.ndarray
-
-    @property
-    def share(self) -> float:
-        """Share of the grid that stands."""
-        return float(self.stands.mean())
-
-    @property
-    def label(self) -> str:
-        """Name of the row."""
-        if not self.switch:
-            return f"**{self.base}**"
-        other = SWITCHES[self.switch] if self.base == "as_printed" else PRINTED
-        return f"{self.switch}: {other}"
+    """Which designs of the grid stand up to the horizon, bool, shape (n,)."""
 
 
-@dataclass(frozen=True)
-class ReadingsStudy:
-    """Results under both presets and under every single change of them.
+class ReadingsStudy(NamedTuple):
+    """Results under both presets, each followed by its five single changes."""
 
-    Attributes
-    ----------
-    grid : str
-        Name of the grid.
-    every : int
-        Every so many-th of its designs was simulated.
-    rows : list of ReadingRow
-        Each preset, followed by its five single changes.
-    """
-
-    grid: str
-    every: int
     rows: list[ReadingRow]
 
     def row(self, base: str, switch: str = "") -> ReadingRow:
@@ -123,7 +75,7 @@ def choices() -> list[tuple[str, str, ReadingChoice]]:
     return found
 
 
-def readings_study(grid: Sweep | str | Path, every: int = 1) -> ReadingsStudy:
+def readings_study(grid: Path, every: int = 1) -> ReadingsStudy:
     """Simulate both crash tests and a whole grid under both presets and every single change of them.
 
     Parameters
@@ -133,24 +85,13 @@ def readings_study(grid: Sweep | str | Path, every: int = 1) -> ReadingsStudy:
     every
         Simulate only every so many-th design of the grid.
     """
-    sweep = grid if isinstance(grid, Sweep) else load(grid)
-    rows = []
+    sweep, rows = load(grid), []
     for base, switch, choice in choices():
         abg, rwg = (simulate(crash_test(test), readings=choice) for test in ("abg", "rwg"))
-        outcome = rwg.motion.outcome.maxima
-        rows.append(
-            ReadingRow(
-                base=base,
-                switch=switch,
-                abg_verdict=_verdict(abg.verdict, abg.reason),
-                rwg_verdict=_verdict(rwg.verdict, rwg.reason),
-                abg_time_to_limit_s=abg.motion.outcome.t_limit,
-                rwg_rotation_deg=math.degrees(outcome.theta),
-                rwg_displacement_m=outcome.x_b,
-                stands=standing(sweep, choice, every),
-            )
-        )
-    return ReadingsStudy(sweep.name, every, rows)
+        verdict = ", ".join(word for word in (abg.verdict, abg.reason) if word)
+        rotation = math.degrees(rwg.motion.outcome.maxima.theta)
+        rows.append(ReadingRow(base, switch, verdict, rotation, standing(sweep, choice, every)))
+    return ReadingsStudy(rows)
 
 
 def standing(sweep: Sweep, choice: ReadingChoice, every: int = 1) -> np.ndarray:
@@ -180,10 +121,6 @@ def standing(sweep: Sweep, choice: ReadingChoice, every: int = 1) -> np.ndarray:
         here[computable] = (found.verdict == PASS) | (found.reason == HORIZON)
         stands.append(here[chosen])
     return np.concatenate(stands)
-
-
-def _verdict(verdict: str, reason: str) -> str:
-    return f"{verdict}, {reason}" if reason else verdict
 
 
 def readings_words(study: ReadingsStudy) -> str:
@@ -218,18 +155,19 @@ def _preset_words(printed: ReadingRow, corrected: ReadingRow, designs: int) -> s
     unsafe = int((printed.stands & ~corrected.stands).sum())
     lost = int((corrected.stands & ~printed.stands).sum())
     return (
-        f"About as many designs stand by both presets, {printed.share:.1%} as printed and {corrected.share:.1%} "
-        f"corrected, because the misprints partly cancel; but they are not the same designs. {unsafe / designs:.1%} "
-        f"of all stand as printed and not corrected, {lost / designs:.1%} corrected and not as printed."
+        f"About as many designs stand by both presets, {printed.stands.mean():.1%} as printed and "
+        f"{corrected.stands.mean():.1%} corrected, because the misprints partly cancel; but they are not the same "
+        f"designs. {unsafe / designs:.1%} of all stand as printed and not corrected, {lost / designs:.1%} corrected "
+        "and not as printed."
     )
 
 
 def _strictness_words(study: ReadingsStudy) -> str:
     """Which misprints are on the safe side."""
     rows = {switch: study.changed(study.row("corrected", switch)) for switch in SWITCHES}
-    safe = [f"`{switch}`" for switch, (gained, _) in rows.items() if gained == 0]
-    lax = [f"`{switch}`" for switch, (gained, lost) in rows.items() if gained > lost]
+    safe = tuple(f"`{switch}`" for switch, (gained, _) in rows.items() if gained == 0)
+    lax = tuple(f"`{switch}`" for switch, (gained, lost) in rows.items() if gained > lost)
     return (
-        f"One printed formula among corrected ones is safe for {', '.join(safe) or 'none'}, as only fewer designs "
-        f"stand, and unsafe for {', '.join(lax) or 'none'}, as more stand than fall."
+        f"A single printed formula among corrected ones is safe for {listed(safe)}, because fewer designs stand, "
+        f"and unsafe for {listed(lax)}, because more do."
     )

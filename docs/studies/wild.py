@@ -9,25 +9,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from boulder_kernels import Control, DesignTable, OutcomeTable, Status, corrected, simulate_table
+from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, Status, corrected, simulate_table
 from boulder_kernels.control import EVENT_TOLERANCE
 from boulder_kernels.table import some_rows
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.designs import impact_height_of_face
 from boulder_sweep.judge.accuracy import LONGEST_HORIZON, STEPS, Steps, accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
-from boulder_sweep.judge.inputs import Designs
+from boulder_sweep.judge.inputs import Designs, sampled_designs
 from boulder_sweep.settings import load
-from docs.studies.coverage import (
-    HORIZON_S,
-    LIMIT,
-    REFERENCE_STEP_S,
-    ROUNDING_M,
-    ROUNDING_RAD,
-    grid_table,
-    random_table,
-)
+from docs.studies.random_designs import random_table
 
+LIMIT = math.radians(20.0)
+HORIZON_S = 1.0
+REFERENCE_STEP_S = 5e-5
+ROUNDING_RAD, ROUNDING_M = 1e-11, 1e-11
+"""Errors below these are rounding, of the reference as well."""
 DESIGNS = 20_000
 """Designs of each family."""
 SEED = 7
@@ -99,7 +96,7 @@ def late_designs(count: int, seed: int) -> Designs:
     """
     families = wild_families(-(-count // 12), seed)
     table = DesignTable(*(np.concatenate(column) for column in zip(*families.values(), strict=True)))
-    first = _solved(table, Steps(FIRST_STEP_S), estimate=False, late=True)
+    first = solved(table, Steps(FIRST_STEP_S), estimate=False, late=True)
     late = np.flatnonzero(first.t_end > HORIZON_S)
     offset = np.random.default_rng(seed).uniform(*BED_OFFSETS_M, len(late))
     return Designs(some_rows(table, late), offset)
@@ -112,6 +109,8 @@ class FamilyScore(NamedTuple):
     """Designs that turn no further than the limit, by either solution."""
     largest_deg: float
     """Largest true error of the rotation of these."""
+    largest_m: float
+    """Largest true error of the displacements of all that both solutions or neither stopped, and that are decided."""
     rotation: float
     """Share of these whose estimated error of the rotation is no smaller than the true one."""
     displacement: float
@@ -121,17 +120,30 @@ class FamilyScore(NamedTuple):
     """Designs on the wrong side of the limit that are not undecided."""
 
 
-def _solved(
-    table: DesignTable, steps: Steps, *, estimate: bool, paired: bool = False, late: bool = False
+def solved(
+    table: DesignTable,
+    steps: Steps,
+    readings: Readings | None = None,
+    *,
+    estimate: bool,
+    paired: bool = False,
+    late: bool = False,
 ) -> OutcomeTable:
     """Simulate a family; `late` as a table does it that goes on past the horizon, and locates events as finely."""
     control = Control(steps.step_s, HORIZON_S, LIMIT, 0, estimate, True, steps.locate_yield, paired=paired)
     if late:
         control = control._replace(longest_horizon=LONGEST_HORIZON * HORIZON_S, event_tolerance=EVENT_TOLERANCE)
-    return simulate_table(table, corrected(), control)
+    return simulate_table(table, readings or corrected(), control)
 
 
-def _compared(found: OutcomeTable, known: OutcomeTable) -> FamilyScore:
+def reference(table: DesignTable, readings: Readings | None = None) -> OutcomeTable:
+    """Return the solution by very short steps, which also locate the yield of the soil; its errors are rounding."""
+    known = solved(table, Steps(REFERENCE_STEP_S, locate_yield=True), readings, estimate=False)
+    known.theta_error[:], known.x_error[:] = ROUNDING_RAD, ROUNDING_M
+    return known
+
+
+def compared(found: OutcomeTable, known: OutcomeTable) -> FamilyScore:
     """Compare estimated with true errors, which are known to within the errors of `known`."""
     computed = np.isfinite(found.theta_max) & np.isfinite(known.theta_max)
     fell, falls = found.status == Status.LIMIT, known.status == Status.LIMIT
@@ -142,6 +154,7 @@ def _compared(found: OutcomeTable, known: OutcomeTable) -> FamilyScore:
     return FamilyScore(
         int(standing.sum()),
         math.degrees(float(turned[standing].max(initial=0.0))),
+        float(moved[alike & ~unsure].max(initial=0.0)),
         float(np.mean((turned <= found.theta_error + known.theta_error)[standing])),
         float(np.mean((moved <= found.x_error + known.x_error)[alike])),
         int((computed & (fell != falls) & ~unsure).sum()),
@@ -150,19 +163,14 @@ def _compared(found: OutcomeTable, known: OutcomeTable) -> FamilyScore:
 
 def _measured(designs: DesignTable) -> dict[str, FamilyScore]:
     """Compare the named accuracies."""
-    known = _solved(designs, Steps(REFERENCE_STEP_S, locate_yield=True), estimate=False)
-    known.theta_error[:], known.x_error[:] = ROUNDING_RAD, ROUNDING_M
-    found = {}
-    for name, steps in STEPS.items():
-        out = _solved(designs, steps, estimate=name != "fast")
-        found[name] = _compared(out, known)
-    return found
+    known = reference(designs)
+    return {name: compared(solved(designs, steps, estimate=name != "fast"), known) for name, steps in STEPS.items()}
 
 
 def _known_late(designs: Designs) -> OutcomeTable:
     """Solve late designs by two short steps; what they differ by is the error, and where one falls nothing is known."""
     other, known = (
-        _solved(designs.table, Steps(factor * REFERENCE_STEP_S, locate_yield=True), estimate=False, late=True)
+        solved(designs.table, Steps(factor * REFERENCE_STEP_S, locate_yield=True), estimate=False, late=True)
         for factor in (2.0, 1.0)
     )
     known.theta_max[(known.status == Status.LIMIT) != (other.status == Status.LIMIT)] = np.nan
@@ -200,14 +208,14 @@ def _measured_late(designs: Designs, grid: Path) -> dict[str, FamilyScore]:
     for name in [name for name in STEPS if name != "fast"]:  # which leaves them undecided
         out = _judged_late(designs, grid, name)
         together = np.abs(out.t_end - known.t_end) < SAME_END_S
-        found[name] = _compared(some_rows(out, together), some_rows(known, together))
+        found[name] = compared(some_rows(out, together), some_rows(known, together))
     return found
 
 
 def _worst(families: list[FamilyScore]) -> FamilyScore:
     """Return the worst of each number, and how many designs stand and are wrong in all."""
-    standing, largest, rotation, displacement, wrong = zip(*families, strict=True)
-    return FamilyScore(sum(standing), max(largest), min(rotation), min(displacement), sum(wrong))
+    standing, largest, largest_m, rotation, displacement, wrong = zip(*families, strict=True)
+    return FamilyScore(sum(standing), max(largest), max(largest_m), min(rotation), min(displacement), sum(wrong))
 
 
 def _degrees(angle: float) -> str:
@@ -232,7 +240,8 @@ def wild_table(grid: Path, count: int = DESIGNS, seed: int = SEED) -> Table:
     seed
         Of the random numbers.
     """
-    usual = {"usual, random": random_table(count, seed + 1), "usual, M30 grid": grid_table(grid, count)}
+    of_grid = sampled_designs(load(grid), count).table
+    usual = {"usual, random": random_table(count, seed + 1), "usual, M30 grid": of_grid}
     families = usual | wild_families(count, seed)
     with ThreadPoolExecutor(2) as pool:
         found = dict(zip(families, pool.map(_measured, families.values()), strict=True))

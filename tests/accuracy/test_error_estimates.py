@@ -2,40 +2,60 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from boulder_kernels import OutcomeTable, Status, simulate_table
+from boulder_kernels import DesignTable, OutcomeTable, Status, simulate_table
 from boulder_kernels.outcomes import NONE_NEEDED, PAIR, THETA_ERROR, X_ERROR, take_seconds
 from boulder_sweep.columns import OUTCOMES
-from boulder_sweep.judge.inputs import Designs
+from boulder_sweep.judge.accuracy import LADDER, STEPS, STEPS_PRINTED, finer_step
+from boulder_sweep.judge.inputs import Designs, sampled_designs
 from boulder_sweep.judge.judged import UNDECIDED
 from boulder_sweep.judge.verdict import Limits, judge
-from docs.studies.coverage import ROUNDING_M, ROUNDING_RAD, coverages, grid_table, random_table
-from docs.studies.wild import wild_families
+from boulder_sweep.settings import load
+from docs.studies.random_designs import random_table
+from docs.studies.wild import ROUNDING_M, ROUNDING_RAD, FamilyScore, compared, reference, solved, wild_families
 from tests.accuracy.box import LIMIT, PRESETS, box_table, how
 from tests.judge.plain import plain_designs
 
 GRID = Path(__file__).parents[2] / "configs" / "m30_sizing.yaml"
+NUMBERS = tuple(steps for steps in LADDER if finer_step(steps.step_s) in (0.006, 0.003, 0.0005, 0.000125))
+"""Some steps that an accuracy given as a number may come to."""
 
 
-def test_estimates_cover_99_per_cent_and_no_verdict_is_wrong() -> None:
-    """A small edition of the table in the documentation."""
-    for found in coverages({"random": random_table(1500, 21), "grid": grid_table(GRID, 1000)}):
-        assert found.is_enough, found
-        assert found.flips == 0, found
+def grid_table(count: int) -> DesignTable:
+    return sampled_designs(load(GRID), count).table
+
+
+def scores(table: DesignTable, preset: str) -> Iterator[tuple[str, FamilyScore]]:
+    """Yield the scores of the named accuracies, and of some that are given as a number."""
+    readings = PRESETS[preset]
+    known, printed = reference(table, readings), preset == "as_printed"
+    named = STEPS_PRINTED if printed else STEPS
+    for name, steps in (*named.items(), *(("a number", steps) for steps in NUMBERS)):
+        paired = printed or name == "a number"
+        yield name, compared(solved(table, steps, readings, estimate=name != "fast", paired=paired), known)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_estimates_cover_99_per_cent_and_no_verdict_is_wrong(preset: str) -> None:
+    """A small edition of the table in the documentation; one solution as printed is confirmed by no second one."""
+    for table in (random_table(1500, 21), grid_table(1000)):
+        for name, found in scores(table, preset):
+            least = 0.98 if (name, preset) == ("fast", "as_printed") else 0.99
+            assert min(found.rotation, found.displacement) >= least, (name, found)
+            assert found.wrong == 0, (name, found)
 
 
 def test_named_accuracies_keep_their_promises_on_the_grid() -> None:
     """2000 rows: 0.01 deg and 0.1 mm for balanced, 1e-5 deg for fine."""
-    for found in coverages({"grid": grid_table(GRID, 2000)}):
-        if found.readings == "corrected" and found.accuracy == "balanced":
-            assert found.largest_deg <= 0.01
-            assert found.largest_m <= 1e-4
-        if found.readings == "corrected" and found.accuracy == "fine":
-            assert found.largest_deg <= 1e-5
+    found = dict(scores(grid_table(2000), "corrected"))
+    assert found["balanced"].largest_deg <= 0.01
+    assert found["balanced"].largest_m <= 1e-4
+    assert found["fine"].largest_deg <= 1e-5
 
 
 def test_estimates_cover_families_far_from_usual_designs() -> None:
@@ -55,7 +75,7 @@ def test_estimates_cover_families_far_from_usual_designs() -> None:
 
 
 def test_few_usual_designs_have_a_second_solution() -> None:
-    for table in (random_table(4000, 42), grid_table(GRID, 4000)):
+    for table in (random_table(4000, 42), grid_table(4000)):
         found = simulate_table(table, PRESETS["corrected"], how(0.012, estimate=True))
         assert np.mean(found.step < 0.004) < 0.05
 

@@ -10,7 +10,7 @@ from boulder_kernels.control import ACCEPTED, Rates, first_step, rates_of, refus
 from boulder_kernels.design import design_at
 from boulder_kernels.dynamics import Modes, State, acceleration, switches_of
 from boulder_sweep.judge.accuracy import STEPS
-from docs.studies.coverage import random_table
+from docs.studies.random_designs import random_table
 from tests.accuracy.box import LIMIT, PRESETS, box_table, how, rows
 
 SAMPLES = 60

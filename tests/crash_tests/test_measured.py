@@ -276,7 +276,6 @@ def test_a_test_without_anything_to_compare_is_refused(tmp_path: Path, film: str
         overlay(tmp_path / "film.csv", str(case))
 
 
-@pytest.mark.usefixtures("known_study")
 def test_command_overlays_measured_data(sweep: Command, tmp_path: Path) -> None:
     film = tmp_path / "film.csv"
     film.write_text(FILM)
@@ -288,7 +287,6 @@ def test_command_overlays_measured_data(sweep: Command, tmp_path: Path) -> None:
     assert (tmp_path / "measured_film.png").stat().st_size > 10_000
 
 
-@pytest.mark.usefixtures("known_study")
 def test_command_notices_a_mirrored_film(sweep: Command, tmp_path: Path) -> None:
     film = tmp_path / "film.csv"
     film.write_text(FILM.replace(",4.4,", ",-4.4,").replace(",12,", ",-12,"))

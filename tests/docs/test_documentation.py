@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -143,9 +144,9 @@ def test_command_writes_single_blocks(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 @pytest.mark.nightly
-def test_pictures_are_drawn_by_the_command(tmp_path: Path) -> None:
+def test_pictures_are_drawn_by_the_command(tmp_path: Path, chromium: Any) -> None:
     for folder in ("configs", "docs/examples"):
         shutil.copytree(ROOT / folder, tmp_path / folder)
-    drawn = draw_all(tmp_path)
+    drawn = draw_all(tmp_path, chromium)
     assert all(path.stat().st_size < MOST_BYTES[path.suffix] for path in drawn)
     assert {path.name for path in drawn} == {path.name for path in (DOCS / "images").iterdir()}

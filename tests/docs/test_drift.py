@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from docs.studies.documents import DocumentError, blocks, differences, write
-from docs.studies.drift import drift
+from docs.studies.documents import DocumentError, blocks, differences, drift, write
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from docs.studies.contents import CONTENTS, LONG, compute
-from docs.studies.documents import blocks
-from docs.studies.drift import drift
+from docs.studies.documents import blocks, drift
 
 ROOT = Path(__file__).parents[2]
 

@@ -39,8 +39,7 @@ from boulder_sweep.settings.loader import decode
 from boulder_sweep.settings.problems import MAX_REPORTED, Position, ProblemList
 from boulder_sweep.settings.sweep import derived_words
 from boulder_sweep.settings.tree import Scalar
-from boulder_sweep.stones.formats import READERS
-from boulder_sweep.stones.reading import read_scan
+from boulder_sweep.stones.reading import READERS, read_scan
 from boulder_sweep.stones.solid import solid_of
 from boulder_sweep.store.provenance import settings_sha256
 from boulder_sweep.views.log_text import log_lines

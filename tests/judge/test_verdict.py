@@ -23,8 +23,8 @@ from boulder_sweep.judge.validity import FLAGS, TESTED_ROTATION_DEG, flag_counts
 from boulder_sweep.judge.verdict import NOT_FINITE, PENETRATION_LIMITS_M, STATUS_REASONS, Limits, judge, limits_of
 from boulder_sweep.settings import load
 from boulder_sweep.settings.model import PRESETS, Criterion, Ground, Layer
-from docs.studies.coverage import random_table
 from docs.studies.extremes import box_designs
+from docs.studies.random_designs import random_table
 from tests.judge.plain import plain_designs
 from tests.runner.grids import grid
 

@@ -8,7 +8,7 @@ from typing import Any
 import nbformat
 import pytest
 
-from docs.studies.drift import drift
+from docs.studies.documents import drift
 from docs.studies.notebooks import FOLDER, executed
 
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))

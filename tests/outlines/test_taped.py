@@ -23,7 +23,7 @@ from boulder_sweep.settings.problems import SettingsError
 from boulder_sweep.settings.shape import ProfilePoint, Shape
 from boulder_sweep.soils import with_shape, with_soil
 from boulder_sweep.stones.taped import taped_profiles
-from boulder_sweep.views.scene import SideView
+from boulder_sweep.views.side_view import SideView
 from tests.answers.designs import bare_need
 from tests.outlines.oracle import Stone
 

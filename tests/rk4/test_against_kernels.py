@@ -8,7 +8,7 @@ import pytest
 import boulder_kernels as bk
 from benchmarks.designs import first, sample
 from boulder_kernels import DesignTable, Status
-from docs.studies.coverage import random_table
+from docs.studies.random_designs import random_table
 from tests import rk4
 from tests.accuracy.box import LIMIT, rows
 from tests.kernels.samples import table_of

@@ -25,7 +25,7 @@ from boulder_sweep.impact.trajectory import Trajectory
 from boulder_sweep.settings import load_text
 from boulder_sweep.settings.model import Ground
 from boulder_sweep.views import pictures, side_view
-from boulder_sweep.views.scene import SLICES, STYLES, SceneItem, SideView, samples_shown
+from boulder_sweep.views.side_view import SLICES, SceneItem, SideView, samples_shown
 from boulder_sweep.views.time_curves import AFTER_PEAK, unreliable_from
 from boulder_sweep.views.wording import ground_words
 
@@ -306,13 +306,6 @@ def test_truck_is_crushed_as_the_model_has_it(held: Trajectory) -> None:
         (bed,) = of_style(view.moving(sample), "bed_edge")
         assert bed.points[0][0] == pytest.approx(held.vehicle_displacement_m[sample] - 2.9)
     assert view.rating_line == pytest.approx(design.L + 1.0)
-
-
-def test_every_shape_has_a_style(held: Trajectory) -> None:
-    view = SideView(held)
-    for shape in (*view.ground(), *view.moving(100)):
-        assert shape.style in STYLES
-        assert np.isfinite(np.array(shape.points)).all()
 
 
 def test_samples_of_a_film(held: Trajectory) -> None:

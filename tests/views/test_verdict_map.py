@@ -18,8 +18,16 @@ from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.errors import PictureError
 from boulder_sweep.settings import load_text
 from boulder_sweep.views import pictures
-from boulder_sweep.views.slices import PictureRows, Pieces, Slice, pieces_of, plane
-from boulder_sweep.views.verdict_map import CLASSES, _caption, classes_of, draw_verdict_map
+from boulder_sweep.views.verdict_map import (
+    CLASSES,
+    Pieces,
+    Slice,
+    _caption,
+    classes_of,
+    draw_verdict_map,
+    pieces_of,
+    plane,
+)
 from tests.answers.designs import bare_need
 
 GRID = """\
@@ -181,58 +189,11 @@ def test_a_table_in_pieces_gives_the_same_picture(table, tmp_path, monkeypatch, 
     parts, found = drawn(in_pieces(table, size), monkeypatch, tmp_path / "parts.png")
     np.testing.assert_equal(found, expected)
     assert expected
-    for name in ("across", "up", "columns", "rows_over", "column_values", "row_values", "fixed", "total", "count",
-                 "passing", "thinned", "left_out"):  # fmt: skip
+    for name in ("across", "up", "columns", "rows_over", "column_values", "row_values", "fixed", "total", "left_out"):
         assert getattr(parts, name) == getattr(whole, name), name
-    assert (parts.count, parts.thinned) == (len(whole.rows), False)
+    assert parts.count == len(whole.rows)
     assert parts.total == len(table)
     assert parts.passing == (whole.rows.verdict == "pass").sum()
-
-
-def test_of_too_many_rows_those_are_kept_that_a_picture_can_tell_apart(monkeypatch, tmp_path):
-    monkeypatch.setattr("boulder_sweep.views.slices.MOST_KEPT", 1000)
-    rng = np.random.default_rng(0)
-    n = 5000
-    table = pd.DataFrame(dict.fromkeys(INPUT_COLUMNS, np.ones(n))).assign(
-        boulder_width_m=rng.choice([1.0, 1.0 + 1e-6, 2.0], n),
-        vehicle_mass_kg=6000.0 + 100.0 * rng.integers(0, 20, n),
-        verdict=np.where(np.arange(n) < n - 60, "fail", "pass"),
-        reason=np.where(np.arange(n) < n - 60, "overturns", ""),
-        validity="",
-    )
-    shown, _ = drawn(in_pieces(table, 300), monkeypatch, tmp_path / "map.png")
-    assert (shown.across, shown.up) == ("boulder_width_m", "vehicle_mass_kg")
-    assert shown.thinned
-    assert (shown.total, shown.count, shown.passing) == (n, n, 60)
-    assert len(shown.rows) < 1000 + 300
-
-    def last_drawn(rows: pd.DataFrame) -> dict[Any, str]:
-        """Return the verdict that is seen at each place of the picture."""
-        by_place = rows.astype({"verdict": str}).groupby([rows.boulder_width_m.round(3), "vehicle_mass_kg"])
-        return by_place.verdict.last().to_dict()
-
-    assert len(last_drawn(table)) == 40
-    assert last_drawn(shown.rows) == last_drawn(table)
-
-
-def test_the_command_never_holds_more_than_a_few_parts(out, monkeypatch, capsys):
-    """What it keeps of each part is what the picture shows."""
-    held = []
-
-    def add(kept, rows):
-        held.append(len(rows))
-        plain(kept, rows)
-
-    plain = PictureRows.add
-    monkeypatch.setattr(PictureRows, "add", add)
-    monkeypatch.setattr("boulder_sweep.store.read", None)
-    monkeypatch.setattr("boulder_sweep.store.folder.FEWEST_ROWS", 4)
-    monkeypatch.setattr("boulder_sweep.runner.ranges.WORK_S", 1e-9)
-    assert boulder_sweep.run(boulder_sweep.load(out.parent / "grid.yaml"), out, overwrite=True).rows == 36
-    assert execute(["plot", str(out), "--at", "subgrade_reaction_MN_m3=95"]) == 0
-    assert "18 of 36 designs" in capsys.readouterr().out
-    assert len(held) == 8
-    assert sum(held) == 18
 
 
 @pytest.fixture
@@ -242,7 +203,9 @@ def out(tmp_path: Path) -> Path:
     return tmp_path / "grid.sweep"
 
 
-def test_command_draws_a_map(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_draws_a_map(out: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the whole table in memory."""
+    monkeypatch.setattr("boulder_sweep.store.read", None)
     assert execute(["plot", str(out), "--at", "subgrade_reaction_MN_m3=95"]) == 0
     printed = capsys.readouterr().out
     assert printed.startswith(str(out.with_suffix(".png")))
