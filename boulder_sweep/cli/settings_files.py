@@ -36,7 +36,7 @@ def new(file: Path | None, vehicle: str | None, units: str | None, output: Path 
     """
     from boulder_sweep.errors import ExistingFileError
     from boulder_sweep.settings import load
-    from boulder_sweep.settings.starter import CLASSES, is_published, starter
+    from boulder_sweep.settings.fields import CLASSES, is_published, starter
 
     if file is not None and output is not None:
         raise click.UsageError(f"two files are named, {file} and {output}; name one")
@@ -91,7 +91,7 @@ def _question_of(file: Path) -> str:
 
 def _lines_to_fill_in(file: Path, vehicle: str, units: int) -> list[str]:
     """Return which entries of a vehicle have no published values, and how to measure them."""
-    from boulder_sweep.settings.starter import CATEGORIES, CLASSES
+    from boulder_sweep.settings.fields import CATEGORIES, CLASSES
 
     mass = CATEGORIES[CLASSES[vehicle][0]][0][units]
     return [

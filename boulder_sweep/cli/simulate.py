@@ -85,7 +85,7 @@ def simulate(
     not every outcome is the same to the last bit, what has changed since is printed: versions, kernels, rules.
     """
     from boulder_sweep.cli import console
-    from boulder_sweep.settings.shown_units import shown_settings, shown_unit, shown_values
+    from boulder_sweep.settings.units import shown_settings, shown_unit, shown_values
 
     number, again, location = design or 0, None, location_of(case)
     if _is_result(location):
@@ -214,7 +214,7 @@ def impact_lines(row: Mapping[str, Any], history: Trajectory, units: str = "si")
         ``si`` or ``us``.
     """
     from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
-    from boulder_sweep.settings.shown_units import quantity_text
+    from boulder_sweep.settings.units import quantity_text
 
     metres = partial(quantity_text, "m", units)
     limit = math.degrees(history.motion.control.theta_limit)
@@ -249,7 +249,7 @@ def _to_build(history: Trajectory) -> dict[str, float]:
 
 def build_line(history: Trajectory, units: str = "si") -> str:
     """Return in words what a design takes to build."""
-    from boulder_sweep.settings.shown_units import quantity_text
+    from boulder_sweep.settings.units import quantity_text
 
     mass, above, *volumes = _to_build(history).values()
     weight = f"{mass / 1e3:.1f} t" if units == "si" else quantity_text("kg", units, mass, digits=",.0f")

@@ -24,7 +24,7 @@ from boulder_sweep.settings.problems import (
     refuse,
     shorten,
 )
-from boulder_sweep.settings.text_table import MAX_BYTES, TextTable, open_text
+from boulder_sweep.settings.tables import MAX_BYTES, TextTable, open_text
 from boulder_sweep.settings.units import UnitError, factor
 
 MOST_ROWS = 2_000_000

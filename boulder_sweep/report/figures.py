@@ -17,8 +17,7 @@ from bokeh.models import ColumnDataSource, DataRange1d, HoverTool, TapTool
 from bokeh.models.annotations import BoxAnnotation, Legend
 from bokeh.plotting import figure
 
-from boulder_sweep.settings.model import Ground
-from boulder_sweep.settings.shape import BOX, ProfilePoint, Shape
+from boulder_sweep.settings.model import BOX, Ground, ProfilePoint, Shape
 from boulder_sweep.views.pictures import VERDICTS
 
 COLOURS = {**VERDICTS, "none": "#BBBBBB"}

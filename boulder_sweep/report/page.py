@@ -18,8 +18,8 @@ from boulder_sweep.report.contents import held_at, page_data, reading_words, tab
 from boulder_sweep.report.export import setting_lines
 from boulder_sweep.report.figures import curves, verdict_map
 from boulder_sweep.report.log_chart import log_charts
-from boulder_sweep.settings.shape import Shape
-from boulder_sweep.settings.shown_units import shown_settings
+from boulder_sweep.settings.model import Shape
+from boulder_sweep.settings.units import shown_settings
 from boulder_sweep.text import script_data
 from boulder_sweep.views.wording import LAW_WORDS, ground_words
 

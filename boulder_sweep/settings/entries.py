@@ -17,7 +17,6 @@ import numpy as np
 
 from boulder_sweep.errors import ScanError
 from boulder_sweep.settings import fields
-from boulder_sweep.settings.distributions import Distribution, Input, SetDistributions, read_input
 from boulder_sweep.settings.fields import Field
 from boulder_sweep.settings.model import (
     ACCURACIES,
@@ -29,12 +28,15 @@ from boulder_sweep.settings.model import (
     SECOND_OPINIONS,
     SWITCHES,
     Bound,
+    Distribution,
     Layer,
+    ProfilePoint,
     ReadingChoice,
+    Scan,
+    SetDistributions,
+    Shape,
 )
 from boulder_sweep.settings.problems import Mistakes, Position, ProblemList, did_you_mean, shorten, unknown_word, wrong
-from boulder_sweep.settings.shape import ProfilePoint, Scan, Shape
-from boulder_sweep.settings.shown_units import SYSTEMS, system_of
 from boulder_sweep.settings.soil_readings import (
     CORRELATION,
     ENERGY,
@@ -47,13 +49,15 @@ from boulder_sweep.settings.soil_readings import (
 )
 from boulder_sweep.settings.sweep import SECTION, UNITS, DesignList
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence, block_of
-from boulder_sweep.settings.units import UnitError, factor
+from boulder_sweep.settings.units import SYSTEMS, UnitError, factor, system_of
 from boulder_sweep.settings.values import (
+    Leaf,
     NumberError,
     meant_by,
     quoted,
     read_count,
     read_entries,
+    read_input,
     read_single,
     split_number,
 )
@@ -112,7 +116,7 @@ class Entries:
 
     Attributes
     ----------
-    leaves : dict of str to Input
+    leaves : dict of str to Leaf
         Inputs by column (or axis) name, as far as they have no mistake.
     settings : dict of str to Any
         What holds for all designs, by the name of the attribute, as far as given and without a mistake.
@@ -136,7 +140,7 @@ class Entries:
         self.root = root
         self.path = path
         self.problems = problems
-        self.leaves: dict[str, Input] = {}
+        self.leaves: dict[str, Leaf] = {}
         self.settings: dict[str, Any] = {}
         self.given: set[str] = set()
         self.misspelled: set[str] = set()
@@ -238,7 +242,7 @@ class Entries:
                 self.report(path, "is part of boulder.profile; remove one of them")
             for key, value in sides_of(points).items():
                 at = self.position_of("boulder.profile")
-                self.leaves[f"boulder_{key}_m"] = Input(np.array([value]), False, at)
+                self.leaves[f"boulder_{key}_m"] = Leaf(np.array([value]), False, at)
             self.settings["profile"] = shares_of(points)
         self.given |= sides  # a profile with mistakes is reported, and its sides are not missing
 
@@ -270,7 +274,7 @@ class Entries:
         if node is None:
             return
         # The csv module is needed for tables only.
-        from boulder_sweep.settings.design_list import read_designs
+        from boulder_sweep.settings.tables import read_designs
 
         if not isinstance(node, Scalar) or not node.text.strip():
             self.problems.add(node.position, "table", "must be the name of a .csv, .xlsx or .parquet file")
@@ -312,7 +316,7 @@ class Entries:
         """Read a list of named sets: ``[{name: loose, density: 1700 kg/m^3, ...}, ...]``."""
         before = len(self.problems.problems)
         names: list[str] = []
-        columns: dict[str, list[Input]] = {}
+        columns: dict[str, list[Leaf]] = {}
         items = node.items or [Scalar(node.position, "")]
         for item in items:
             if not isinstance(item, Mapping):
@@ -425,7 +429,7 @@ class Entries:
         self.problems.add(self.position_of(path), path, message)
 
 
-def _one_of_set(node: Node, field: Field) -> Input:
+def _one_of_set(node: Node, field: Field) -> Leaf:
     """Return the value that a named set gives for an input, with its distribution if it has one.
 
     Raises
@@ -435,18 +439,18 @@ def _one_of_set(node: Node, field: Field) -> Input:
     """
     leaf = read_input(node, field)
     if leaf.distribution is None:
-        return Input(np.array([read_single(node, field)]), False, node.position, leaf.written)
+        return Leaf(np.array([read_single(node, field)]), False, node.position, leaf.written)
     if leaf.is_axis:
         raise wrong(node.position, "must have one mean in a named set")
     return leaf
 
 
-def _axis_of_sets(section: str, leaves: list[Input], position: Position) -> Input:
+def _axis_of_sets(section: str, leaves: list[Leaf], position: Position) -> Leaf:
     """Return the values that the named sets give for an input, as an axis."""
     each = tuple(one if isinstance(one := leaf.distribution, Distribution) else None for leaf in leaves)
     spread = SetDistributions(section, each) if any(each) else None
     values, positions = np.concatenate([leaf.values for leaf in leaves]), tuple(leaf.position for leaf in leaves)
-    return Input(values, True, position, leaves[0].written, positions, spread)
+    return Leaf(values, True, position, leaves[0].written, positions, spread)
 
 
 def read_layers(node: Node) -> tuple[Layer, ...]:

@@ -32,10 +32,10 @@ from boulder_sweep.settings.problems import (
     refuse,
     shorten,
 )
-from boulder_sweep.settings.shown_units import SYSTEMS
 from boulder_sweep.settings.sweep import SECTION, UNITS, Axis, Heading, Sweep, wrong_with
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, parse, parse_node
 from boulder_sweep.settings.tree import Sequence as List
+from boulder_sweep.settings.units import SYSTEMS
 from boulder_sweep.stones.rock import ROCK_KG_M3
 
 MAX_DESIGNS = 2**63 - 1

@@ -19,14 +19,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from boulder_sweep import investigation as sand
-from boulder_sweep.settings.distributions import FRACTILE_5
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import Bound, Field
 from boulder_sweep.settings.problems import LeafError, Mistakes, Position, wrong
-from boulder_sweep.settings.shown_units import quantity_text
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence, block_of
-from boulder_sweep.settings.units import UnitError, factor
-from boulder_sweep.settings.values import NumberError, quoted, read_block, read_single, split_number
+from boulder_sweep.settings.units import UnitError, factor, quantity_text
+from boulder_sweep.settings.values import FRACTILE_5, NumberError, quoted, read_block, read_single, split_number
 from boulder_sweep.text import counted
 
 CONE = "q_c"

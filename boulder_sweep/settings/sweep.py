@@ -15,12 +15,11 @@ import numpy as np
 from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.designs import LEAST_SOLIDITY, SIDES, UNUSUAL, DesignBlock, DesignPlan, Label, Source
 from boulder_sweep.errors import QuestionError
-from boulder_sweep.settings.distributions import Distribution, SetDistributions
 from boulder_sweep.settings.fields import ALLOW_UNUSUAL, BY_NAME, EMBEDMENT, HELD, INPUTS, TO_BE_FOUND
-from boulder_sweep.settings.model import CLOSED_FORM, Criterion, Model, SolverSettings
+from boulder_sweep.settings.model import CLOSED_FORM, Criterion, Distribution, Model, SetDistributions, SolverSettings
 from boulder_sweep.settings.problems import Problem
-from boulder_sweep.settings.shown_units import SYSTEMS
 from boulder_sweep.settings.soil_readings import soil_words
+from boulder_sweep.settings.units import SYSTEMS
 from boulder_sweep.settings.values import is_unusual
 from boulder_sweep.settings.vehicle import APPROACH, approach_words
 

@@ -17,8 +17,8 @@ from typing import Any
 
 from boulder_sweep.settings.model import Bound, entries_of, setting
 from boulder_sweep.settings.problems import Mistakes, wrong
-from boulder_sweep.settings.shown_units import quantity_text
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar
+from boulder_sweep.settings.units import quantity_text
 from boulder_sweep.settings.values import read_block
 
 G = 9.80665

@@ -13,7 +13,7 @@ from boulder_sweep.answers.printing import need_lines, reserve_lines, uncertaint
 from boulder_sweep.answers.reserves import capacity
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.settings import Sweep
-from boulder_sweep.settings.distributions import Distribution, SetDistributions
+from boulder_sweep.settings.model import Distribution, SetDistributions
 from boulder_sweep.settings.sweep import DesignList
 
 SITE = Path("configs/site.yaml")

@@ -14,7 +14,7 @@ import pytest
 from scipy.integrate import quad
 
 from boulder_sweep.settings import SettingsError, load, load_text
-from boulder_sweep.settings.shape import ProfilePoint, Shape, tapered
+from boulder_sweep.settings.model import ProfilePoint, Shape, tapered
 from boulder_sweep.stones.weighing import scanned
 from tests.stones.files import ply, prism, regular
 

@@ -12,7 +12,7 @@ from boulder_sweep import investigation as sand
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.investigation import api_curve
 from boulder_sweep.settings import load
-from boulder_sweep.settings.distributions import SetDistributions
+from boulder_sweep.settings.model import SetDistributions
 from boulder_sweep.settings.soil_readings import CORRELATION, covered_depth
 from boulder_sweep.settings.sweep import derived_words
 from boulder_sweep.settings.vehicle import Approach, G, NoApproachError

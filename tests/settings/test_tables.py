@@ -476,7 +476,7 @@ def test_mistakes_in_a_spreadsheet(write_xlsx, messages_of):
 
 
 def test_a_spreadsheet_that_unpacks_to_too_much(messages_of, tmp_path, monkeypatch):
-    monkeypatch.setattr("boulder_sweep.settings.design_list.MAX_UNPACKED_BYTES", 1_000_000)
+    monkeypatch.setattr("boulder_sweep.settings.tables.MAX_UNPACKED_BYTES", 1_000_000)
     with zipfile.ZipFile(tmp_path / "designs.xlsx", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("xl/workbook.xml", bytes(1_000_001))
     (message,) = messages_of(None, "designs.xlsx")
@@ -731,14 +731,12 @@ def test_more_columns_than_a_table_has(tmp_path, name):
     ],
 )
 def test_every_limit_of_a_text(tmp_path, monkeypatch, text, words):
-    monkeypatch.setattr("boulder_sweep.settings.design_list.MAX_TABLE_ROWS", 6 if "lines" in words else 10**6)
-    monkeypatch.setattr("boulder_sweep.settings.design_list.MOST_WORDS", 2)
-    monkeypatch.setattr(
-        "boulder_sweep.settings.design_list._TOO_MANY_WORDS", "column {} has more than 2 different words"
-    )
-    monkeypatch.setattr("boulder_sweep.settings.design_list.MOST_BYTES", 40 if "bytes" in words else 10**6)
-    monkeypatch.setattr("boulder_sweep.settings.text_table.MOST_MISTAKES", 100)
-    monkeypatch.setattr("boulder_sweep.settings.text_table.CHUNK", 300)
+    monkeypatch.setattr("boulder_sweep.settings.tables.MAX_TABLE_ROWS", 6 if "lines" in words else 10**6)
+    monkeypatch.setattr("boulder_sweep.settings.tables.MOST_WORDS", 2)
+    monkeypatch.setattr("boulder_sweep.settings.tables._TOO_MANY_WORDS", "column {} has more than 2 different words")
+    monkeypatch.setattr("boulder_sweep.settings.tables.MOST_BYTES", 40 if "bytes" in words else 10**6)
+    monkeypatch.setattr("boulder_sweep.settings.tables.MOST_MISTAKES", 100)
+    monkeypatch.setattr("boulder_sweep.settings.tables.CHUNK", 300)
     (tmp_path / "table.csv").write_text(text)
     with pytest.raises(SettingsError) as refused:
         load_text(SETTINGS.format(file="table.csv"), tmp_path / "grid.yaml")
