@@ -280,16 +280,17 @@ class _Lines:
 
 
 @contextmanager
-def open_text(path: Location, most_lines: int, known: Sequence[str], problems: ProblemList) -> Iterator[TextTable]:
-    """Open a text file as a table.
+def open_table(path: Location, most_lines: int, known: Sequence[str], problems: ProblemList) -> Iterator[TextTable]:
+    """Open a text file, or the first sheet of a spreadsheet (.xlsx), as a table.
 
     Parameters
     ----------
     path
-        UTF-8; comma, semicolon or tab between the cells, the first line the column names. Lines that begin with # and
-        blank rows are skipped.
+        A text is UTF-8; comma, semicolon or tab between the cells, the first line the column names. Lines that begin
+        with # and blank rows are skipped. In a spreadsheet row and column of a cell are its position, and formulas
+        count by their stored value.
     most_lines
-        Most lines that it may have.
+        Most lines that a text may have.
     known
         Names as a table may have them, for a message.
     problems
@@ -298,9 +299,12 @@ def open_text(path: Location, most_lines: int, known: Sequence[str], problems: P
     Raises
     ------
     SettingsError
-        The file cannot be read at all, or not to its end.
+        The file cannot be read at all, or not to its end, or openpyxl is not installed.
     """
     label = str(path)
+    if path.suffix.lower() == ".xlsx":
+        yield TextTable(label, _sheet_rows(path), "", known, problems)
+        return
     try:
         with io.TextIOWrapper(opened(path), encoding="utf-8-sig", newline="") as stream:
             lines = _Lines(stream, label, most_lines)
@@ -341,7 +345,6 @@ def _is_number(text: str) -> bool:
     return True
 
 
-MAX_TABLE_ROWS = MOST_ROWS
 MOST_WORDS = 2_000_000
 """Most different words of a column."""
 _TOO_MANY_WORDS = f"column {{}} has more than {MOST_WORDS:,} different words"
@@ -415,32 +418,13 @@ def located(name: str, folder: Path) -> Location:
     return location_of(name) if is_url(name) else folder / Path(name)
 
 
-@contextmanager
-def open_table(path: Location, most_rows: int, known: Sequence[str], problems: ProblemList) -> Iterator[TextTable]:
-    """Open a text file, or the first sheet of a spreadsheet (.xlsx), as a table; see `open_text`.
-
-    In a spreadsheet row and column of a cell are its position. Empty rows are skipped, formulas count by their stored
-    value.
-
-    Raises
-    ------
-    SettingsError
-        The file cannot be read at all, or openpyxl is not installed.
-    """
-    if path.suffix.lower() != ".xlsx":
-        with open_text(path, most_rows, known, problems) as table:
-            yield table
-        return
-    label = str(path)
-    try:
-        from openpyxl import load_workbook  # an extra, for tables in this format only
-    except ImportError:
-        raise refuse(label, f"spreadsheets need openpyxl: {install('report')}") from None
-    yield TextTable(label, _sheet_rows(path, load_workbook), "", known, problems)
+def _read_rows(path: Location, problems: ProblemList) -> DesignList:
+    with open_table(path, MOST_ROWS, _NAMES, problems) as table:
+        return _designs_of(table, path, problems)
 
 
 def _designs_of(table: TextTable, path: Location, problems: ProblemList) -> DesignList:
-    """Return the designs of a table of text; with mistakes in the header or the cells they are not usable."""
+    """Return the designs of a table; with mistakes in the header or the cells they are not usable."""
     before = len(problems.problems)
     columns = read_header(table.names, table.positions, problems)
     numbers: dict[str, list[np.ndarray]] = {column.field.name: [] for column in columns if column and column.field}
@@ -458,7 +442,7 @@ def _designs_of(table: TextTable, path: Location, problems: ProblemList) -> Desi
                 if len(words[column.name].codes) > MOST_WORDS:
                     raise refuse(table.label, _TOO_MANY_WORDS.format(column.name))
                 continue
-            values = to_input_unit(table.numbers(rows, index, column.name, column.field.unit), column)
+            values = table.numbers(rows, index, column.name, column.field.unit) * float(column.factor)
             for row, message in check_values(values, column.field):
                 if not np.isnan(values[row]):  # those have been reported as they were read
                     table.alike.add("cells", table.position(rows[row], index), column.name, message)
@@ -501,20 +485,13 @@ def _are_numbers(cells: Iterable[str]) -> bool:
         return False
 
 
-def _read_rows(path: Location, problems: ProblemList) -> DesignList:
-    with open_table(path, MAX_TABLE_ROWS, _NAMES, problems) as table:
-        return _designs_of(table, path, problems)
-
-
-def _sheet_rows(path: Location, load_workbook: Callable[..., Any]) -> Iterator[Row]:
-    """Yield the rows of the first sheet, empty cells at their ends as far as the first row has names.
-
-    Raises
-    ------
-    SettingsError
-        The file is damaged, larger than a spreadsheet can be, or has formulas without values.
-    """
+def _sheet_rows(path: Location) -> Iterator[Row]:
+    """Yield the rows of the first sheet, empty cells at their ends as far as the first row has names."""
     label = str(path)
+    try:
+        from openpyxl import load_workbook  # an extra, for tables in this format only
+    except ImportError:
+        raise refuse(label, f"spreadsheets need openpyxl: {install('report')}") from None
     try:
         source = source_of(path)
         with zipfile.ZipFile(source) as archive:
@@ -587,7 +564,7 @@ def _read_columns(path: Location, problems: ProblemList) -> DesignList:
     label = str(path)
     try:
         with opened(path) as source:
-            return _checked_columns(TableFile(source, MAX_TABLE_ROWS, most_text=math.inf), path, problems)
+            return _checked_columns(TableFile(source, MOST_ROWS, most_text=math.inf), path, problems)
     except ParquetError as problem:
         raise refuse(label, str(problem)) from None
     except OSError as error:
@@ -627,7 +604,7 @@ def _checked_columns(file: TableFile, path: Location, problems: ProblemList) -> 
         if cells.null_count:
             problems.add(position, name, f"has {cells.null_count} empty cells; every design needs a value")
             continue
-        values = to_input_unit(cells.cast(pa.float64(), safe=False).to_numpy(), column)
+        values = cells.cast(pa.float64(), safe=False).to_numpy() * float(column.factor)
         for row, message in check_values(values, column.field):
             alike.add("rows", position, name, f"row {row + 1}: {message}")
         designs.columns[column.field.name] = np.ascontiguousarray(values)
@@ -792,8 +769,3 @@ def label_of(texts: list[str]) -> Label:
     """Return texts, one a row, as codes and words; fit to be printed."""
     words, codes = np.unique(np.array([shorten(text, MAX_TEXT) for text in texts], dtype=object), return_inverse=True)
     return Label(codes.astype(np.int32), tuple(words.tolist()))
-
-
-def to_input_unit(values: np.ndarray, column: TableColumn) -> np.ndarray:
-    """Return values in the unit of the input."""
-    return values if column.factor == 1 else values * float(column.factor)

@@ -507,26 +507,13 @@ def shown_as(stored: str, unit: str, meaning: str, units: str) -> ShownColumn:
     return ShownColumn(stored, name, other, size, meaning)
 
 
-def shown_values(values: Mapping[str, Any], units: str) -> dict[str, Any]:
-    """Return values by names of columns in the units asked for; what is no column stays as it is."""
-    shown_by_name = {}
-    for name, value in values.items():
-        if name not in BY_NAME:
-            shown_by_name[name] = value
-            continue
-        column = shown_column(name, units)
-        is_other = isinstance(value, float) and column.size != 1.0
-        shown_by_name[column.name] = float(in_unit(np.array(value), column.size)) if is_other else value
-    return shown_by_name
-
-
 def shown_settings(settings: Mapping[str, Any], units: str) -> dict[str, Any]:
-    """Return the resolved settings in the units asked for: numbers under a name that ends in a unit, and its name.
+    """Return resolved settings or a row in the units asked for: numbers under a name that ends in a unit, and its name.
 
     Parameters
     ----------
     settings
-        See `boulder_sweep.settings.Sweep.resolved`, or a part of it.
+        See `boulder_sweep.settings.Sweep.resolved`, or a part of it; or values by names of columns.
     units
         ``si`` or ``us``.
     """
@@ -537,7 +524,7 @@ def shown_settings(settings: Mapping[str, Any], units: str) -> dict[str, Any]:
         if name == "order" and isinstance(value, list):
             shown_by_name[name] = [shown_column(one, units).name if one in BY_NAME else one for one in value]
             continue
-        unit = max((unit for unit in _SHOWN if name.endswith(name_suffix(unit))), key=len, default="")
+        unit = max((unit for unit in (*_SHOWN, *_FORCES) if name.endswith(name_suffix(unit))), key=len, default="")
         shown = shown_as(name, unit, "", units)
         shown_by_name[shown.name] = _shown_setting(value, shown.size, units)
     return shown_by_name

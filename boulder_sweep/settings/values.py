@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
@@ -162,17 +162,29 @@ def read_single(node: Node, field: Field) -> float:
     return value
 
 
-def read_entries(node: Node, known: dict[str, Field], what: str, mistakes: Mistakes) -> dict[str, float]:
-    """Return the single values of a block by their keys; unknown keys and wrong values go to `mistakes`.
+def read_block(node: Node, known: dict[str, Field], what: str, required: Collection[str] = ()) -> dict[str, float]:
+    """Return the single values of a block by the names of its fields.
+
+    Parameters
+    ----------
+    node : Node
+        Must be a block.
+    known : dict of str to Field
+        What may be in it, by key.
+    what : str
+        What it is, for messages: ``a layer``.
+    required : collection of str
+        Keys that it must have.
 
     Raises
     ------
     LeafError
-        It is no block.
+        With every mistake in it.
     """
     if not isinstance(node, Mapping) or node.unit is not None:
         raise wrong(node.position, f"{what} must be a block of keys: {', '.join(known)}")
     values: dict[str, float] = {}
+    mistakes = Mistakes()
     for entry in node:
         field = known.get(entry.key)
         if field is None:
@@ -180,10 +192,14 @@ def read_entries(node: Node, known: dict[str, Field], what: str, mistakes: Mista
             mistakes.add(entry.position, message)
             continue
         try:
-            values[entry.key] = read_single(entry.value, field)
+            values[field.name] = read_single(entry.value, field)
         except LeafError as error:
             for mistake in error.mistakes:
                 mistakes.add(mistake.position, f"{entry.key}: {mistake.message}")
+    missing = [key for key in required if key not in node.entries]
+    if missing and not mistakes:
+        mistakes.add(node.position, f"the {what.partition(' ')[2]} lacks {', '.join(missing)}")
+    mistakes.raise_if_any()
     return values
 
 
@@ -223,20 +239,6 @@ def _fits(value: Node, field: Field) -> bool:
         return True
     except UnitError:
         return False
-
-
-def read_block(node: Node, known: dict[str, Field], what: str) -> dict[str, float]:
-    """Return the single values of a block by the names of its fields.
-
-    Raises
-    ------
-    LeafError
-        With every mistake in it, see `read_entries`.
-    """
-    mistakes = Mistakes()
-    values = read_entries(node, known, what, mistakes)
-    mistakes.raise_if_any()
-    return {known[key].name: value for key, value in values.items()}
 
 
 def sample_of(field: Field) -> str:

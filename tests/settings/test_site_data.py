@@ -304,13 +304,6 @@ def test_what_was_used_is_said_and_kept(soil):
     assert data["readings"][0]["friction_angles_deg"] == pytest.approx(sand.angles_by_blow_count(30.6))
 
 
-def test_tables_that_kept_one_angle_of_a_reading_are_still_put_in_words(soil):
-    (data,) = soil(RAW).resolved()["derived"]["soil"]
-    for reading in data["readings"]:
-        del reading["friction_angles_deg"]
-    assert "rods 0.75 (Wolff 1989); density" in derived_words({"soil": [data]})[0]
-
-
 def test_named_soils_have_readings_of_their_own(load_it, minimal):
     soils = "soil: [{name: a, spt: {n1_60: 20}}, {name: b, relative_density: 60 %}, {name: c, density: 1800, "
     soils += "friction_angle: 38, subgrade_reaction: 40}]\n"

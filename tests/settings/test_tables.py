@@ -731,7 +731,7 @@ def test_more_columns_than_a_table_has(tmp_path, name):
     ],
 )
 def test_every_limit_of_a_text(tmp_path, monkeypatch, text, words):
-    monkeypatch.setattr("boulder_sweep.settings.tables.MAX_TABLE_ROWS", 6 if "lines" in words else 10**6)
+    monkeypatch.setattr("boulder_sweep.settings.tables.MOST_ROWS", 6 if "lines" in words else 10**6)
     monkeypatch.setattr("boulder_sweep.settings.tables.MOST_WORDS", 2)
     monkeypatch.setattr("boulder_sweep.settings.tables._TOO_MANY_WORDS", "column {} has more than 2 different words")
     monkeypatch.setattr("boulder_sweep.settings.tables.MOST_BYTES", 40 if "bytes" in words else 10**6)
