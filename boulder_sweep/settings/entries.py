@@ -625,7 +625,7 @@ def _read_readings(node: Node) -> ReadingChoice:
             else:
                 mistakes.add(entry.position, unknown_word(entry.key, "a reading", ("preset", *SWITCHES)))
     mistakes.raise_if_any()
-    return ReadingChoice(**{**ReadingChoice.of_preset(preset).as_dict(), **switches})
+    return replace(ReadingChoice.of_preset(preset), **switches)
 
 
 def _read_soil(node: Node) -> int:

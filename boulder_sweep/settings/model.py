@@ -245,14 +245,9 @@ class Shape:
         return [asdict(point) for point in self.points]
 
     @classmethod
-    def of_list(cls, points: list[dict[str, float]]) -> Shape:
-        """Return the shape that `as_list` returned; a box of no data."""
-        return cls(tuple(ProfilePoint(**point) for point in points))
-
-    @classmethod
     def of_model(cls, model: Mapping[str, Any]) -> Shape:
-        """Return the shape in the part `model` of resolved settings."""
-        return cls.of_list(model.get("profile", []))
+        """Return the shape in the part `model` of resolved settings; a box where that has none."""
+        return cls(tuple(ProfilePoint(**point) for point in model.get("profile", [])))
 
     @property
     def words(self) -> str:
@@ -443,11 +438,7 @@ class ReadingChoice:
     @property
     def corrected(self) -> tuple[bool, ...]:
         """Which readings are corrected, in the order of the kernels."""
-        return tuple(reading != PRINTED for reading in self.as_dict().values())
-
-    def as_dict(self) -> dict[str, str]:
-        """Return switch: value, in order."""
-        return asdict(self)
+        return tuple(reading != PRINTED for reading in asdict(self).values())
 
 
 @dataclass(frozen=True, slots=True)
@@ -492,10 +483,6 @@ class Ground:
         """Whether the resistance grows in proportion to depth, as in the paper's soil."""
         return not self.layers and self.cohesion_kPa == 0.0 and self.water_table_m in (None, 0.0)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return everything as plain data."""
-        return asdict(self)
-
     def words_in(self, length: tuple[str, float], pressure: tuple[str, float]) -> str:
         """Return what there is of it, in units with their sizes in m and kPa; empty where there is nothing."""
         cohesions = [self.cohesion_kPa, *(layer.cohesion_kPa for layer in self.layers)]
@@ -515,7 +502,7 @@ class Ground:
 
     @classmethod
     def of_dict(cls, given: dict[str, Any]) -> Ground:
-        """Return the ground that `as_dict` returned; the usual one of no data."""
+        """Return the ground of plain data, see `asdict`; the usual one of none."""
         return cls(**given | {"layers": tuple(Layer(**layer) for layer in given.get("layers", ()))})
 
 

@@ -327,7 +327,7 @@ class Sweep:
             "criterion": asdict(self.criterion),
             "model": {
                 "preset": self.model.preset,
-                "readings": self.model.readings.as_dict(),
+                "readings": asdict(self.model.readings),
                 "soil": self.model.soil_elements or CLOSED_FORM,
                 "calibrated_crush_m": self.model.calibrated_crush_m,
                 "resistance": self.model.resistance,
@@ -335,7 +335,7 @@ class Sweep:
                 **({"rock_assumed": True} if self.model.rock_assumed else {}),
                 **({} if self.model.shape.is_box else {"profile": self.model.shape.as_list()}),
                 **({} if self.model.scan is None else {"scan": asdict(self.model.scan)}),
-                **({} if ground.is_usual else {"ground": ground.as_dict()}),
+                **({} if ground.is_usual else {"ground": asdict(ground)}),
                 **({"second_opinion": list(opinions)} if (opinions := self.model.second_opinion) else {}),
             },
             "solver": {

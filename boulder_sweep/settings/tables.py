@@ -35,7 +35,6 @@ from boulder_sweep.settings.problems import (
     Position,
     ProblemList,
     SettingsError,
-    cell_position,
     check_regular_file,
     nearest,
     refuse,
@@ -127,12 +126,13 @@ class TextTable:
         self.rows = self._even(filled, self.position(header, -self._first))
 
     def position(self, row: Row, index: int) -> Position:
-        """Return where the cell of a column begins."""
+        """Return where the cell of a column begins; with quotation marks in the line, only the line is certain."""
         _, line, text = row
         index += self._first
-        if self.delimiter:
-            return cell_position(self.label, line, text, self.delimiter, index)
-        return Position(self.label, line, index + 1)
+        if '"' in text:
+            return Position(self.label, line)
+        before = sum(len(cell) + 1 for cell in text.split(self.delimiter)[:index]) if self.delimiter else index
+        return Position(self.label, line, before + 1)
 
     def put_back(self, row: Row) -> None:
         """Let a row be the next one again."""

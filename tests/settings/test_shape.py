@@ -92,7 +92,7 @@ def test_a_constant_profile_and_a_taper_of_one_are_boxes(load_it, minimal):
 
 def test_settings_are_read_back(load_it, minimal):
     shape = load_it(with_profile(minimal, POINTS)).model.shape
-    assert Shape.of_list(shape.as_list()) == shape
+    assert Shape.of_model({"profile": shape.as_list()}) == shape
 
 
 @pytest.mark.parametrize(
