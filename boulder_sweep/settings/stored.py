@@ -52,46 +52,23 @@ _OTHER_BOUNDS = {
     "n_designs": Bound(0, math.inf, ""),
     "count": Bound(1, MOST_ROWS, ""),  # some values are made from it
     "soil": Bound(1, MAX_ELEMENTS, ""),
-    "h": Bound(1e-7, 1.0, ""),
-    "horizon": Bound(1e-4, 100.0, ""),
-    "theta_limit": Bound(math.radians(0.01), math.radians(90.0), ""),
-    "elements": Bound(0, MAX_ELEMENTS, ""),
-    "longest_horizon": Bound(0.0, 1e4, ""),
-    "event_tolerance": Bound(1e-12, 1.0, ""),
 }
-
-
-@dataclass
-class _Control:
-    """Entries of `boulder_kernels.Control`.
-
-    The kernels are not asked: to import them, and the compiler with them, takes longer than to read a table.
-    """
-
-    h: float
-    horizon: float
-    theta_limit: float
-    elements: int
-    longest_horizon: float
-    event_tolerance: float
-    error_estimate: bool
-    stop_at_limit: bool
-    locate_yield: bool
-    refined: bool
-    last_resort: bool
-    paired: bool
-    side_by_side: bool
-
-
-@dataclass
-class _Readings:
-    """Entries of `boulder_kernels.Readings`."""
-
-    inertia_box: bool
-    arm_geometric: bool
-    contact_left_face: bool
-    restoring_gravity: bool
-    separation_released: bool
+_CONTROL: dict[str, tuple[type, float, float]] = {
+    "h": (float, 1e-7, 1.0),
+    "horizon": (float, 1e-4, 100.0),
+    "theta_limit": (float, math.radians(0.01), math.radians(90.0)),
+    "elements": (int, 0, MAX_ELEMENTS),
+    "longest_horizon": (float, 0.0, 1e4),
+    "event_tolerance": (float, 1e-12, 1.0),
+    **dict.fromkeys(
+        ("error_estimate", "stop_at_limit", "locate_yield", "refined", "last_resort", "paired", "side_by_side"),
+        (bool, 0, 1),
+    ),
+}
+"""Entries of `boulder_kernels.Control` with their types and bounds. The kernels are not asked: to import them, and the
+compiler with them, takes longer than to read a table."""
+_READINGS = {"inertia_box", "arm_geometric", "contact_left_face", "restoring_gravity", "separation_released"}
+"""Names of the entries of `boulder_kernels.Readings`."""
 
 
 @dataclass
@@ -191,7 +168,7 @@ def check_entries(entries: Any, kind: type[Any], path: str) -> None:
         raise ValueError(shorten(wrong, 200))
 
 
-def check_control(control: Any, readings: Any) -> None:
+def check_control(control: dict[str, Any], readings: dict[str, Any]) -> None:
     """Check how a result says that the motion was integrated.
 
     Parameters
@@ -206,8 +183,14 @@ def check_control(control: Any, readings: Any) -> None:
     ValueError
         An entry is missing, unknown, or no value that a settings file leads to.
     """
-    check_entries(control, _Control, "control")
-    check_entries(readings, _Readings, "readings")
+    if control.keys() != _CONTROL.keys():
+        raise ValueError(f"control has other entries than {', '.join(_CONTROL)}")
+    for name, (kind, low, high) in _CONTROL.items():
+        value = control[name]
+        if not _is_of(value, kind) or not low <= value <= high:
+            raise ValueError(f"control.{name} is {str(value)[:60]!r}, which no settings give")
+    if readings.keys() != _READINGS or any(type(value) is not bool for value in readings.values()):
+        raise ValueError("readings are not the five of the paper")
 
 
 def _mistakes(value: Any, kind: Any, path: str) -> Iterator[str]:
