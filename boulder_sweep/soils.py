@@ -14,8 +14,7 @@ from boulder_kernels import DesignTable
 from boulder_kernels import ground as kernels
 from boulder_kernels.pieces import FRICTION, PRESSURE, PiecewiseTable
 from boulder_kernels.table import some_rows
-from boulder_sweep.settings.model import RESISTANCES, Ground
-from boulder_sweep.settings.shape import BOX, ProfilePoint, Shape
+from boulder_sweep.settings.model import BOX, RESISTANCES, Ground, ProfilePoint, Shape
 from boulder_sweep.stones.taped import taped_profiles
 
 SLICES = 16

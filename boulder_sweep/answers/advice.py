@@ -17,7 +17,7 @@ from boulder_sweep.designs import SIDES
 from boulder_sweep.judge.robustness import DECISIVE, MEANINGS, can_be_asked
 from boulder_sweep.judge.validity import BY_FLAG, UNSTUDIED
 from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT
-from boulder_sweep.settings.shown_units import quantity_text, shown_unit
+from boulder_sweep.settings.units import quantity_text, shown_unit
 from boulder_sweep.text import NO_BREAK_SPACE
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from boulder_sweep.judge.quantities import BACKFILLED, EXCAVATED
 from boulder_sweep.judge.validity import NOT_A_RATING, flag_counts
 from boulder_sweep.settings.fields import BOULDER_MASS, BY_NAME, EMBEDMENT
 from boulder_sweep.settings.model import FOOT_WORDS
-from boulder_sweep.settings.shown_units import number_text, quantity_text, shown_unit
+from boulder_sweep.settings.units import number_text, quantity_text, shown_unit
 from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.text import NO_BREAK_SPACE, counted
 

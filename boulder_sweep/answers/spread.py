@@ -14,8 +14,8 @@ import numpy as np
 
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.quantiles import values_of
-from boulder_sweep.settings.distributions import Distribution, SetDistributions
 from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT
+from boulder_sweep.settings.model import Distribution, SetDistributions
 
 if TYPE_CHECKING:
     from boulder_sweep.answers.trials import InputRows

@@ -15,7 +15,7 @@ from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 from boulder_sweep.judge.judged import PASS, Judged, joined
 from boulder_sweep.judge.robustness import standing
 from boulder_sweep.settings import fields
-from boulder_sweep.settings.distributions import SetDistributions
+from boulder_sweep.settings.model import SetDistributions
 from boulder_sweep.settings.sweep import DesignList
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from boulder_sweep.columns import BY_NAME, VERDICTS, WAY_OUT
 from boulder_sweep.settings.fields import TO_BE_FOUND
 from boulder_sweep.settings.model import FOOT_WORDS, RESISTANCES
-from boulder_sweep.settings.shown_units import ShownColumn, shown_column, shown_settings, shown_unit
+from boulder_sweep.settings.units import ShownColumn, shown_column, shown_settings, shown_unit
 from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.text import counted, duration_text, size_text
 

@@ -79,7 +79,7 @@ def run(
 ) -> int:
     """Simulate every design of GRID and write the table of verdicts."""
     from boulder_sweep.cli import console
-    from boulder_sweep.settings.shown_units import shown_settings
+    from boulder_sweep.settings.units import shown_settings
 
     if options["resume"] and options["overwrite"]:
         raise click.UsageError("--resume and --overwrite cannot be used together")
@@ -157,7 +157,7 @@ def compare(before: str, after: str, listed: int, units: str | None, as_json: bo
     Lists the designs that changed most.
     """
     from boulder_sweep.report.comparison import compare as match
-    from boulder_sweep.settings.shown_units import shown_unit
+    from boulder_sweep.settings.units import shown_unit
 
     refuse_units_of_json(units, as_json)
     comparison = match(before, after)
@@ -206,7 +206,7 @@ def _count_lines(before: str, after: str, comparison: Comparison, units: str) ->
 
 def _answer_lines(name: str, comparison: Comparison, listed: int, units: str) -> list[str]:
     """Return how an answer changed in all, and the designs in which it changed most."""
-    from boulder_sweep.settings.shown_units import shown_as
+    from boulder_sweep.settings.units import shown_as
 
     shown = shown_as(name, comparison.answers[name], "", units)
     counts = comparison.to_dict()["answers"][name]

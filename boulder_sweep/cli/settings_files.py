@@ -31,7 +31,7 @@ def new(file: Path, vehicle: str | None, units: str | None) -> int:
     """
     from boulder_sweep.errors import ExistingFileError
     from boulder_sweep.settings import load
-    from boulder_sweep.settings.starter import CLASSES, is_published, starter
+    from boulder_sweep.settings.fields import CLASSES, is_published, starter
 
     asks = vehicle is None and units is None and sys.stdin.isatty()
     vehicle, units = (vehicle or next(iter(CLASSES))).upper(), units or SYSTEMS[0]
@@ -83,7 +83,7 @@ def _question_of(file: Path) -> str:
 
 def _lines_to_fill_in(file: Path, vehicle: str, units: int) -> list[str]:
     """Return which entries of a vehicle have no published values, and how to measure them."""
-    from boulder_sweep.settings.starter import CATEGORIES, CLASSES
+    from boulder_sweep.settings.fields import CATEGORIES, CLASSES
 
     mass = CATEGORIES[CLASSES[vehicle][0]][0][units]
     return [

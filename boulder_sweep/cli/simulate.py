@@ -85,7 +85,7 @@ def simulate(
     not every outcome is the same to the last bit, what has changed since is printed: versions, kernels, rules.
     """
     from boulder_sweep.cli import console
-    from boulder_sweep.settings.shown_units import shown_settings, shown_unit, shown_values
+    from boulder_sweep.settings.units import shown_settings, shown_unit
 
     number, again, location = design or 0, None, location_of(case)
     if _is_result(location):
@@ -110,7 +110,9 @@ def simulate(
     if reason:
         say(f"design {number} cannot be computed: {reason}")
         if again is not None:
-            lone = {"design_id": number} | shown_values(again.inputs | again.stored, in_json) | again.compared(in_json)
+            lone = (
+                {"design_id": number} | shown_settings(again.inputs | again.stored, in_json) | again.compared(in_json)
+            )
             show(*[json.dumps(lone)] if as_json else _compared_lines(again))
         return EXIT_SOME_ROWS_FAILED
     if (words := sweep.model.ground.words_in(shown_unit("m", units), shown_unit("kPa", units))) and not quiet:
@@ -130,7 +132,7 @@ def simulate(
         say("\n".join(wrap(f"note: what follows is decided and drawn with {words_of(decided_at[0], units)}")))
     # Before anything else: there may be nothing to draw, and a film takes a while.
     row = result.summary() if again is None else {"design_id": number, **again.inputs, **again.stored}
-    whole = shown_values(row | _to_build(result), in_json if as_json else units)
+    whole = shown_settings(row | _to_build(result), in_json if as_json else units)
     if as_json:
         show(json.dumps(whole if again is None else whole | again.compared(in_json)))
     else:
@@ -214,7 +216,7 @@ def impact_lines(row: Mapping[str, Any], history: Trajectory, units: str = "si")
         ``si`` or ``us``.
     """
     from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
-    from boulder_sweep.settings.shown_units import quantity_text
+    from boulder_sweep.settings.units import quantity_text
 
     metres = partial(quantity_text, "m", units)
     limit = math.degrees(history.motion.control.theta_limit)
@@ -249,7 +251,7 @@ def _to_build(history: Trajectory) -> dict[str, float]:
 
 def build_line(history: Trajectory, units: str = "si") -> str:
     """Return in words what a design takes to build."""
-    from boulder_sweep.settings.shown_units import quantity_text
+    from boulder_sweep.settings.units import quantity_text
 
     mass, above, *volumes = _to_build(history).values()
     weight = f"{mass / 1e3:.1f} t" if units == "si" else quantity_text("kg", units, mass, digits=",.0f")

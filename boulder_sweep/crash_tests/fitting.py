@@ -24,7 +24,8 @@ from boulder_sweep.crash_tests.rigid_wall import RigidWall
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import FitError
 from boulder_sweep.settings.fields import BY_NAME
-from boulder_sweep.settings.values import is_unusual, range_words
+from boulder_sweep.settings.units import range_words
+from boulder_sweep.settings.values import is_unusual
 
 MISFIT, NOT_NEAR = 0.05, 0.15
 """Root mean square of a misfit as a share of the signal's range, from which on the user is warned, and from which on

@@ -24,7 +24,7 @@ from boulder_sweep.settings.problems import (
     refuse,
     shorten,
 )
-from boulder_sweep.settings.text_table import MAX_BYTES, TextTable, open_text
+from boulder_sweep.settings.tables import MAX_BYTES, TextTable, open_table
 from boulder_sweep.settings.units import UnitError, factor
 
 MOST_ROWS = 2_000_000
@@ -94,7 +94,7 @@ def read_history(path: str | Path, wanted: Sequence[Signal]) -> TimeHistory:
     file = Path(path)
     check_regular_file(file, MAX_BYTES, "Keep the impact, and leave out what comes before and after")
     problems = ProblemList()
-    with open_text(file, MOST_ROWS, [f"{signal.name} [{signal.unit}]" for signal in wanted], problems) as table:
+    with open_table(file, MOST_ROWS, [f"{signal.name} [{signal.unit}]" for signal in wanted], problems) as table:
         columns = _columns(table, wanted, problems)
         parts: dict[str, list[np.ndarray]] = {column.signal.name: [] for column in columns}
         last = -np.inf

@@ -22,10 +22,9 @@ from boulder_sweep.judge.robustness import can_be_asked
 from boulder_sweep.judge.verdict import limits_of
 from boulder_sweep.locations import Location, location_of
 from boulder_sweep.settings import Sweep
-from boulder_sweep.settings.model import Criterion, Ground, Model, ReadingChoice, SolverSettings
-from boulder_sweep.settings.shape import Shape
-from boulder_sweep.settings.shown_units import shown_values
+from boulder_sweep.settings.model import Criterion, Ground, Model, ReadingChoice, Shape, SolverSettings
 from boulder_sweep.settings.sweep import DesignList, allowed_in, units_in
+from boulder_sweep.settings.units import shown_settings
 from boulder_sweep.store.part import part_table
 from boulder_sweep.store.provenance import differences, identity, judged_by
 from boulder_sweep.store.reading import FinishedRows
@@ -76,7 +75,7 @@ class Recomputation:
     def compared(self, units: str = "si") -> dict[str, Any]:
         """Return how the row comes out now as plain data, in ``si`` or ``us`` units."""
         were, are = (
-            shown_values({name: outcomes[name] for name in self.unequal}, units)
+            shown_settings({name: outcomes[name] for name in self.unequal}, units)
             for outcomes in (self.stored, self.recomputed)
         )
         return {

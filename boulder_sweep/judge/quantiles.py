@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boulder_sweep.errors import QuestionError
-from boulder_sweep.settings.distributions import SetDistributions
 from boulder_sweep.settings.fields import BY_NAME
-from boulder_sweep.settings.shown_units import quantity_text
+from boulder_sweep.settings.model import SetDistributions
+from boulder_sweep.settings.units import quantity_text
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
-    from boulder_sweep.settings.distributions import Distribution
+    from boulder_sweep.settings.model import Distribution
 
 MEAN, UNFAVOURABLE = "mean", "p5"
 """What ``--at`` may be beside other percentages, and its default."""

@@ -11,8 +11,8 @@ from boulder_sweep.answers.outputs import MARKS, NEED, RUN, UNCERTAINTY, AnswerF
 from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.errors import ReportError
 from boulder_sweep.locations import Location, location_of
-from boulder_sweep.settings.shown_units import SYSTEMS
 from boulder_sweep.settings.sweep import IMPACT_HEIGHT_RULE, units_in
+from boulder_sweep.settings.units import SYSTEMS
 from boulder_sweep.store.provenance import differences
 from boulder_sweep.store.reading import FinishedRows, read
 from boulder_sweep.text import counted

@@ -33,7 +33,8 @@ from boulder_sweep.columns import BOULDER_MASS, BY_NAME, DESIGN_ID
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.quantities import NEEDED, QUANTITIES, quantities_by
 from boulder_sweep.locations import Location, location_of, replacing
-from boulder_sweep.settings.shown_units import (
+from boulder_sweep.settings.sweep import units_in
+from boulder_sweep.settings.units import (
     ShownColumn,
     check_system,
     in_unit,
@@ -41,7 +42,6 @@ from boulder_sweep.settings.shown_units import (
     shown_column,
     shown_settings,
 )
-from boulder_sweep.settings.sweep import units_in
 from boulder_sweep.store.folder import check_target
 from boulder_sweep.store.reading import FinishedRows
 from boulder_sweep.text import install, printable, why

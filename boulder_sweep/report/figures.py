@@ -17,10 +17,9 @@ from bokeh.models import ColumnDataSource, DataRange1d, HoverTool, TapTool
 from bokeh.models.annotations import BoxAnnotation
 from bokeh.plotting import figure
 
-from boulder_sweep.settings.model import Ground
-from boulder_sweep.settings.shape import BOX, ProfilePoint, Shape
-from boulder_sweep.settings.shown_units import shown_unit
+from boulder_sweep.settings.model import BOX, Ground, ProfilePoint, Shape
 from boulder_sweep.settings.soil_readings import log_title, shown_readings, strength
+from boulder_sweep.settings.units import shown_unit
 from boulder_sweep.views.log_text import layer_words, quantity
 from boulder_sweep.views.pictures import VERDICTS
 

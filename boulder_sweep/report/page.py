@@ -39,11 +39,10 @@ from boulder_sweep.report.rows import MOST_ELEMENTS, NOT_YET, ResultRows, label_
 from boulder_sweep.settings.checks import FLOATS, SLIDES, uppermost_is_wet
 from boulder_sweep.settings.entries import LAYER_FIELDS
 from boulder_sweep.settings.fields import BY_NAME, fields_of
-from boulder_sweep.settings.model import FEET, RESISTANCES, WATER_KG_M3, Ground
-from boulder_sweep.settings.shape import Shape
-from boulder_sweep.settings.shown_units import SYSTEMS, quantity_text, shown_settings, shown_unit
+from boulder_sweep.settings.model import FEET, RESISTANCES, WATER_KG_M3, Ground, Shape
 from boulder_sweep.settings.sweep import derived_words
-from boulder_sweep.settings.values import EMPTY, NOT_A_NUMBER, OUTSIDE, needed, sample_of
+from boulder_sweep.settings.units import SYSTEMS, needed, quantity_text, shown_settings, shown_unit
+from boulder_sweep.settings.values import EMPTY, NOT_A_NUMBER, OUTSIDE, sample_of
 from boulder_sweep.soils import SLICES, ground_of, is_layered, layers_count, profile_of
 from boulder_sweep.text import script_data
 from boulder_sweep.views.wording import LAW_WORDS, REASON_WORDS, ground_words

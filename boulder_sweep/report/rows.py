@@ -24,7 +24,7 @@ from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.quantities import NEEDED, quantities_by
 from boulder_sweep.locations import Location
 from boulder_sweep.settings.fields import BY_NAME
-from boulder_sweep.settings.shape import Shape
+from boulder_sweep.settings.model import Shape
 from boulder_sweep.store.reading import FinishedRows
 from boulder_sweep.text import counted
 

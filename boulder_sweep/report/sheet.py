@@ -21,8 +21,8 @@ from boulder_sweep.report.answers import Answer, AnswerTable, Measure
 from boulder_sweep.report.figures import Sketch, sketch_of
 from boulder_sweep.report.rows import DEPTH, ResultRows, inputs_of, label_of
 from boulder_sweep.settings.fields import BY_NAME
-from boulder_sweep.settings.shape import ProfilePoint
-from boulder_sweep.settings.shown_units import SYSTEMS, quantity_text
+from boulder_sweep.settings.model import ProfilePoint
+from boulder_sweep.settings.units import SYSTEMS, quantity_text
 from boulder_sweep.stones.taped import taped_profiles
 from boulder_sweep.views.wording import ground_words
 

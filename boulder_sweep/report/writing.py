@@ -24,8 +24,8 @@ from boulder_sweep.report.build import kernel
 from boulder_sweep.report.rows import MOST_ELEMENTS, inputs_of, read_rows
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import FOOT_WORDS, SolverSettings
-from boulder_sweep.settings.shown_units import check_system, quantity_text
 from boulder_sweep.settings.sweep import NO_HEADING, SECTION, Heading, units_in, wrong_with
+from boulder_sweep.settings.units import check_system, quantity_text
 from boulder_sweep.signals import end_group, undone
 from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.store.folder import check_target

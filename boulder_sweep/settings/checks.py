@@ -15,13 +15,23 @@ from boulder_sweep.columns import BOULDER_MASS, SHAPES, WAY_OUT
 from boulder_sweep.designs import LEAST_SOLIDITY, LEAST_TAPED, MOST_SOLIDITY
 from boulder_sweep.investigation import api_curve, off_families, terzaghi_curve
 from boulder_sweep.settings import fields
-from boulder_sweep.settings.distributions import BOUNDED, Distribution, SetDistributions
 from boulder_sweep.settings.entries import Entries
 from boulder_sweep.settings.fields import BY_NAME, Field
-from boulder_sweep.settings.model import CLOSED_FORM, ENOUGH_ELEMENTS, WATER_KG_M3, Layer, Model, SolverSettings
+from boulder_sweep.settings.model import (
+    BOUNDED,
+    CLOSED_FORM,
+    ENOUGH_ELEMENTS,
+    WATER_KG_M3,
+    Distribution,
+    Layer,
+    Model,
+    SetDistributions,
+    SolverSettings,
+)
 from boulder_sweep.settings.problems import Position, Problem
 from boulder_sweep.settings.sweep import Sweep
-from boulder_sweep.settings.values import is_unusual, range_words
+from boulder_sweep.settings.units import range_words
+from boulder_sweep.settings.values import is_unusual
 from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.text import counted
 

@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,6 @@ import numpy as np
 
 from boulder_sweep.errors import ScanError
 from boulder_sweep.settings import fields
-from boulder_sweep.settings.distributions import Distribution, Input, SetDistributions, read_input
 from boulder_sweep.settings.fields import Field
 from boulder_sweep.settings.model import (
     ACCURACIES,
@@ -29,12 +29,15 @@ from boulder_sweep.settings.model import (
     SECOND_OPINIONS,
     SWITCHES,
     Bound,
+    Distribution,
     Layer,
+    ProfilePoint,
     ReadingChoice,
+    Scan,
+    SetDistributions,
+    Shape,
 )
 from boulder_sweep.settings.problems import Mistakes, Position, ProblemList, did_you_mean, shorten, unknown_word, wrong
-from boulder_sweep.settings.shape import ProfilePoint, Scan, Shape
-from boulder_sweep.settings.shown_units import SYSTEMS, system_of
 from boulder_sweep.settings.soil_readings import (
     CORRELATION,
     ENERGY,
@@ -47,13 +50,15 @@ from boulder_sweep.settings.soil_readings import (
 )
 from boulder_sweep.settings.sweep import SECTION, UNITS, DesignList
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence, block_of
-from boulder_sweep.settings.units import UnitError, factor
+from boulder_sweep.settings.units import SYSTEMS, UnitError, factor, system_of
 from boulder_sweep.settings.values import (
+    Leaf,
     NumberError,
     meant_by,
     quoted,
+    read_block,
     read_count,
-    read_entries,
+    read_input,
     read_single,
     split_number,
 )
@@ -99,12 +104,11 @@ LAYER_FIELDS = {
     field.key: field
     for field in (
         fields.LAYER_TOP,
-        *(fields.BY_NAME[name] for name in ("soil_density_kg_m3", "friction_angle_deg", "subgrade_reaction_MN_m3")),
-        fields.BY_NAME["cohesion_kPa"],
+        replace(fields.BY_NAME["soil_density_kg_m3"], name="density_kg_m3"),
+        *(fields.BY_NAME[name] for name in ("friction_angle_deg", "subgrade_reaction_MN_m3", "cohesion_kPa")),
     )
 }
 """Entries of a layer by key; all are required but the last."""
-_NAMES = dict(zip(LAYER_FIELDS, Layer.__dataclass_fields__, strict=True))
 
 
 class Entries:
@@ -112,7 +116,7 @@ class Entries:
 
     Attributes
     ----------
-    leaves : dict of str to Input
+    leaves : dict of str to Leaf
         Inputs by column (or axis) name, as far as they have no mistake.
     settings : dict of str to Any
         What holds for all designs, by the name of the attribute, as far as given and without a mistake.
@@ -136,7 +140,7 @@ class Entries:
         self.root = root
         self.path = path
         self.problems = problems
-        self.leaves: dict[str, Input] = {}
+        self.leaves: dict[str, Leaf] = {}
         self.settings: dict[str, Any] = {}
         self.given: set[str] = set()
         self.misspelled: set[str] = set()
@@ -185,12 +189,12 @@ class Entries:
         boulder = self.root.get("boulder")
         if isinstance(boulder, Mapping) and "rock" in boulder.entries:
             with self.reporting("boulder.rock", ["boulder.density"]):
-                unfold_rock(boulder)
+                _unfold_rock(boulder)
         if isinstance(boulder, Mapping) and "scan" in boulder.entries:
             self.given.add("boulder.scan")
             folder = self._folder_of(boulder.entries["scan"].position)
             with self.reporting("boulder.scan", [f"boulder.{key}" for key in (*SIDES, "density")]):
-                self.settings["scan"], self.cautions = unfold_scan(boulder, folder)
+                self.settings["scan"], self.cautions = _unfold_scan(boulder, folder)
 
     def _unfold_soils(self) -> None:
         """Replace the readings of an investigation by soil constants."""
@@ -236,10 +240,10 @@ class Entries:
         if points:
             for path in sorted(self.given & {*sides, "boulder.taper"}):
                 self.report(path, "is part of boulder.profile; remove one of them")
-            for key, value in sides_of(points).items():
+            for key, value in _sides_of(points).items():
                 at = self.position_of("boulder.profile")
-                self.leaves[f"boulder_{key}_m"] = Input(np.array([value]), False, at)
-            self.settings["profile"] = shares_of(points)
+                self.leaves[f"boulder_{key}_m"] = Leaf(np.array([value]), False, at)
+            self.settings["profile"] = _shares_of(points)
         self.given |= sides  # a profile with mistakes is reported, and its sides are not missing
 
     def _folder_of(self, position: Position) -> Path:
@@ -270,7 +274,7 @@ class Entries:
         if node is None:
             return
         # The csv module is needed for tables only.
-        from boulder_sweep.settings.design_list import read_designs
+        from boulder_sweep.settings.tables import read_designs
 
         if not isinstance(node, Scalar) or not node.text.strip():
             self.problems.add(node.position, "table", "must be the name of a .csv, .xlsx or .parquet file")
@@ -306,13 +310,13 @@ class Entries:
                 elif field in fields.INPUTS:
                     self.leaves[field.name] = read_input(inner.value, field)
                 else:
-                    self.settings[field.name] = read_setting(inner.value, field)
+                    self.settings[field.name] = _read_setting(inner.value, field)
 
     def _read_sets(self, section: str, node: Sequence, known: dict[str, Field]) -> None:
         """Read a list of named sets: ``[{name: loose, density: 1700 kg/m^3, ...}, ...]``."""
         before = len(self.problems.problems)
         names: list[str] = []
-        columns: dict[str, list[Input]] = {}
+        columns: dict[str, list[Leaf]] = {}
         items = node.items or [Scalar(node.position, "")]
         for item in items:
             if not isinstance(item, Mapping):
@@ -425,38 +429,26 @@ class Entries:
         self.problems.add(self.position_of(path), path, message)
 
 
-def _one_of_set(node: Node, field: Field) -> Input:
-    """Return the value that a named set gives for an input, with its distribution if it has one.
-
-    Raises
-    ------
-    LeafError
-        It is a list or a range, or wrong in itself.
-    """
+def _one_of_set(node: Node, field: Field) -> Leaf:
+    """Return the value that a named set gives for an input, with its distribution if it has one."""
     leaf = read_input(node, field)
     if leaf.distribution is None:
-        return Input(np.array([read_single(node, field)]), False, node.position, leaf.written)
+        return Leaf(np.array([read_single(node, field)]), False, node.position, leaf.written)
     if leaf.is_axis:
         raise wrong(node.position, "must have one mean in a named set")
     return leaf
 
 
-def _axis_of_sets(section: str, leaves: list[Input], position: Position) -> Input:
+def _axis_of_sets(section: str, leaves: list[Leaf], position: Position) -> Leaf:
     """Return the values that the named sets give for an input, as an axis."""
     each = tuple(one if isinstance(one := leaf.distribution, Distribution) else None for leaf in leaves)
     spread = SetDistributions(section, each) if any(each) else None
     values, positions = np.concatenate([leaf.values for leaf in leaves]), tuple(leaf.position for leaf in leaves)
-    return Input(values, True, position, leaves[0].written, positions, spread)
+    return Leaf(values, True, position, leaves[0].written, positions, spread)
 
 
-def read_layers(node: Node) -> tuple[Layer, ...]:
-    """Read ``[{from: 0.5 m, density: ..., friction_angle: ..., subgrade_reaction: ..., cohesion: ...}, ...]``.
-
-    Raises
-    ------
-    LeafError
-        With every mistake in the list.
-    """
+def _read_layers(node: Node) -> tuple[Layer, ...]:
+    """Read ``[{from: 0.5 m, density: ..., friction_angle: ..., subgrade_reaction: ..., cohesion: ...}, ...]``."""
     if not isinstance(node, Sequence) or not 1 <= len(node.items) <= MOST_LAYERS:
         message = f"must be a list of 1 to {MOST_LAYERS} layers, each a block of keys: {', '.join(LAYER_FIELDS)}"
         raise wrong(node.position, message)
@@ -464,13 +456,7 @@ def read_layers(node: Node) -> tuple[Layer, ...]:
     mistakes = Mistakes()
     for item in node.items:
         with mistakes:
-            own = Mistakes()
-            values = read_entries(item, LAYER_FIELDS, "a layer", own)
-            assert isinstance(item, Mapping)  # anything else has been refused
-            if missing := [key for key in LAYER_FIELDS if key not in item.entries and key != "cohesion"]:
-                own.add(item.position, f"the layer lacks {', '.join(missing)}")
-            own.raise_if_any()
-            layer = Layer(**{_NAMES[key]: value for key, value in values.items()})
+            layer = Layer(**read_block(item, LAYER_FIELDS, "a layer", [*LAYER_FIELDS][:-1]))
             if layers and layer.from_m <= layers[-1].from_m:
                 message = f"begins at {layer.from_m:g} m, not below the layer before it ({layers[-1].from_m:g} m)"
                 mistakes.add(item.position, message)
@@ -479,24 +465,14 @@ def read_layers(node: Node) -> tuple[Layer, ...]:
     return tuple(layers)
 
 
-def read_profile(node: Node) -> tuple[ProfilePoint, ...]:
+def _read_profile(node: Node) -> tuple[ProfilePoint, ...]:
     """Read ``[{height: 0 m, width: 1.2 m, length: 1.1 m}, ...]``, or ``near`` and ``far`` in place of ``length``.
 
-    Returns
-    -------
-    tuple of ProfilePoint
-        In metres; see `shares_of`.
-
-    Raises
-    ------
-    LeafError
-        With every mistake in the list.
+    The points are in metres; see `_shares_of`.
     """
-    keys = ", ".join(PROFILE_FIELDS)
     if not isinstance(node, Sequence) or not 2 <= len(node.items) <= MOST_POINTS or node.unit is not None:
-        raise wrong(
-            node.position, f"must be a list of 2 to {MOST_POINTS} points from the foot up, each a block of keys: {keys}"
-        )
+        message = f"must be a list of 2 to {MOST_POINTS} points from the foot up, each a block of keys: "
+        raise wrong(node.position, message + ", ".join(PROFILE_FIELDS))
     points: list[ProfilePoint] = []
     mistakes = Mistakes()
     for item in node.items:
@@ -508,53 +484,33 @@ def read_profile(node: Node) -> tuple[ProfilePoint, ...]:
                 message = f"is {point.height:g} m high, not above the point before it ({points[-1].height:g} m)"
                 mistakes.add(item.position, message)
             points.append(point)
-    if (
-        not mistakes
-        and not max(point.width for point in points) * max(point.near + point.far for point in points) > 0.0
-    ):
-        mistakes.add(node.position, "has neither width nor length")
-    if not mistakes and not Shape(shares_of(tuple(points))).stands_up:
-        message = "its centre of mass does not lie over its foot: it would fall over by itself"
-        mistakes.add(node.position, message)
     mistakes.raise_if_any()
+    if not max(point.width for point in points) * max(point.near + point.far for point in points) > 0.0:
+        raise wrong(node.position, "has neither width nor length")
+    if not Shape(_shares_of(tuple(points))).stands_up:
+        raise wrong(node.position, "its centre of mass does not lie over its foot: it would fall over by itself")
     return tuple(points)
 
 
 def _read_point(node: Node) -> ProfilePoint:
     """Read one point of a profile."""
-    mistakes = Mistakes()
-    values = read_entries(node, PROFILE_FIELDS, "a point", mistakes)
-    assert isinstance(node, Mapping)  # anything else has been refused
-    given = set(node.entries)
-    if "length" in given and given & {"near", "far"}:
-        mistakes.add(node.position, "give length, or near and far, not both")
-    wanted = ("height", "width", *(("near", "far") if given & {"near", "far"} else ("length",)))
-    missing = [key for key in wanted if key not in given]
-    if missing and not mistakes:
-        mistakes.add(node.position, f"the point lacks {', '.join(missing)}")
-    mistakes.raise_if_any()
+    given = set(node.entries) if isinstance(node, Mapping) else set()
+    reaches = given & {"near", "far"}
+    if "length" in given and reaches:
+        raise wrong(node.position, "give length, or near and far, not both")
+    needed = ("height", "width", *(("near", "far") if reaches else ("length",)))
+    values = read_block(node, PROFILE_FIELDS, "a point", needed)
     half = 0.5 * values.get("length", 0.0)
-    if values.get("near", half) + values.get("far", half) < 0.0:
+    near, far = values.get("near", half), values.get("far", half)
+    if near + far < 0.0:
         raise wrong(node.position, "near and far together are the length, which cannot be negative")
-    return ProfilePoint(values["height"], values["width"], values.get("near", half), values.get("far", half))
+    return ProfilePoint(values["height"], values["width"], near, far)
 
 
-def unfold_scan(boulder: Mapping, folder: Path) -> tuple[Scan, list[str]]:
+def _unfold_scan(boulder: Mapping, folder: Path) -> tuple[Scan, list[str]]:
     """Replace the scan of a boulder, and the mass of the whole stone beside it, by profile and density.
 
-    Returns what the scan is, and what makes one doubt it.
-
-    Parameters
-    ----------
-    boulder
-        The block of the boulder, changed in place.
-    folder
-        Where the scan lies if its name is relative.
-
-    Raises
-    ------
-    LeafError
-        With every mistake in it.
+    Returns what the scan is, and what makes one doubt it; a relative name begins in `folder`.
     """
     entry = boulder.entries.pop("scan")
     words = _read_scan_words(entry.value)
@@ -589,19 +545,8 @@ def unfold_scan(boulder: Mapping, folder: Path) -> tuple[Scan, list[str]]:
     return said, scan.surface_cautions
 
 
-def unfold_rock(boulder: Mapping) -> None:
-    """Give a boulder the density of its kind of rock: a triangular distribution over the published range.
-
-    Parameters
-    ----------
-    boulder
-        The block of the boulder, changed in place.
-
-    Raises
-    ------
-    LeafError
-        There is no such rock, or a density beside it.
-    """
+def _unfold_rock(boulder: Mapping) -> None:
+    """Give a boulder the density of its kind of rock: a triangular distribution over the published range."""
     entry = boulder.entries["rock"]
     if "density" in boulder.entries:
         raise wrong(boulder.entries["density"].position, "density follows from boulder.rock; remove one of them")
@@ -631,7 +576,7 @@ def _read_scan_words(node: Node) -> dict[str, str]:
     return words
 
 
-def sides_of(points: tuple[ProfilePoint, ...]) -> dict[str, float]:
+def _sides_of(points: tuple[ProfilePoint, ...]) -> dict[str, float]:
     """Return length, width and height [m] of the box around a profile in metres, by the keys of the file."""
     return {
         "length": max(point.near for point in points) + max(point.far for point in points),
@@ -640,21 +585,15 @@ def sides_of(points: tuple[ProfilePoint, ...]) -> dict[str, float]:
     }
 
 
-def shares_of(points: tuple[ProfilePoint, ...]) -> tuple[ProfilePoint, ...]:
+def _shares_of(points: tuple[ProfilePoint, ...]) -> tuple[ProfilePoint, ...]:
     """Return a profile in metres as shares of the box around it."""
-    sides = sides_of(points)
+    sides = _sides_of(points)
     L, W, H = sides["length"], sides["width"], sides["height"]
     return tuple(ProfilePoint(one.height / H, one.width / W, one.near / L, one.far / L) for one in points)
 
 
-def read_setting(node: Node, field: Field) -> Any:
-    """Return the value of an entry that cannot be an axis.
-
-    Raises
-    ------
-    LeafError
-        With every mistake of this entry.
-    """
+def _read_setting(node: Node, field: Field) -> Any:
+    """Return the value of an entry that cannot be an axis."""
     if field.choices:
         return _one_of(node, field.choices, field.kind)
     reader = _READERS.get(field.name)
@@ -686,7 +625,7 @@ def _read_readings(node: Node) -> ReadingChoice:
             else:
                 mistakes.add(entry.position, unknown_word(entry.key, "a reading", ("preset", *SWITCHES)))
     mistakes.raise_if_any()
-    return ReadingChoice(**{**ReadingChoice.of_preset(preset).as_dict(), **switches})
+    return replace(ReadingChoice.of_preset(preset), **switches)
 
 
 def _read_soil(node: Node) -> int:
@@ -738,8 +677,8 @@ def _read_second_opinion(node: Node) -> tuple[str, ...]:
 _READERS: dict[str, Callable[[Node], Any]] = {
     "readings": _read_readings,
     "soil_elements": _read_soil,
-    "layers": read_layers,
-    "profile": read_profile,
+    "layers": _read_layers,
+    "profile": _read_profile,
     "accuracy": _read_accuracy,
     "second_opinion": _read_second_opinion,
 }

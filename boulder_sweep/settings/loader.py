@@ -32,10 +32,10 @@ from boulder_sweep.settings.problems import (
     refuse,
     shorten,
 )
-from boulder_sweep.settings.shown_units import SYSTEMS
 from boulder_sweep.settings.sweep import SECTION, UNITS, Axis, Heading, Sweep, wrong_with
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, parse, parse_node
 from boulder_sweep.settings.tree import Sequence as List
+from boulder_sweep.settings.units import SYSTEMS
 from boulder_sweep.stones.rock import ROCK_KG_M3
 
 MAX_DESIGNS = 2**63 - 1
@@ -45,8 +45,6 @@ DENSITY = "boulder_density_kg_m3"
 MAX_BYTES = 500_000
 """Largest settings file; real ones have a few kilobytes. Long lists of designs belong in a table."""
 
-_WIDE = re.compile(rb"(?P<UTF_32>\xff\xfe\x00\x00|\x00\x00\xfe\xff)|(?P<UTF_16>\xff\xfe|\xfe\xff)")
-"""Marks at the beginning of a text in UTF-32 or UTF-16."""
 _ALTERNATIVES = {
     "site.embedment_ratio": "embedment_depth",
     "site.embedment_depth": "embedment_ratio",
@@ -137,7 +135,7 @@ def _plain(value: Any) -> Any:
 
 def _checked(root: Mapping, path: Path, overrides: Sequence[str], problems: ProblemList) -> Sweep:
     """Read and check a tree."""
-    apply_overrides(root, overrides, problems)
+    _apply_overrides(root, overrides, problems)
     units = _read_units(root, problems)
     entries = Entries(root, path, problems)
     name = _read_name(entries)
@@ -151,13 +149,7 @@ def _checked(root: Mapping, path: Path, overrides: Sequence[str], problems: Prob
 
 
 def _read_text(path: Path) -> str:
-    """Return the text of a settings file.
-
-    Raises
-    ------
-    SettingsError
-        The file cannot be read, is too large, or is not UTF-8 text.
-    """
+    """Return the text of a settings file."""
     check_regular_file(path, MAX_BYTES, "Put a long list of designs into a separate file: table: designs.csv")
     try:
         with path.open("rb") as stream:
@@ -175,12 +167,10 @@ def decode(data: bytes, label: str) -> str:
     Raises
     ------
     SettingsError
-        UTF-16 or UTF-32, zero bytes, or bytes that are not UTF-8.
+        Zero bytes, as in UTF-16, or bytes that are not UTF-8.
     """
-    if wide := _WIDE.match(data):
-        raise refuse(label, f"is {str(wide.lastgroup).replace('_', '-')} text; save it as UTF-8")
     if b"\x00" in data:
-        raise refuse(label, "is not a text file (it contains zero bytes); a YAML file in UTF-8 is needed")
+        raise refuse(label, "is not a text file (it contains zero bytes); save it as text in UTF-8")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -190,18 +180,11 @@ def decode(data: bytes, label: str) -> str:
         raise refuse(label, "is not UTF-8 text; save it as UTF-8", line, column) from None
 
 
-def apply_overrides(root: Mapping, overrides: Sequence[str], problems: ProblemList) -> None:
+def _apply_overrides(root: Mapping, overrides: Sequence[str], problems: ProblemList) -> None:
     """Put every ``key.path=value`` into the tree, in order; mistakes go to `problems`.
 
-    Parameters
-    ----------
-    root : Mapping
-        The tree of the file, changed in place.
-    overrides : sequence of str
-        As typed behind ``--set``, the key as `boulder_sweep.settings.fields.named` takes it; the value is YAML, so
-        lists and ranges work as in the file. ``--accuracy=fine`` is an option of its own.
-    problems : ProblemList
-        Receives what cannot be understood.
+    They are as typed behind ``--set``, the key as `boulder_sweep.settings.fields.named` takes it; the value is YAML, so
+    lists and ranges work as in the file. ``--accuracy=fine`` is an option of its own.
     """
     for text in overrides:
         key, equals, value_text = text.partition("=")

@@ -15,7 +15,6 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from boulder_sweep.locations import Location, LocationError, opened
-from boulder_sweep.settings.design_list import located, open_table
 from boulder_sweep.settings.problems import (
     LeafError,
     Mistake,
@@ -30,6 +29,7 @@ from boulder_sweep.settings.problems import (
     wrong,
 )
 from boulder_sweep.settings.soil_readings import CONE, READING_FIELDS, REFUSAL_BLOWS, Log, LogReading
+from boulder_sweep.settings.tables import located, open_table
 from boulder_sweep.settings.tree import Scalar
 from boulder_sweep.settings.units import UnitError, factor, suffix_unit
 from boulder_sweep.settings.values import outside

@@ -1,16 +1,22 @@
-"""The settings that are not columns, each declared once: criterion, reading of the paper, soil, solver.
+"""The settings that are not columns, each declared once: criterion, reading of the paper, soil, shape, solver.
 
 What an attribute declares with `setting` is read, checked and documented by that; see `boulder_sweep.settings.fields`.
+A boulder is a box, or has a profile of width and length over the height.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields, replace
+from itertools import pairwise
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from boulder_sweep.columns import RATINGS
-from boulder_sweep.settings.shape import ProfilePoint, Scan, Shape, tapered
-from boulder_sweep.stones.rock import ROCKS
+from boulder_sweep.settings.problems import Position
+from boulder_sweep.stones.rock import ROCKS, is_flat
 
 PRESETS = ("as_printed", "corrected")
 
@@ -45,6 +51,9 @@ FOOT_WORDS = {
 }
 """Note on the foot in every answer."""
 
+BOUNDED = ("uniform", "triangular", "beta")
+"""Kinds that reach from one end to the other; others are truncated at theirs."""
+KINDS = ("normal", "lognormal", *BOUNDED)
 ENOUGH_ELEMENTS = 200
 """Soil elements that come near their limit; a note says what fewer cost."""
 
@@ -150,6 +159,238 @@ def entries_of(part: type[Any]) -> list[Field]:
 
 
 @dataclass(frozen=True, slots=True)
+class ProfilePoint:
+    """One point of a profile, as shares of the height, the width and the length of the boulder.
+
+    Attributes
+    ----------
+    height : float
+        Over the foot.
+    width : float
+        Width there.
+    near, far : float
+        How far the boulder reaches there towards the vehicle and away from it, from the middle of its foot.
+    """
+
+    height: float
+    width: float
+    near: float
+    far: float
+
+
+BOX = (ProfilePoint(0.0, 1.0, 0.5, 0.5), ProfilePoint(1.0, 1.0, 0.5, 0.5))
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """The shape of the boulders of a file; between its points it is linear.
+
+    Attributes
+    ----------
+    points : tuple of ProfilePoint
+        From the foot to the top; none for a box.
+    """
+
+    points: tuple[ProfilePoint, ...] = ()
+
+    @property
+    def is_box(self) -> bool:
+        """Whether width and faces are the same at every height."""
+        return len({(point.width, point.near, point.far) for point in self.points}) <= 1
+
+    @property
+    def taper(self) -> float | None:
+        """Width and length of the top over width and length of the foot, if that says it all; 1 for a box."""
+        if self.is_box:
+            return 1.0
+        both = all(point.near == point.far == 0.5 * point.width for point in self.points)
+        return self.points[-1].width / self.points[0].width if both and len(self.points) == 2 else None
+
+    @property
+    def stands_flat(self) -> bool:
+        """Whether the foot is at least half as wide and as long as the largest section."""
+        if not self.points:
+            return True
+        foot, longest = self.points[0], max(point.near + point.far for point in self.points)
+        return is_flat(foot.width, 1.0) and is_flat(foot.near + foot.far, longest)
+
+    @property
+    def filled(self) -> float:
+        """Volume over the box's of height, width and length: the integral of w l, by Simpson's rule exactly."""
+        return self._integral(lambda near, far: near + far)
+
+    @property
+    def centre(self) -> float:
+        """Centre of mass before the middle of the foot, away from the vehicle, as a share of the length."""
+        return self._integral(lambda near, far: 0.5 * (far * far - near * near)) / self.filled
+
+    @property
+    def stands_up(self) -> bool:
+        """Whether the centre of mass lies over the foot."""
+        foot = (self.points or BOX)[0]
+        return -foot.near < self.centre < foot.far
+
+    def _integral(self, of_length: Any) -> float:
+        """Integral over the height of the width times something of the reaches, at most of second degree."""
+        total = 0.0
+        for low, high in pairwise(self.points or BOX):
+            middle = (0.5 * (getattr(low, name) + getattr(high, name)) for name in ("width", "near", "far"))
+            ends = ((one.width, one.near, one.far) for one in (low, high))
+            values = [w * of_length(near, far) for w, near, far in (*ends, tuple(middle))]
+            total += (high.height - low.height) / 6.0 * (values[0] + values[1] + 4.0 * values[2])
+        return total
+
+    def as_list(self) -> list[dict[str, float]]:
+        """Return the points as plain data."""
+        return [asdict(point) for point in self.points]
+
+    @classmethod
+    def of_model(cls, model: Mapping[str, Any]) -> Shape:
+        """Return the shape in the part `model` of resolved settings; a box where that has none."""
+        return cls(tuple(ProfilePoint(**point) for point in model.get("profile", [])))
+
+    @property
+    def words(self) -> str:
+        """What it is; empty for a box."""
+        if self.is_box:
+            return ""
+        foot, top = self.points[0], self.points[-1]
+        if len(self.points) == 2 and foot.near == foot.far and top.near == top.far:
+            return f"boulder tapered, its top {top.width / foot.width:.3g} times as wide as its foot"
+        return f"boulder by a profile of {len(self.points)} points"
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """Where the shape of the boulder comes from.
+
+    Attributes
+    ----------
+    file, sha256 : str
+        The scan, as it is named in the settings, and the hash of its content.
+    up, facing : str
+        Ends of the stone that are up and that face the vehicle.
+    cut_m : float
+        What is cut off below for a flat foot [m].
+    """
+
+    file: str
+    sha256: str
+    up: str
+    facing: str
+    cut_m: float
+
+
+def tapered(ratio: float) -> Shape:
+    """Return the shape of a boulder whose top is `ratio` times as wide and as long as its foot."""
+    if ratio == 1.0:
+        return Shape()
+    foot, top = (1.0, ratio) if ratio < 1.0 else (1.0 / ratio, 1.0)
+    return Shape((ProfilePoint(0.0, foot, 0.5 * foot, 0.5 * foot), ProfilePoint(1.0, top, 0.5 * top, 0.5 * top)))
+
+
+@dataclass(frozen=True, slots=True)
+class Distribution:
+    """Spread of one input about its mean, in the unit of its column.
+
+    The mean is not in here: it is the value of the constant or axis of the same name in the sweep, so a grid may have
+    several means with one spread.
+
+    Attributes
+    ----------
+    kind : str
+        ``normal``, ``lognormal``, ``uniform``, ``triangular`` or ``beta``.
+    sd : float or None
+        Standard deviation; None where `cov` stands for it, or where the ends decide (uniform, triangular).
+    cov : float or None
+        Coefficient of variation, the standard deviation as a fraction of the mean.
+    low, high : float
+        Ends. Normal and lognormal distributions are truncated there, and their mean and standard deviation are those
+        before truncation; the others reach from one end to the other. The admitted range where the file names none.
+    mode : float or None
+        Most likely value; triangular only.
+    position : Position
+        Where it stands in the file.
+    """
+
+    kind: str
+    low: float
+    high: float
+    sd: float | None = None
+    cov: float | None = None
+    mode: float | None = None
+    position: Position = field(default_factory=lambda: Position(""), compare=False)
+
+    def deviation(self, mean: np.ndarray) -> np.ndarray:
+        """Return the standard deviation (before truncation) for some means, in the unit of the column.
+
+        Parameters
+        ----------
+        mean : ndarray of float64
+            Means; uniform and triangular distributions have one of their own and do not look at it.
+        """
+        mean = np.asarray(mean, dtype=np.float64)
+        if self.kind == "uniform":
+            return np.full(mean.shape, (self.high - self.low) / math.sqrt(12.0))
+        if self.kind == "triangular":
+            a, b, c = self.low, self.high, self.own_mode
+            return np.full(mean.shape, math.sqrt((a * a + b * b + c * c - a * b - a * c - b * c) / 18.0))
+        return np.full(mean.shape, self.sd) if self.cov is None else self.cov * mean
+
+    @property
+    def own_mode(self) -> float:
+        """The most likely value of a triangular distribution."""
+        assert self.mode is not None
+        return self.mode
+
+    def words(self, unit: str, size: float = 1.0) -> str:
+        """Return kind and spread in words, in a unit of which one is `size` in the unit of the column."""
+        unit = "" if unit == "1" else f" {unit}"
+        sd, mode = (None if value is None else f"{value / size:.6g}{unit}" for value in (self.sd, self.mode))
+        spread = f"sd {sd}" if self.cov is None else f"cov {100.0 * self.cov:g} %"
+        ends = f"{self.low / size:g} to {self.high / size:g}{unit}"
+        return {
+            "uniform": f"uniform, {ends}",
+            "triangular": f"triangular, {ends}, most likely {mode}",
+            "beta": f"beta, {spread}, {ends}",
+        }.get(self.kind, f"{self.kind}, {spread}")
+
+    def to_dict(self) -> dict[str, float | str]:
+        """Return what is given as plain data."""
+        named = {"kind": self.kind, "sd": self.sd, "cov": self.cov, "low": self.low, "high": self.high}
+        return {name: value for name, value in {**named, "mode": self.mode}.items() if value is not None}
+
+
+@dataclass(frozen=True, slots=True)
+class SetDistributions:
+    """Spread of one input of named soils or vehicles, each its own.
+
+    Attributes
+    ----------
+    section : str
+        ``soil`` or ``vehicle``; under this name a row carries the index of its set.
+    each : tuple of Distribution or None
+        In the order of the sets; None where a set gives a value.
+    """
+
+    section: str
+    each: tuple[Distribution | None, ...]
+
+    @property
+    def position(self) -> Position:
+        """Where the first of them stands in the file."""
+        return next(spread.position for spread in self.each if spread is not None)
+
+    def words(self, unit: str, size: float = 1.0) -> str:
+        """Return kind and spread of each in words; see `Distribution.words`."""
+        return "; ".join("certain" if spread is None else spread.words(unit, size) for spread in self.each)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what is given as plain data."""
+        return {"sets": [None if spread is None else spread.to_dict() for spread in self.each]}
+
+
+@dataclass(frozen=True, slots=True)
 class Criterion:
     """What a design must hold."""
 
@@ -197,11 +438,7 @@ class ReadingChoice:
     @property
     def corrected(self) -> tuple[bool, ...]:
         """Which readings are corrected, in the order of the kernels."""
-        return tuple(reading != PRINTED for reading in self.as_dict().values())
-
-    def as_dict(self) -> dict[str, str]:
-        """Return switch: value, in order."""
-        return asdict(self)
+        return tuple(reading != PRINTED for reading in asdict(self).values())
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,10 +483,6 @@ class Ground:
         """Whether the resistance grows in proportion to depth, as in the paper's soil."""
         return not self.layers and self.cohesion_kPa == 0.0 and self.water_table_m in (None, 0.0)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return everything as plain data."""
-        return asdict(self)
-
     def words_in(self, length: tuple[str, float], pressure: tuple[str, float]) -> str:
         """Return what there is of it, in units with their sizes in m and kPa; empty where there is nothing."""
         cohesions = [self.cohesion_kPa, *(layer.cohesion_kPa for layer in self.layers)]
@@ -269,7 +502,7 @@ class Ground:
 
     @classmethod
     def of_dict(cls, given: dict[str, Any]) -> Ground:
-        """Return the ground that `as_dict` returned; the usual one of no data."""
+        """Return the ground of plain data, see `asdict`; the usual one of none."""
         return cls(**given | {"layers": tuple(Layer(**layer) for layer in given.get("layers", ()))})
 
 

@@ -30,13 +30,6 @@ class Position:
         return ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
 
 
-def cell_position(file: str, line: int, text: str, delimiter: str, index: int) -> Position:
-    """Return where a cell begins in a line of delimited text; with quotation marks in it, only the line is certain."""
-    if '"' in text:
-        return Position(file, line)
-    return Position(file, line, sum(len(cell) + 1 for cell in text.split(delimiter)[:index]) + 1)
-
-
 @dataclass(frozen=True, slots=True)
 class Problem:
     """One mistake in a settings file, or one note on it.

@@ -19,14 +19,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from boulder_sweep import investigation as sand
-from boulder_sweep.settings.distributions import FRACTILE_5
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import Bound, Field
 from boulder_sweep.settings.problems import LeafError, Mistakes, Position, wrong
-from boulder_sweep.settings.shown_units import quantity_text
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence, block_of
-from boulder_sweep.settings.units import UnitError, factor
-from boulder_sweep.settings.values import NumberError, quoted, read_block, read_single, split_number
+from boulder_sweep.settings.units import UnitError, factor, quantity_text
+from boulder_sweep.settings.values import FRACTILE_5, NumberError, quoted, read_block, read_single, split_number
 from boulder_sweep.text import counted
 
 CONE = "q_c"
@@ -101,23 +99,10 @@ Located = list[tuple[Position, dict[str, Any]]]
 """Readings as plain data, each with its position in the file."""
 
 
-def readings_of(node: Node, method: str, density_kg_m3: float | None) -> Located:
-    """Return the readings of a test as plain data.
+def _readings_of(node: Node, method: str, density_kg_m3: float | None) -> Located:
+    """Return the readings of a test as plain data; of a mistake in many readings the first is reported.
 
-    Parameters
-    ----------
-    node : Node
-        ``{n: 28, energy_ratio: 60 %, depth: 1.5 m}``, ``{n1_60: 30}``, ``{q_c: 14 MPa, depth: 1.5 m}``, a list of
-        such, or a relative density.
-    method : str
-        One of `METHODS`.
-    density_kg_m3 : float or None
-        Density of the soil for the stress at a reading; None where the file does not give it.
-
-    Raises
-    ------
-    LeafError
-        With every mistake, the same one in many readings once.
+    A reading is ``{n: 28, energy_ratio: 60 %, depth: 1.5 m}``, ``{n1_60: 30}`` or ``{q_c: 14 MPa, depth: 1.5 m}``.
     """
     if method == RELATIVE_DENSITY.key:
         return [(node.position, {method: read_single(node, RELATIVE_DENSITY)})]
@@ -437,40 +422,23 @@ def _layer(readings: list[dict[str, Any]], weights: np.ndarray, top: float, bott
     return LogLayer(top, bottom, n, angles, math.sqrt(variance / independent))
 
 
-def soil_of(
+def _soil_of(
     node: Node,
     method: str,
     lacking: Collection[str],
     density_kg_m3: float | None,
-    foot_m: float = math.inf,
-    topsoil_m: float = 0.0,
-    log: Log | None = None,
+    foot_m: float,
+    topsoil_m: float,
+    log: Log | None,
 ) -> dict[str, Any]:
     """Return the soil constants by readings as plain data: the readings, and what is taken of them.
 
     Of several readings the weakest counts, from the topsoil down to the first below the deepest foot, and of several
-    correlations the lowest. The standard deviation is the scatter about it, or what keeps the highest correlation
-    within the 95 % fractile, if that is more.
-
-    Parameters
-    ----------
-    node, method, density_kg_m3
-        The readings, the kind of test, and the density of the soil [kg/m^3] if the file gives it.
-    lacking : collection of str
-        Soil constants (`SOIL_KEYS`) that the file does not give. If it gives all, the readings are only recorded.
-    foot_m : float
-        The deepest foot of all designs [m].
-    topsoil_m : float
-        Depth of the topsoil [m].
-    log : Log, optional
-        The file that the readings are from, which makes layers of them.
-
-    Raises
-    ------
-    LeafError
-        With every mistake; a reading that counts and is too weak for its correlation is one.
+    correlations the lowest; a log makes layers of them. The standard deviation is the scatter about it, or what keeps
+    the highest correlation within the 95 % fractile, if that is more. Where the file lacks no constant (`SOIL_KEYS`),
+    the readings are only recorded.
     """
-    located = readings_of(node, method, density_kg_m3)
+    located = _readings_of(node, method, density_kg_m3)
     readings = [reading for _, reading in located]
     data: dict[str, Any] = {"method": method, "readings": readings}
     if log is not None:
@@ -569,7 +537,7 @@ def _weakest(readings: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def soil_words(data: dict[str, Any], units: str = "si") -> str:
-    """Return in one line what is taken of readings, by what `soil_of` returned."""
+    """Return in one line what is taken of readings, by `Sweep.derived`."""
     remarks = data["log"]["remarks"] if "log" in data else []
     if not data.keys() & {"friction_angle_deg", "density_low_kg_m3", "subgrade_reaction_MN_m3"}:
         return "; ".join(["the readings are kept for the record: the file gives every constant", *remarks])
@@ -578,7 +546,7 @@ def soil_words(data: dict[str, Any], units: str = "si") -> str:
     weakest = _weakest(data["readings"])
     count = len(_counting(data["readings"]))
     of = f"{_reading_words(weakest, units)}{f', the weakest of {count} readings' if count > 1 else ''}"
-    parts = _constant_words(data, weakest.get("friction_angles_deg", {}), of, units)
+    parts = _constant_words(data, weakest["friction_angles_deg"], of, units)
     return "; ".join([*parts, *_remarks(data, units)])
 
 
@@ -711,7 +679,7 @@ def unfold_soils(
     Returns
     -------
     list of dict
-        What `soil_of` keeps of each, under the name of its soil where it is a named one.
+        What is kept of each as plain data, under the name of its soil where it is a named one.
     """
     data: list[dict[str, Any]] = []
     for soil in root.blocks("soil"):
@@ -745,7 +713,7 @@ def unfold_soils(
                 is_one = soil.label or "layers" in soil.entries or not needed <= set(lacking) or math.isinf(foot_m)
                 log = log._replace(may_be_layered=not is_one)
                 method, node = _nodes_of(log, node.position, beside.get(ENERGY), topsoil_m)
-            constants = soil_of(node, method, lacking, density, foot_m, topsoil_m, log)
+            constants = _soil_of(node, method, lacking, density, foot_m, topsoil_m, log)
             data.append(soil.label | constants)
         for key in given[1:]:
             del soil.entries[key]

@@ -14,7 +14,6 @@ from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from boulder_sweep.parquet import MOST_ROWS
-from boulder_sweep.settings.distributions import Distribution
 from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT, INPUTS, MAX_ELEMENTS, TO_BE_FOUND
 from boulder_sweep.settings.model import (
     ACCURACIES,
@@ -24,11 +23,13 @@ from boulder_sweep.settings.model import (
     SWITCHES,
     Bound,
     Criterion,
+    Distribution,
     Ground,
+    ProfilePoint,
     ReadingChoice,
+    Scan,
 )
 from boulder_sweep.settings.problems import shorten
-from boulder_sweep.settings.shape import ProfilePoint, Scan
 from boulder_sweep.settings.soil_readings import shown_readings, strength
 from boulder_sweep.settings.sweep import IMPACT_HEIGHT_RULE, Heading, derived_words, wrong_with
 

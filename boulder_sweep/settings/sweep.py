@@ -15,12 +15,11 @@ import numpy as np
 from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.designs import LEAST_SOLIDITY, SIDES, UNUSUAL, DesignBlock, DesignPlan, Label, Source
 from boulder_sweep.errors import QuestionError
-from boulder_sweep.settings.distributions import Distribution, SetDistributions
 from boulder_sweep.settings.fields import ALLOW_UNUSUAL, BY_NAME, EMBEDMENT, HELD, INPUTS, TO_BE_FOUND
-from boulder_sweep.settings.model import CLOSED_FORM, Criterion, Model, SolverSettings
+from boulder_sweep.settings.model import CLOSED_FORM, Criterion, Distribution, Model, SetDistributions, SolverSettings
 from boulder_sweep.settings.problems import Problem
-from boulder_sweep.settings.shown_units import SYSTEMS
 from boulder_sweep.settings.soil_readings import soil_words
+from boulder_sweep.settings.units import SYSTEMS
 from boulder_sweep.settings.values import is_unusual
 from boulder_sweep.settings.vehicle import APPROACH, approach_words
 
@@ -328,7 +327,7 @@ class Sweep:
             "criterion": asdict(self.criterion),
             "model": {
                 "preset": self.model.preset,
-                "readings": self.model.readings.as_dict(),
+                "readings": asdict(self.model.readings),
                 "soil": self.model.soil_elements or CLOSED_FORM,
                 "calibrated_crush_m": self.model.calibrated_crush_m,
                 "resistance": self.model.resistance,
@@ -336,7 +335,7 @@ class Sweep:
                 **({"rock_assumed": True} if self.model.rock_assumed else {}),
                 **({} if self.model.shape.is_box else {"profile": self.model.shape.as_list()}),
                 **({} if self.model.scan is None else {"scan": asdict(self.model.scan)}),
-                **({} if ground.is_usual else {"ground": ground.as_dict()}),
+                **({} if ground.is_usual else {"ground": asdict(ground)}),
                 **({"second_opinion": list(opinions)} if (opinions := self.model.second_opinion) else {}),
             },
             "solver": {

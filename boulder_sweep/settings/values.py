@@ -1,4 +1,4 @@
-"""From text to numbers, as engineers write them: a value with or without a unit, a list, a range with exact steps.
+"""From text to numbers, as engineers write them: a value with or without a unit, a list, a range, a distribution.
 
 A number is kept as an exact fraction of its decimal digits, so that ``0.40 + 15 * 0.02`` is 0.70 to the bit.
 """
@@ -7,15 +7,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from boulder_sweep.settings.fields import FAR, Field
+from boulder_sweep.settings.model import KINDS, Distribution, SetDistributions
 from boulder_sweep.settings.problems import (
     LeafError,
     Mistakes,
@@ -25,9 +26,18 @@ from boulder_sweep.settings.problems import (
     shorten,
     wrong,
 )
-from boulder_sweep.settings.shown_units import SYSTEMS, shown_unit
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
-from boulder_sweep.settings.units import EXPECTED, UnitError, factor, suffix_unit
+from boulder_sweep.settings.units import (
+    EXPECTED,
+    SYSTEMS,
+    UnitError,
+    describe,
+    factor,
+    needed,
+    range_words,
+    shown_unit,
+    suffix_unit,
+)
 
 MAX_AXIS = 1_000_000
 """Most values on one axis."""
@@ -58,6 +68,9 @@ _DECIMAL_COMMA = re.compile(r"[+-]?(?:0,\d+|\d+,(?!\d{3}$)\d+)")
 """A comma that stands for a decimal point: before three digits it separates thousands."""
 EMPTY, NOT_A_NUMBER = "is empty", "is not a number"
 """What may be wrong with a number; the page of a report says the same."""
+T = TypeVar("T")
+FRACTILE_5 = 1.6448536269514722
+"""Distance of the 5 % fractile of a normal distribution below its mean, in standard deviations."""
 _MAX_DIGITS = 40
 _MAX_EXPONENT = 300
 
@@ -89,6 +102,8 @@ class Leaf:
         The unit in which it was written; empty for bare numbers.
     positions : tuple of Position
         Where each value stands; empty where all of them stand at `position`, as in a range.
+    distribution : Distribution, SetDistributions or None
+        Spread about the values, which are its means; None where the values are certain.
     """
 
     values: np.ndarray
@@ -96,6 +111,7 @@ class Leaf:
     position: Position
     written: str = ""
     positions: tuple[Position, ...] = ()
+    distribution: Distribution | SetDistributions | None = None
 
 
 def read_leaf(node: Node, field: Field) -> Leaf:
@@ -146,17 +162,29 @@ def read_single(node: Node, field: Field) -> float:
     return value
 
 
-def read_entries(node: Node, known: dict[str, Field], what: str, mistakes: Mistakes) -> dict[str, float]:
-    """Return the single values of a block by their keys; unknown keys and wrong values go to `mistakes`.
+def read_block(node: Node, known: dict[str, Field], what: str, required: Collection[str] = ()) -> dict[str, float]:
+    """Return the single values of a block by the names of its fields.
+
+    Parameters
+    ----------
+    node : Node
+        Must be a block.
+    known : dict of str to Field
+        What may be in it, by key.
+    what : str
+        What it is, for messages: ``a layer``.
+    required : collection of str
+        Keys that it must have.
 
     Raises
     ------
     LeafError
-        It is no block.
+        With every mistake in it.
     """
     if not isinstance(node, Mapping) or node.unit is not None:
         raise wrong(node.position, f"{what} must be a block of keys: {', '.join(known)}")
     values: dict[str, float] = {}
+    mistakes = Mistakes()
     for entry in node:
         field = known.get(entry.key)
         if field is None:
@@ -164,10 +192,14 @@ def read_entries(node: Node, known: dict[str, Field], what: str, mistakes: Mista
             mistakes.add(entry.position, message)
             continue
         try:
-            values[entry.key] = read_single(entry.value, field)
+            values[field.name] = read_single(entry.value, field)
         except LeafError as error:
             for mistake in error.mistakes:
                 mistakes.add(mistake.position, f"{entry.key}: {mistake.message}")
+    missing = [key for key in required if key not in node.entries]
+    if missing and not mistakes:
+        mistakes.add(node.position, f"the {what.partition(' ')[2]} lacks {', '.join(missing)}")
+    mistakes.raise_if_any()
     return values
 
 
@@ -207,20 +239,6 @@ def _fits(value: Node, field: Field) -> bool:
         return True
     except UnitError:
         return False
-
-
-def read_block(node: Node, known: dict[str, Field], what: str) -> dict[str, float]:
-    """Return the single values of a block by the names of its fields.
-
-    Raises
-    ------
-    LeafError
-        With every mistake in it, see `read_entries`.
-    """
-    mistakes = Mistakes()
-    values = read_entries(node, known, what, mistakes)
-    mistakes.raise_if_any()
-    return {known[key].name: value for key, value in values.items()}
 
 
 def sample_of(field: Field) -> str:
@@ -558,20 +576,155 @@ def quoted(node: Node) -> str:
     return f"'{shorten(node.text)}'" if isinstance(node, Scalar) else "this"
 
 
-def describe(value: float, unit: str, written: str = "") -> str:
-    """Return a value of a unit of the table, for messages: in the unit in which it was written, if any."""
-    if written:
-        value, unit = value / float(factor(written, unit)), written
-    return f"{value:.6g}" if unit == "1" else f"{value:.6g} {unit}"
+_CENTRES = ("mean", "characteristic")
+_SPREADS = ("sd", "cov")
+NEEDED = {
+    "normal": (_CENTRES, _SPREADS),
+    "lognormal": (_CENTRES, _SPREADS),
+    "uniform": (("low",), ("high",)),
+    "triangular": (("low",), ("mode",), ("high",)),
+    "beta": (("mean",), _SPREADS, ("low",), ("high",)),
+}
+"""For every kind what must be given, one of each group."""
+_KEYS = ("distribution", *_CENTRES, *_SPREADS, "low", "high", "mode")
+_WORDS = frozenset({*_KEYS, *KINDS})
 
 
-def range_words(low: float, high: float, unit: str, written: str = "") -> str:
-    """Return a range, or the one value that both its ends are; other arguments: see `describe`."""
-    ends = describe(low, unit, written), describe(high, unit, written)
-    return ends[1] if low == high else f"{ends[0].split()[0]} to {ends[1]}"
+def read_input(node: Node, field: Field) -> Leaf:
+    """Return what an entry gives for an input: a value, a list, a range or a distribution.
+
+    Raises
+    ------
+    LeafError
+        With every mistake of this entry.
+    """
+    if isinstance(node, Mapping) and not set(RANGE_KEYS) & set(node.entries) and _WORDS & set(node.entries):
+        return _read_distribution(node, field)
+    return read_leaf(node, field)
 
 
-def needed(unit: str, sample: str = "") -> str:
-    """Return what an entry takes whose bare numbers are in a unit of the table, with an example."""
-    expected = EXPECTED[unit]
-    return "a number is needed" if unit == "1" else f"{expected.words} is needed, such as {sample or expected.sample}"
+def _read_distribution(node: Mapping, field: Field) -> Leaf:
+    """Return an uncertain input: its mean, or the axis of its means, and its distribution.
+
+    It is ``{mean: 38 deg, sd: 3 deg}``, ``{distribution: lognormal, mean: [36, 38] deg, cov: 8 %}``,
+    ``{characteristic: 36 deg, cov: 8 %}``, ``{distribution: uniform, low: 36 deg, high: 40 deg}`` and the like.
+    """
+    kind = _kind(node)
+    _check_keys(node, kind)
+    mistakes = Mistakes()
+
+    def read(key: str | None, reader: Callable[[Node], T]) -> T | None:
+        value = None if key is None else node.get(key)
+        if value is not None:
+            with mistakes:
+                return reader(value)
+        return None
+
+    low, high, mode = (read(key, lambda value: read_single(value, field)) for key in ("low", "high", "mode"))
+    sd = read("sd", lambda value: _positive(value, field.unit))
+    cov = read("cov", lambda value: _positive(value, "1"))
+    centre = next((key for key in _CENTRES if key in node.entries), None)
+    given = read(centre, lambda value: read_leaf(value, field))
+    mistakes.raise_if_any()
+    bound = field.admitted
+    assert bound is not None
+    distribution = Distribution(
+        kind,
+        bound.low if low is None else low,
+        bound.high if high is None else high,
+        sd=sd,
+        cov=cov,
+        mode=mode,
+        position=node.position,
+    )
+    if given is None:
+        ends = (distribution.low, *(() if mode is None else (mode,)), distribution.high)
+        values = np.array([sum(ends) / len(ends)])
+    else:
+        values = given.values if centre == "mean" else _means(node, kind, given.values, sd, cov)
+    _check_spread(node, values, distribution, field)
+    if given is None:
+        return Leaf(values, False, node.position, distribution=distribution)
+    return replace(given, values=values, position=node.position, distribution=distribution)
+
+
+def _kind(node: Mapping) -> str:
+    """Return the kind of the distribution; normal where a mean is given and no kind."""
+    value = node.get("distribution")
+    if value is None:
+        named = next((key for key in node.entries if key in KINDS), None)
+        if named is not None:
+            message = f"write the kind as an entry of its own: {{distribution: {named}, mean: ..., sd: ...}}"
+            raise wrong(node.entries[named].position, message)
+        return "normal"
+    word = value.text.strip() if isinstance(value, Scalar) else ""
+    if word not in KINDS:
+        hint = did_you_mean(word, KINDS)
+        raise wrong(value.position, f"'{shorten(word)}' is not a distribution: {', '.join(KINDS)}{hint}")
+    return word
+
+
+def _check_keys(node: Mapping, kind: str) -> None:
+    """Report keys that are unknown, do not belong to this kind, are missing or exclude each other."""
+    taken = {"distribution", "low", "high", *(key for group in NEEDED[kind] for key in group)}
+    mistakes = Mistakes()
+    for entry in node:
+        if entry.key not in taken:
+            hint = "" if entry.key in _KEYS else did_you_mean(entry.key, _KEYS)
+            known = ", ".join(key for key in _KEYS if key in taken)
+            message = f"'{shorten(entry.key)}' is not a key of a {kind} distribution ({known}){hint}"
+            mistakes.add(entry.position, message)
+    for group in NEEDED[kind]:
+        given = [key for key in group if key in node.entries]
+        if len(given) > 1:
+            mistakes.add(node.entries[given[1]].position, f"give {' or '.join(group)}, not both")
+        elif not given and not mistakes:
+            mistakes.add(node.position, f"a {kind} distribution needs {' or '.join(group)}")
+    if node.unit is not None:
+        mistakes.add(node.unit.position, "write the unit behind each number of a distribution")
+    mistakes.raise_if_any()
+
+
+def _positive(node: Node, unit: str) -> float:
+    value = float(read_quantity(node, unit).value)
+    if not 0.0 < value < math.inf:
+        raise wrong(node.position, "must be more than 0; for a value without doubt, write the value alone")
+    return value
+
+
+def _means(node: Mapping, kind: str, fractile: np.ndarray, sd: float | None, cov: float | None) -> np.ndarray:
+    """Return the means of normal or lognormal distributions whose 5 % fractiles are given, their characteristic values.
+
+    Normal: x_k = m - 1.645 s. Lognormal: x_k = m exp(-s_ln**2 / 2 - 1.645 s_ln) with s_ln**2 = ln(1 + cov**2).
+    """
+    if kind == "lognormal":
+        if cov is None:
+            raise wrong(node.position, "a characteristic value of a lognormal distribution needs cov")
+        spread = math.sqrt(math.log1p(cov * cov))
+        return fractile * math.exp(FRACTILE_5 * spread + 0.5 * spread * spread)
+    if cov is None:
+        assert sd is not None
+        return fractile + FRACTILE_5 * sd
+    if FRACTILE_5 * cov >= 1.0:
+        message = "a normal distribution this wide has no positive 5 % fractile; use lognormal"
+        raise wrong(node.entries["cov"].position, message)
+    return fractile / (1.0 - FRACTILE_5 * cov)
+
+
+def _check_spread(node: Mapping, values: np.ndarray, distribution: Distribution, field: Field) -> None:
+    """Report ends in the wrong order, and means and spreads that do not fit between them."""
+    low, high, unit = distribution.low, distribution.high, "" if field.unit == "1" else f" {field.unit}"
+    message = ""
+    if not low < high:
+        message = f"low ({low:g}{unit}) must be less than high ({high:g}{unit})"
+    elif distribution.mode is not None and not low <= distribution.mode <= high:
+        message = f"the mode must be between low and high ({low:g} to {high:g}{unit})"
+    elif not (low < values.min() and values.max() < high):
+        worst = values.min() if values.min() <= low else values.max()
+        message = outside(float(worst), field) or f"the mean must be between low and high ({low:g} to {high:g}{unit})"
+    elif distribution.kind == "beta":
+        largest = np.sqrt((values - low) * (high - values))
+        if np.any(distribution.deviation(values) >= largest):
+            message = f"the standard deviation must be less than {largest.min():.4g}{unit} between these ends"
+    if message:
+        raise wrong(node.position, message)

@@ -17,8 +17,8 @@ from typing import Any
 
 from boulder_sweep.settings.model import Bound, entries_of, setting
 from boulder_sweep.settings.problems import Mistakes, wrong
-from boulder_sweep.settings.shown_units import quantity_text
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar
+from boulder_sweep.settings.units import quantity_text
 from boulder_sweep.settings.values import read_block
 
 G = 9.80665
@@ -135,14 +135,8 @@ APPROACH_FIELDS = {key: _DECLARED[key] for key in ("length", "from", "accelerati
 """Entries of a run-up by key."""
 
 
-def read_approach(node: Node) -> Approach:
-    """Read ``{length: 80 m, from: 0 mph, acceleration: 1.5 m/s^2, curve_radius: 25 m, friction: 0.8, grade: -4 %}``.
-
-    Raises
-    ------
-    LeafError
-        With every mistake in it.
-    """
+def _read_approach(node: Node) -> Approach:
+    """Read ``{length: 80 m, from: 0 mph, acceleration: 1.5 m/s^2, curve_radius: 25 m, friction: 0.8, grade: -4 %}``."""
     values = read_block(node, APPROACH_FIELDS, "an approach")
     given = node.entries if isinstance(node, Mapping) else {}
     mistakes = Mistakes()
@@ -166,7 +160,7 @@ def read_approach(node: Node) -> Approach:
     return approach
 
 
-def approach_data(approach: Approach) -> dict[str, Any]:
+def _kept_of(approach: Approach) -> dict[str, Any]:
     """Return what is kept of a run-up as plain data: what was given, and the speeds that follow."""
     given = {name: value for name, value in asdict(approach).items() if value is not None}
     if approach.curve_radius_m is None:
@@ -177,7 +171,7 @@ def approach_data(approach: Approach) -> dict[str, Any]:
 
 
 def approach_words(data: dict[str, Any], units: str = "si") -> str:
-    """Return in one line how a speed follows from a run-up, by what `approach_data` returned."""
+    """Return in one line how a speed follows from a run-up, by `Sweep.derived`."""
     start, curve = data.get("from_m_s", math.inf), data.get("curve_speed_m_s", math.inf)
 
     def shown(name: str, unit: str) -> str:
@@ -209,7 +203,7 @@ def unfold_approaches(root: Mapping, mistakes: Mistakes) -> list[dict[str, Any]]
     Returns
     -------
     list of dict
-        What `approach_data` keeps of each, under the name of its vehicle where it is a named one.
+        What is kept of each as plain data, under the name of its vehicle where it is a named one.
     """
     data: list[dict[str, Any]] = []
     for vehicle in root.blocks("vehicle"):
@@ -218,10 +212,10 @@ def unfold_approaches(root: Mapping, mistakes: Mistakes) -> list[dict[str, Any]]
             continue
         new: list[Entry] = []
         with mistakes:
-            approach = read_approach(entry.value)
+            approach = _read_approach(entry.value)
             if SPEED in vehicle.entries:
                 mistakes.add(entry.position, f"give {SPEED} or {APPROACH}, not both")
-            data.append(vehicle.label | approach_data(approach))
+            data.append(vehicle.label | _kept_of(approach))
             speed = Scalar(entry.value.position, f"{approach.impact_speed_m_s!r} m/s")
             new = [Entry(SPEED, entry.position, speed)]
         vehicle.replace(APPROACH, new)

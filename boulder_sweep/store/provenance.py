@@ -34,7 +34,7 @@ _DECIDING_SOURCES = (
     "soils.py",
     "investigation.py",
     "judge/*.py",
-    *(f"settings/{name}.py" for name in ("distributions", "fields", "model", "shape")),
+    *(f"settings/{name}.py" for name in ("fields", "model")),
     *(f"stones/{name}.py" for name in ("rock", "taped")),
 )
 """Modules, in addition to the kernels, whose code determines the rows: of settings and stones what others import."""

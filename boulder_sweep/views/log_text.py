@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from boulder_sweep.settings.shown_units import SYSTEMS, shown_unit
 from boulder_sweep.settings.soil_readings import log_title, shown_readings, strength
+from boulder_sweep.settings.units import SYSTEMS, shown_unit
 from boulder_sweep.text import counted
 
 MOST_ROWS = 18

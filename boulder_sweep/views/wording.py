@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.columns import BY_NAME
-from boulder_sweep.settings.model import Ground
-from boulder_sweep.settings.shape import Shape
-from boulder_sweep.settings.shown_units import number_text, shown_unit
+from boulder_sweep.settings.model import Ground, Shape
+from boulder_sweep.settings.units import number_text, shown_unit
 from boulder_sweep.text import NO_BREAK_SPACE
 
 if TYPE_CHECKING:

@@ -12,8 +12,7 @@ from boulder_sweep.cli.main import cli
 from boulder_sweep.columns import OUTCOMES
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.judge.validity import FLAGS
-from boulder_sweep.settings.fields import INPUTS, SETTINGS, Field
-from boulder_sweep.settings.starter import default_text
+from boulder_sweep.settings.fields import INPUTS, SETTINGS, Field, default_text
 from boulder_sweep.settings.units import EXPECTED
 
 DEFAULTS = {

@@ -18,7 +18,7 @@ from boulder_sweep.crash_tests.fitting import fit_pulse
 from boulder_sweep.crash_tests.measured import read_pulse
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.settings import Sweep
-from boulder_sweep.settings.distributions import Distribution, SetDistributions
+from boulder_sweep.settings.model import Distribution, SetDistributions
 from boulder_sweep.settings.sweep import DesignList, derived_words
 from boulder_sweep.views.log_text import log_lines
 from docs.studies.example_pulse import example_pulse

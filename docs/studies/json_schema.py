@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-from boulder_sweep.settings.distributions import NEEDED
 from boulder_sweep.settings.entries import (
     LAYER_FIELDS,
     MOST_LAYERS,
@@ -39,7 +38,6 @@ from boulder_sweep.settings.model import (
     SECOND_OPINIONS,
     SWITCHES,
 )
-from boulder_sweep.settings.shown_units import SYSTEMS
 from boulder_sweep.settings.soil_readings import (
     BLOW_KEYS,
     ENERGY,
@@ -53,8 +51,8 @@ from boulder_sweep.settings.soil_readings import (
     TOPSOIL,
 )
 from boulder_sweep.settings.sweep import SECTION, UNITS, Heading
-from boulder_sweep.settings.units import EXPECTED
-from boulder_sweep.settings.values import MAX_AXIS
+from boulder_sweep.settings.units import EXPECTED, SYSTEMS
+from boulder_sweep.settings.values import MAX_AXIS, NEEDED
 from boulder_sweep.settings.vehicle import APPROACH, APPROACH_FIELDS, SPEED
 
 FILE = Path("docs/sweep.schema.json")

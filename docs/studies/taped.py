@@ -15,7 +15,7 @@ from boulder_sweep.designs import SIDES, DesignBlock, block_of
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.judged import PASS, Judged
-from boulder_sweep.settings.shape import ProfilePoint, Shape
+from boulder_sweep.settings.model import ProfilePoint, Shape
 from boulder_sweep.soils import with_soil
 from boulder_sweep.stones.rock import LEAST_FOOT, ROCKS
 from docs.studies.forms import BED_OFFSET_M, BUMPER_M, HOOD_M, grid_evaluation

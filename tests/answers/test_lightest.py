@@ -19,7 +19,7 @@ from boulder_sweep.designs import block_of
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.judged import PASS
 from boulder_sweep.settings import Sweep, load_text
-from boulder_sweep.settings.shape import tapered
+from boulder_sweep.settings.model import tapered
 from tests.answers.designs import DEPTH, bare_need, passes, random_designs, site
 
 

@@ -26,7 +26,7 @@ from boulder_sweep.judge.judged import ERROR, FAIL, OVERRIDE, PASS, UNDECIDED, n
 from boulder_sweep.judge.quantiles import values_of
 from boulder_sweep.runner.pool import Pool
 from boulder_sweep.settings import Sweep, load_text
-from boulder_sweep.settings.distributions import Distribution
+from boulder_sweep.settings.model import Distribution
 from tests.answers.designs import bare_need, site
 from tests.runner.grids import grid
 

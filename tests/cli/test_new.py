@@ -8,9 +8,8 @@ import sys
 import pytest
 
 from boulder_sweep.settings import SettingsError, load
-from boulder_sweep.settings.fields import FIELDS
-from boulder_sweep.settings.shown_units import SYSTEMS
-from boulder_sweep.settings.starter import CLASSES, UNPUBLISHED, starter
+from boulder_sweep.settings.fields import CLASSES, FIELDS, UNPUBLISHED, starter
+from boulder_sweep.settings.units import SYSTEMS
 
 OF_THE_PAPER = [vehicle for vehicle, (code, _) in CLASSES.items() if code == "M"]
 

@@ -34,10 +34,10 @@ from boulder_sweep.report.comparison import compare
 from boulder_sweep.report.export import export
 from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import Sweep, load_text
-from boulder_sweep.settings.design_list import read_designs
 from boulder_sweep.settings.loader import decode
 from boulder_sweep.settings.problems import MAX_REPORTED, Position, ProblemList
 from boulder_sweep.settings.sweep import derived_words
+from boulder_sweep.settings.tables import read_designs
 from boulder_sweep.settings.tree import Scalar
 from boulder_sweep.stones.reading import READERS, read_scan
 from boulder_sweep.stones.solid import solid_of

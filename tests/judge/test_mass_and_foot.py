@@ -20,9 +20,8 @@ from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.settings import Sweep, load, load_text
 from boulder_sweep.settings.loader import SECOND_OPINION
-from boulder_sweep.settings.model import Ground
+from boulder_sweep.settings.model import Ground, tapered
 from boulder_sweep.settings.problems import SettingsError
-from boulder_sweep.settings.shape import tapered
 from boulder_sweep.soils import SLICES, coefficients, with_soil
 from tests.answers.designs import bare_need
 from tests.judge.plain import plain_designs

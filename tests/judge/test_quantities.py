@@ -11,8 +11,7 @@ from boulder_kernels.design import compression_wedge_length, wedge_slope
 from boulder_sweep import load
 from boulder_sweep.judge import quantities as own
 from boulder_sweep.judge.quantities import QUANTITIES, buried_share, quantities, quantities_by
-from boulder_sweep.settings.model import Ground, Layer
-from boulder_sweep.settings.shape import ProfilePoint, Shape, tapered
+from boulder_sweep.settings.model import Ground, Layer, ProfilePoint, Shape, tapered
 
 BOX = Shape()
 PLAIN = Ground()

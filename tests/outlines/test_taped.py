@@ -18,9 +18,8 @@ from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import PLAIN_DESIGN, Evaluation, by_kernels, evaluation_of
 from boulder_sweep.settings import Sweep, load_text
-from boulder_sweep.settings.model import Ground
+from boulder_sweep.settings.model import Ground, ProfilePoint, Shape
 from boulder_sweep.settings.problems import SettingsError
-from boulder_sweep.settings.shape import ProfilePoint, Shape
 from boulder_sweep.soils import with_shape, with_soil
 from boulder_sweep.stones.taped import taped_profiles
 from boulder_sweep.views.side_view import SideView

@@ -34,8 +34,7 @@ from boulder_sweep.report.export import export
 from boulder_sweep.report.page import ASSETS, SCRIPTS
 from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import load_text
-from boulder_sweep.settings.shown_units import ShownColumn, shown_column, shown_settings, shown_unit
-from boulder_sweep.settings.units import factor
+from boulder_sweep.settings.units import ShownColumn, factor, shown_column, shown_settings, shown_unit
 from tests.answers.designs import bare_need, site
 from tests.store.folders import rewrite
 

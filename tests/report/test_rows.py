@@ -14,8 +14,7 @@ from boulder_sweep.report import write_report
 from boulder_sweep.report.answers import answer_of
 from boulder_sweep.report.page import table_data, thinned
 from boulder_sweep.report.rows import NOT_YET, read_rows
-from boulder_sweep.settings.model import Ground
-from boulder_sweep.settings.shape import Shape
+from boulder_sweep.settings.model import Ground, Shape
 from boulder_sweep.store import folder
 from tests.report.conftest import GRID, LIST, SETS
 

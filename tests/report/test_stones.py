@@ -10,7 +10,7 @@ from boulder_sweep.report import write_explorer, write_report
 from boulder_sweep.report.figures import sketch_of
 from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import load_text
-from boulder_sweep.settings.shape import tapered
+from boulder_sweep.settings.model import tapered
 from tests.report.test_ground import SOILS
 
 STONE = """\

@@ -1,4 +1,7 @@
-"""Whatever the bytes, loading ends in a sweep or in problems with their positions: never in a traceback."""
+"""Whatever stands in a good file, loading ends in a sweep or in problems with their positions: never in a traceback.
+
+`tests.fuzz` tries any bytes.
+"""
 
 import re
 from contextlib import suppress
@@ -9,7 +12,6 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from boulder_sweep.settings import Problem, SettingsError, Sweep, load_text
-from boulder_sweep.settings.loader import decode
 from boulder_sweep.settings.units import EXPECTED, UnitError, factor
 
 ROOT = Path(__file__).parents[2]
@@ -85,24 +87,6 @@ def mutated(draw: st.DrawFn) -> str:
 
 
 QUICK = settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
-LONG = settings(QUICK, max_examples=80_000)
-
-
-def _any_bytes(data: bytes) -> None:
-    try:
-        text = decode(data, "grid.yaml")
-    except SettingsError:
-        return
-    loads_or_says_why(text)
-
-
-@QUICK
-@given(data=st.binary(max_size=300))
-@example(data=b"\xff\xfea\x00")
-@example(data=b"\xef\xbb\xbf")
-@example(data=b"a: \xed\xa0\x80")
-def test_any_bytes(data: bytes) -> None:
-    _any_bytes(data)
 
 
 @QUICK
@@ -113,12 +97,6 @@ def test_any_bytes(data: bytes) -> None:
 @example(text='boulder: {height: "\\ud800"}')
 def test_mutated_files(text: str) -> None:
     loads_or_says_why(text)
-
-
-@QUICK
-@given(parts=st.lists(st.sampled_from([*SCRAPS, "boulder", "height", "site", "soil", "a"]), max_size=30))
-def test_scraps_in_any_order(parts: list[str]) -> None:
-    loads_or_says_why("".join(parts))
 
 
 @QUICK
@@ -180,19 +158,3 @@ def test_any_table(tmp_path_factory: pytest.TempPathFactory, columns, count, cha
     given = {name.split("_")[1] for name in header if name.startswith("boulder")}
     text = re.sub(r"(length|width|height): [\d.]+, ", lambda m: "" if m[1] in given else m[0], BESIDE_A_TABLE)
     loads_or_says_why(text, f"table={path}")
-
-
-@pytest.mark.nightly
-@settings(LONG)
-@given(
-    text=st.one_of(
-        mutated(),
-        st.lists(st.sampled_from([*SCRAPS, "boulder", "height", "site", "soil", "a"]), max_size=40).map("".join),
-    ),
-    data=st.one_of(
-        st.binary(max_size=400), st.text(max_size=200).map(lambda text: text.encode(errors="surrogatepass"))
-    ),
-)
-def test_files_and_bytes_at_length(text: str, data: bytes) -> None:
-    loads_or_says_why(text)
-    _any_bytes(data)

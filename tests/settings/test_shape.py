@@ -14,7 +14,7 @@ import pytest
 from scipy.integrate import quad
 
 from boulder_sweep.settings import SettingsError, load, load_text
-from boulder_sweep.settings.shape import ProfilePoint, Shape, tapered
+from boulder_sweep.settings.model import ProfilePoint, Shape, tapered
 from boulder_sweep.stones.weighing import scanned
 from tests.stones.files import ply, prism, regular
 
@@ -92,7 +92,7 @@ def test_a_constant_profile_and_a_taper_of_one_are_boxes(load_it, minimal):
 
 def test_settings_are_read_back(load_it, minimal):
     shape = load_it(with_profile(minimal, POINTS)).model.shape
-    assert Shape.of_list(shape.as_list()) == shape
+    assert Shape.of_model({"profile": shape.as_list()}) == shape
 
 
 @pytest.mark.parametrize(

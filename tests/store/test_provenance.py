@@ -106,7 +106,7 @@ def test_what_deciding_modules_import_is_hashed():
     assert reached - {path.relative_to(package).as_posix() for path in hashed} <= {
         "text.py",
         "errors.py",
-        "settings/shown_units.py",
+        "settings/units.py",
     }
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import math
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -347,5 +348,5 @@ def test_command_makes_energy_and_film(tmp_path: Path, capsys: pytest.CaptureFix
     [("si", "cohesion 5 kPa, water table 0.9144 m down"), ("us", "cohesion 104.4 psf, water table 3 ft down")],
 )
 def test_the_ground_is_in_the_units_of_the_picture(units: str, words: str) -> None:
-    settings = {"model": {"ground": Ground(cohesion_kPa=5.0, water_table_m=0.9144).as_dict()}}
+    settings = {"model": {"ground": asdict(Ground(cohesion_kPa=5.0, water_table_m=0.9144))}}
     assert ground_words(settings, units) == words

@@ -1,7 +1,16 @@
-"""``table: designs.csv``, ``.xlsx`` or ``.parquet``: a list of designs, numbers in the units of the column names."""
+"""Tables as people have them: lists of designs (``table: designs.csv``), crash pulses, measured curves, logs.
+
+A file of text, or the first sheet of a spreadsheet, is read as rows of cells in one way. Blank rows, commas at the ends
+of rows and the numbers of rows that pandas writes in front are left out. Where a comma does not separate cells, it may
+be the decimal sign of the whole file. Nothing is read without a limit: on the bytes of a file, its lines, its columns,
+and the characters of a row. A list of designs may be a Parquet file, too; its numbers are in the units of the column
+names.
+"""
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 import re
 import zipfile
@@ -9,8 +18,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import chain
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
@@ -30,18 +40,311 @@ from boulder_sweep.settings.problems import (
     refuse,
     shorten,
 )
-from boulder_sweep.settings.shown_units import system_of
 from boulder_sweep.settings.sweep import DesignList
-from boulder_sweep.settings.text_table import MAX_BYTES, MAX_COLUMNS, Row, TextTable, open_text
 from boulder_sweep.settings.tree import Scalar
-from boulder_sweep.settings.units import factor, name_suffix, suffix_unit
-from boulder_sweep.settings.values import outside
+from boulder_sweep.settings.units import factor, name_suffix, suffix_unit, system_of
+from boulder_sweep.settings.values import NumberError, outside, split_number
 from boulder_sweep.text import install, size_text, why
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-MAX_TABLE_ROWS = MOST_ROWS
+MAX_BYTES = 500_000_000
+MAX_COLUMNS = 1000
+LONGEST_ROW = 1_000_000
+"""Most characters of a row."""
+CHUNK = 200_000
+"""Characters that are converted and checked at once."""
+MOST_MISTAKES = 10_000
+"""Mistakes after which a table is not read further."""
+INDEX_NAMES = ("", "Unnamed: 0")
+"""What pandas writes above the numbers of rows: nothing, or this where it has read and written them before."""
+
+_CERTAIN_COMMA = re.compile(r"^\s*[+−-]?(?:0?,\d|\d{4,},\d|\d+,\d{1,2}(?!\d)|\d+,\d{4})", re.MULTILINE | re.ASCII)
+"""A number whose comma cannot separate thousands."""
+_COMMA_IN_NUMBER = re.compile(r"(?<=\d),(?=\d)")
+
+Row = tuple[list[str], int, str]
+"""Cells, the number of the line, and its text; in a spreadsheet the text is empty."""
+
+
+class TextTable:
+    """Rows of cells below a row of names.
+
+    Parameters
+    ----------
+    label
+        The file, for messages.
+    rows
+        All its rows, the names first.
+    delimiter
+        What separates cells; empty for a spreadsheet.
+    known
+        Names as a table may have them, for a message.
+    problems
+        Receives what is wrong, with its place.
+
+    Attributes
+    ----------
+    names : list of str
+        Names of the columns.
+    positions : list of Position
+        Where they stand.
+    rows : iterator of Row
+        The rows below, each with a cell for every name.
+
+    Raises
+    ------
+    SettingsError
+        It is empty, has too many columns, or has no names.
+    """
+
+    def __init__(
+        self, label: str, rows: Iterator[Row], delimiter: str, known: Sequence[str], problems: ProblemList
+    ) -> None:
+        self.label, self.delimiter, self.problems = label, delimiter, problems
+        self.alike = Alike(problems)
+        filled = (row for row in rows if _is_filled(row[0]))
+        header = next(filled, None)
+        if header is None:
+            raise refuse(label, "is empty; the first line must hold the column names")
+        names = [cell.strip() for cell in header[0]]
+        while not names[-1]:
+            names.pop()
+        if len(names) > MAX_COLUMNS:
+            raise refuse(label, f"has {len(names):,} columns; at most {MAX_COLUMNS:,} are read")
+        if all(_is_number(name) for name in names if name):
+            sample = (", " if delimiter in ("", "\t") else delimiter).join(known[: max(2, len(names))])
+            tabs = " (with tabs between them)" if delimiter == "\t" else ""
+            words = f"such as {sample}{tabs}; known names are {', '.join(known)}"
+            raise refuse(label, f"the first line holds numbers; write a line of names above it, {words}", header[1], 1)
+        self._first = int(names[0] in INDEX_NAMES)
+        self.names = names[self._first :]
+        self.positions = [self.position(header, index) for index in range(len(self.names))]
+        self._width = len(names)
+        self._seen: dict[str, tuple[Position, str]] = {}
+        self.rows = self._even(filled, self.position(header, -self._first))
+
+    def position(self, row: Row, index: int) -> Position:
+        """Return where the cell of a column begins; with quotation marks in the line, only the line is certain."""
+        _, line, text = row
+        index += self._first
+        if '"' in text:
+            return Position(self.label, line)
+        before = sum(len(cell) + 1 for cell in text.split(self.delimiter)[:index]) if self.delimiter else index
+        return Position(self.label, line, before + 1)
+
+    def put_back(self, row: Row) -> None:
+        """Let a row be the next one again."""
+        self.rows = chain([row], self.rows)
+
+    def chunks(self) -> Iterator[list[Row]]:
+        """Yield the rows, some at once, up to the end or too many mistakes."""
+        chunk: list[Row] = []
+        size = 0
+        for row in self.rows:
+            chunk.append(row)
+            size += len(row[2]) or sum(map(len, row[0]))
+            if size >= CHUNK:
+                yield chunk
+                chunk, size = [], 0
+                if self.alike.counts.total() > MOST_MISTAKES:
+                    self.problems.add(
+                        Position(self.label, row[1]), "", "is not read beyond this line: too many mistakes"
+                    )
+                    break
+        if chunk:
+            yield chunk
+        self._check_signs()
+        self.alike.finish()
+
+    def cells(self, rows: list[Row], index: int) -> list[str]:
+        """Return the cells of a column."""
+        index += self._first
+        return [row[0][index] for row in rows]
+
+    def numbers(
+        self, rows: list[Row], index: int, key: str, unit: str = "1", *, may_be_empty: bool = False
+    ) -> np.ndarray:
+        """Return the cells of a column as numbers, NaN for empty ones and for those that are none.
+
+        Parameters
+        ----------
+        rows
+            Some rows.
+        index
+            The column.
+        key
+            What it gives, for messages.
+        unit
+            What a message says is needed: the unit of an input.
+        may_be_empty
+            Whether empty cells are no mistake.
+        """
+        cells = self.cells(rows, index)
+        text = "\n".join(cells)
+        if self.delimiter in (";", "\t"):
+            self._note_signs(text, rows, index)
+            if "," in text:
+                cells = [cell.replace(",", ".") if cell.count(",") == 1 and "." not in cell else cell for cell in cells]
+        if text.isascii() and "_" not in text and "n" not in text.lower():
+            try:
+                gaps = may_be_empty and not all(cells)  # the usual case, fast
+                return np.array([np.nan if gaps and not cell.strip() else float(cell) for cell in cells])
+            except ValueError:
+                pass
+        values = np.full(len(cells), np.nan)
+        for at, cell in enumerate(cells):
+            if may_be_empty and not cell.strip():
+                continue
+            try:
+                number, written = split_number(cell, unit)
+                if written:
+                    raise NumberError(f"'{shorten(cell)}' has a unit; units belong in the column's name")
+                values[at] = float(number)
+            except (NumberError, OverflowError) as error:
+                self.alike.add("cells", self.position(rows[at], index), key, str(error))
+        return values
+
+    def _note_signs(self, text: str, rows: list[Row], index: int) -> None:
+        """Note where the first comma and the first point stand, and whether a comma is certainly a decimal one."""
+        if "certain" not in self._seen and _CERTAIN_COMMA.search(text):
+            self._seen["certain"] = self.positions[index], ""
+        for sign in ",.":
+            if sign in text and sign not in self._seen:
+                row = next(row for row in rows if sign in row[0][index + self._first])
+                self._seen[sign] = self.position(row, index), row[0][index + self._first]
+
+    def _check_signs(self) -> None:
+        """Report numbers of which nobody can say where their decimals begin."""
+        if "," not in self._seen:
+            return
+        position, cell = self._seen[","]
+        if "." in self._seen:
+            place, other = self._seen["."]
+            message = f"'{shorten(cell)}' has a comma, and '{shorten(other)}' in line {place.line} a point"
+            remedy = "write all numbers with decimal points, or all with decimal commas, and thousands unseparated"
+            self.problems.add(position, "", f"{message}; {remedy}")
+        elif "certain" not in self._seen:
+            whole, _, decimals = (shorten(part) for part in cell.partition(","))
+            message = f"'{shorten(cell)}' may be {whole}{decimals} or {whole}.{decimals}, and no other number tells"
+            self.problems.add(position, "", f"{message}; write the numbers of this file without commas")
+
+    def _even(self, rows: Iterator[Row], unnamed: Position) -> Iterator[Row]:
+        """Yield rows with a cell for every name; report others, and an index that is none."""
+        width, last = self._width, -1
+        hint = " (a comma begins a cell: write 15000 for 15,000, 1.5 for 1,5, and text with a comma in quotation marks)"
+        for row in rows:
+            cells = row[0]
+            if len(cells) != width:
+                if len(cells) < width or _is_filled(cells[width:]):
+                    message = f"has {len(cells)} cell{'' if len(cells) == 1 else 's'}; the first line has {width}"
+                    message += hint if len(cells) > width and self.delimiter == "," else ""
+                    self.alike.add("lines", self.position(row, -self._first), "", message)
+                    continue
+                del cells[width:]
+            if self._first:
+                number = int(cells[0]) if cells[0].isascii() and cells[0].isdecimal() and len(cells[0]) < 18 else -1
+                if number <= last:
+                    message = "has no name, and does not count the rows; give it a name, or remove it"
+                    self.alike.add("", unnamed, "the first column", message, most=1)
+                last = number
+            yield row
+
+
+class _Lines:
+    """Lines of a text without the comments (# ...); remembers the line that was read last."""
+
+    def __init__(self, stream: TextIO, label: str, most: int) -> None:
+        self.stream, self.label, self.most = stream, label, most
+        self.number = 0
+        self.text = ""
+        self.taken, self.begun = 0, 1
+        """Characters since the last row, and the line behind it."""
+
+    def __iter__(self) -> Iterator[str]:
+        readline = self.stream.readline
+        while text := readline(LONGEST_ROW + 1):
+            self.number += 1
+            if self.number > self.most:
+                raise refuse(self.label, f"has more than {self.most:,} lines")
+            self.taken += len(text)
+            if self.taken > LONGEST_ROW:
+                remedy = "is a quotation mark not closed?"
+                raise refuse(self.label, f"has a row of more than {LONGEST_ROW:,} characters; {remedy}", self.number, 1)
+            self.text = text
+            if text[0] != "#":
+                yield text
+            else:
+                self.taken = 0
+
+
+@contextmanager
+def open_table(path: Location, most_lines: int, known: Sequence[str], problems: ProblemList) -> Iterator[TextTable]:
+    """Open a text file, or the first sheet of a spreadsheet (.xlsx), as a table.
+
+    Parameters
+    ----------
+    path
+        A text is UTF-8; comma, semicolon or tab between the cells, the first line the column names. Lines that begin
+        with # and blank rows are skipped. In a spreadsheet row and column of a cell are its position, and formulas
+        count by their stored value.
+    most_lines
+        Most lines that a text may have.
+    known
+        Names as a table may have them, for a message.
+    problems
+        Receives mistakes with line and column of the cell.
+
+    Raises
+    ------
+    SettingsError
+        The file cannot be read at all, or not to its end, or openpyxl is not installed.
+    """
+    label = str(path)
+    if path.suffix.lower() == ".xlsx":
+        yield TextTable(label, _sheet_rows(path), "", known, problems)
+        return
+    try:
+        with io.TextIOWrapper(opened(path), encoding="utf-8-sig", newline="") as stream:
+            lines = _Lines(stream, label, most_lines)
+            try:
+                yield _table_of(lines, known, problems)
+            except csv.Error:
+                message = "cannot be read as CSV; is a quotation mark not closed, or does text follow a closed one?"
+                raise refuse(label, message, lines.begun, 1) from None
+    except UnicodeDecodeError:
+        raise refuse(label, "is not UTF-8 text; save it as CSV in UTF-8") from None
+    except OSError as error:
+        raise refuse(label, f"cannot be read ({error.strerror})") from None
+
+
+def _table_of(lines: _Lines, known: Sequence[str], problems: ProblemList) -> TextTable:
+    """Return the lines of a text as a table; what stands most often between names separates cells."""
+    texts = iter(lines)
+    header = next((text for text in texts if text.strip(" \t\r\n,;")), "")
+    delimiter = max(",;\t", key=_COMMA_IN_NUMBER.sub("", header).count)
+
+    def rows() -> Iterator[Row]:
+        for cells in csv.reader(chain([header], texts), delimiter=delimiter, strict=True):
+            lines.taken, lines.begun = 0, lines.number + 1
+            yield cells, lines.number, lines.text
+
+    return TextTable(lines.label, rows(), delimiter, known, problems)
+
+
+def _is_filled(cells: list[str]) -> bool:
+    return bool(cells) and bool(cells[0].strip() or "".join(cells).strip())
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text.replace(",", "."))
+    except ValueError:
+        return False
+    return True
+
+
 MOST_WORDS = 2_000_000
 """Most different words of a column."""
 _TOO_MANY_WORDS = f"column {{}} has more than {MOST_WORDS:,} different words"
@@ -115,32 +418,13 @@ def located(name: str, folder: Path) -> Location:
     return location_of(name) if is_url(name) else folder / Path(name)
 
 
-@contextmanager
-def open_table(path: Location, most_rows: int, known: Sequence[str], problems: ProblemList) -> Iterator[TextTable]:
-    """Open a text file, or the first sheet of a spreadsheet (.xlsx), as a table; see `open_text`.
-
-    In a spreadsheet row and column of a cell are its position. Empty rows are skipped, formulas count by their stored
-    value.
-
-    Raises
-    ------
-    SettingsError
-        The file cannot be read at all, or openpyxl is not installed.
-    """
-    if path.suffix.lower() != ".xlsx":
-        with open_text(path, most_rows, known, problems) as table:
-            yield table
-        return
-    label = str(path)
-    try:
-        from openpyxl import load_workbook  # an extra, for tables in this format only
-    except ImportError:
-        raise refuse(label, f"spreadsheets need openpyxl: {install('report')}") from None
-    yield TextTable(label, _sheet_rows(path, load_workbook), "", known, problems)
+def _read_rows(path: Location, problems: ProblemList) -> DesignList:
+    with open_table(path, MOST_ROWS, _NAMES, problems) as table:
+        return _designs_of(table, path, problems)
 
 
 def _designs_of(table: TextTable, path: Location, problems: ProblemList) -> DesignList:
-    """Return the designs of a table of text; with mistakes in the header or the cells they are not usable."""
+    """Return the designs of a table; with mistakes in the header or the cells they are not usable."""
     before = len(problems.problems)
     columns = read_header(table.names, table.positions, problems)
     numbers: dict[str, list[np.ndarray]] = {column.field.name: [] for column in columns if column and column.field}
@@ -158,7 +442,7 @@ def _designs_of(table: TextTable, path: Location, problems: ProblemList) -> Desi
                 if len(words[column.name].codes) > MOST_WORDS:
                     raise refuse(table.label, _TOO_MANY_WORDS.format(column.name))
                 continue
-            values = to_input_unit(table.numbers(rows, index, column.name, column.field.unit), column)
+            values = table.numbers(rows, index, column.name, column.field.unit) * float(column.factor)
             for row, message in check_values(values, column.field):
                 if not np.isnan(values[row]):  # those have been reported as they were read
                     table.alike.add("cells", table.position(rows[row], index), column.name, message)
@@ -201,20 +485,13 @@ def _are_numbers(cells: Iterable[str]) -> bool:
         return False
 
 
-def _read_rows(path: Location, problems: ProblemList) -> DesignList:
-    with open_table(path, MAX_TABLE_ROWS, _NAMES, problems) as table:
-        return _designs_of(table, path, problems)
-
-
-def _sheet_rows(path: Location, load_workbook: Callable[..., Any]) -> Iterator[Row]:
-    """Yield the rows of the first sheet, empty cells at their ends as far as the first row has names.
-
-    Raises
-    ------
-    SettingsError
-        The file is damaged, larger than a spreadsheet can be, or has formulas without values.
-    """
+def _sheet_rows(path: Location) -> Iterator[Row]:
+    """Yield the rows of the first sheet, empty cells at their ends as far as the first row has names."""
     label = str(path)
+    try:
+        from openpyxl import load_workbook  # an extra, for tables in this format only
+    except ImportError:
+        raise refuse(label, f"spreadsheets need openpyxl: {install('report')}") from None
     try:
         source = source_of(path)
         with zipfile.ZipFile(source) as archive:
@@ -287,7 +564,7 @@ def _read_columns(path: Location, problems: ProblemList) -> DesignList:
     label = str(path)
     try:
         with opened(path) as source:
-            return _checked_columns(TableFile(source, MAX_TABLE_ROWS, most_text=math.inf), path, problems)
+            return _checked_columns(TableFile(source, MOST_ROWS, most_text=math.inf), path, problems)
     except ParquetError as problem:
         raise refuse(label, str(problem)) from None
     except OSError as error:
@@ -327,7 +604,7 @@ def _checked_columns(file: TableFile, path: Location, problems: ProblemList) -> 
         if cells.null_count:
             problems.add(position, name, f"has {cells.null_count} empty cells; every design needs a value")
             continue
-        values = to_input_unit(cells.cast(pa.float64(), safe=False).to_numpy(), column)
+        values = cells.cast(pa.float64(), safe=False).to_numpy() * float(column.factor)
         for row, message in check_values(values, column.field):
             alike.add("rows", position, name, f"row {row + 1}: {message}")
         designs.columns[column.field.name] = np.ascontiguousarray(values)
@@ -492,8 +769,3 @@ def label_of(texts: list[str]) -> Label:
     """Return texts, one a row, as codes and words; fit to be printed."""
     words, codes = np.unique(np.array([shorten(text, MAX_TEXT) for text in texts], dtype=object), return_inverse=True)
     return Label(codes.astype(np.int32), tuple(words.tolist()))
-
-
-def to_input_unit(values: np.ndarray, column: TableColumn) -> np.ndarray:
-    """Return values in the unit of the input."""
-    return values if column.factor == 1 else values * float(column.factor)
