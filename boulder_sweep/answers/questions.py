@@ -129,7 +129,7 @@ class ValueSearch:
         return (last, first) if self.key.most else (first, last)
 
     def answers_of(self, rows: InputRows, low: np.ndarray, high: np.ndarray) -> Answers:
-        """Return the answers of n designs, between the ends of a range for each, shape (n,)."""
+        """Return the answers of n designs, between the ends of a range for each, shape (n,); they are not graded."""
         every = np.arange(len(low))
         first, last = self.lattice(low, high)
         trial = self.trial(rows)
@@ -147,15 +147,11 @@ class ValueSearch:
             self._kinds(trial, result, judged, chances, high if not self.key.most else low),
             np.where(result.has_fails, self.key.values(result.fails), np.nan),
             np.where(result.has_holds, self.key.values(result.holds), np.nan),
-            self.graded(judged, block),
+            judged,
             [_stretches(self.key, result.changes.get(row), first[row], last[row]) for row in every.tolist()],
             trial.simulated,
             chances,
         )
-
-    def graded(self, judged: Judged, block: DesignBlock) -> Judged:
-        """Return the outcomes at the answers with their grades."""
-        return self.judges.final.graded(judged, block)
 
     def undecided(self, judged: Judged, chances: Chances | None) -> np.ndarray:
         """Return where designs that are no answers would be if what is undecided passed, bool, shape (n,)."""
@@ -256,8 +252,16 @@ class Question(ValueSearch):
             shares, tried = self._best_depths(rows, *ends)
             rows |= {SHARE: shares}
         answers = self.answers_of(rows, *ends)
-        answers = replace(answers, simulated=answers.simulated + tried)
-        return replace(answers, block=replace(answers.block, labels=self.open.labels(start, stop)))
+        return replace(
+            answers,
+            simulated=answers.simulated + tried,
+            judged=self.graded(answers.judged, answers.block),
+            block=replace(answers.block, labels=self.open.labels(start, stop)),
+        )
+
+    def graded(self, judged: Judged, block: DesignBlock) -> Judged:
+        """Return the outcomes at the answers with their grades."""
+        return self.judges.final.graded(judged, block)
 
     def _best_depths(self, rows: InputRows, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, int]:
         """Return the depths, as `SHARE`, at which the answers of n designs are the best, and how many were simulated.
