@@ -50,8 +50,8 @@ SHALLOW = (0.15, 0.35)
 SLOW_M_S = (4.0, 13.0)
 """speeds that they stop."""
 LOOSE_DEG = 30.0
-OF_A_SITE = 25
-"""Passes of one site, which turn by at least"""
+LEAST_SITES, OF_A_SITE = 4, 25
+"""Number of sites where few passes are asked for, and else the passes of one, which turn by at least"""
 FAR_DEG = 9.0
 """in the planar motion."""
 WATCHED_S = 0.6
@@ -109,13 +109,14 @@ def random_ground(rng: np.random.Generator) -> Ground:
 def sites(evaluation: Evaluation, count: int) -> Iterator[tuple[Evaluation, Designs]]:
     """Yield how the designs of random sites are judged, and passes of them that turn far."""
     rng = np.random.default_rng(SEED)
-    for site in range(max(count // OF_A_SITE, 1)):
+    n = max(count // OF_A_SITE, LEAST_SITES)
+    for site in range(n):
         model = Model(**random_ground(rng).fields())
         here, drawn = replace(evaluation, model=model), random_designs(DRAWN * OF_A_SITE, SEED + site)
         designs = drawn._replace(table=with_soil(drawn.table, model.resistance, model.ground))
         judged = here.judged(designs)
         far = (judged.verdict == PASS) & (judged["max_rotation_deg"] >= FAR_DEG)
-        yield here, designs.rows(np.flatnonzero(far)[: min(OF_A_SITE, count)])
+        yield here, designs.rows(np.flatnonzero(far)[: count // n])
 
 
 def overturned_as_it_lies(passes: Designs, stand: np.ndarray, evaluation: Evaluation) -> np.ndarray:

@@ -18,7 +18,7 @@ SAID = {
     "embassy_street": r"→ +1\.8 +3\.4 +2\.41\d +0\.\d+ +0\.98 +29\.2 .*robust",
     "wet_backfill": r"pass +\d+",
     "clayey_terrace": r"PASS, 16\.8° of 20°",
-    "embankment": r"2\.3 +3 +13\.97",
+    "embankment": r"2\.3 +3 +12\.76",
     "quarry_stone": r"\(23\.0 t\)\s+2\.424 m deep",
     "uncertain_site": r"2\.322",
 }

@@ -117,7 +117,7 @@ def test_order_of_many_rows(layers: int) -> None:
 
 
 SPOILT = {
-    "not a number": ({"phi": np.nan}, Status.INVALID),
+    "not a number": ({"rho_b": np.nan}, Status.INVALID),
     "infinite": ({"rho_b": np.inf}, Status.INVALID),
     "no mass": ({"m_v": 0.0}, Status.INVALID),
     "as high as it is deep": ({"H": 1.0, "d": 1.0}, Status.NO_CONTACT),
