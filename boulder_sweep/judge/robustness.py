@@ -24,7 +24,6 @@ import numpy as np
 from boulder_kernels import Status
 from boulder_kernels._jit import plain
 from boulder_kernels.heave import Base, bearing_capacity_factor
-from boulder_kernels.rules import UNSTUDIED
 from boulder_kernels.second_opinion import USUAL_BASE, HeaveControl, second_opinions
 from boulder_kernels.table import some_rows
 from boulder_sweep.columns import GRADES
@@ -58,10 +57,7 @@ MEANINGS = {
     "open": "second opinions know boxes of rock of given density and corrected readings only",
 }
 """What a grade means of a pass of which second opinions were asked, if they could be."""
-UNSTUDIED_IN_WORDS = (
-    "stands under the second opinions that were asked, but outside the ranges of their study, as its flags say "
-    f"({', '.join(UNSTUDIED)})"
-)
+UNSTUDIED_IN_WORDS = "stands under the second opinions that were asked, but outside the ranges of their study"
 """Explanation of the grade ``open`` where second opinions were asked."""
 GIVES_WAY = (
     "no second opinion: by the density and friction angle of the soil the ground under the foot cannot carry the "

@@ -33,6 +33,12 @@ ROCK, ROCK_KG = Path("docs/examples/rock.ply"), 23_500.0
 FILM = "film_rwg.gif"
 """A boulder that holds, on the first screen of the README."""
 HEADING = Heading("Main Street", "City of Springfield", "North gate", "2026-11-28", "A", "C. Day", "E. Fox")
+SHEETS = {
+    "site": (SITE, "si"),
+    "borehole": (Path("configs/borehole_log.yaml"), "us"),
+    "stone": (Path("configs/quarry_stone.yaml"), "si"),
+}
+"""Answers whose sheet to sign is shown, and their units."""
 MARGIN = 20
 """Beside a photographed sheet [px]."""
 
@@ -80,9 +86,14 @@ def draw_all(root: Path, chromium: Browser) -> list[Path]:
         run(sweep, Path(scratch) / "grid.sweep")
         table, terms = read(Path(scratch) / "grid.sweep"), terms_line(sweep.resolved())
         draw_verdict_map(table, named("m30_sizing.png"), title=sweep.name, terms=terms)
-        need(load(root / SITE)).write(Path(scratch) / "site.parquet")
-        page = write_report(Path(scratch) / "site.parquet", Path(scratch) / "page.html", units="si", heading=HEADING)
-        photograph(chromium, page, named("report_site.png"))
+        for name, (file, units) in SHEETS.items():
+            need(load(root / file)).write(Path(scratch) / f"{name}.parquet")
+            page = write_report(
+                Path(scratch) / f"{name}.parquet", Path(scratch) / "page.html", units=units, heading=HEADING
+            )
+            photograph(chromium, page, named(f"report_{name}.png"))
+        page = write_report(Path(scratch) / "grid.sweep", Path(scratch) / "page.html", units="si", heading=HEADING)
+        photograph(chromium, page, named("report_grid.png"))
     for path in drawn:
         if path.name != FILM:
             reduce_colours(path)
