@@ -300,7 +300,7 @@ class Trial:
         self.simulated = 0
         self.slides = np.zeros(len(next(iter(rows.values()))), dtype=bool)
         """Rows of which some value that passes makes a shallow boulder slide, shape (n,)."""
-        self._final = Remembered(judges.final)
+        self._final = Remembered(judges)
         self._alone = [replace(each, against_slower=False) for each in (judges.final, judges.coarse)]
 
     def coarse(self, index: np.ndarray, positions: np.ndarray) -> np.ndarray:
@@ -365,7 +365,7 @@ class Trial:
 
     def codes(self, block: DesignBlock, judged: Judged) -> np.ndarray:
         """Return what a search asks of judged designs."""
-        codes = np.where(self.judges.holds(judged), HOLDS, FAILS)
+        codes = np.where(self._final.holds(judged, block), HOLDS, FAILS)
         codes[judged["time_to_limit_s"] < FAST_OVERTURN_S] = FAR
         return np.where(beyond_reach(block, judged), BEYOND, codes)
 

@@ -104,7 +104,7 @@ def capacity(sweep: Settings, *, jobs: int | None = None, progress: ProgressCall
     sweep = at_values(sweep_of(sweep))
     sweep.need_depth()
     judges = judges_of(sweep)
-    judges.final.warm_up()
+    judges.final.asked().warm_up()
     calls = (call(_table, sweep, judges, start, stop) for start, stop in ranges(sweep.n_designs, ROWS_AT_ONCE))
     tables = collected(Pool(jobs)(calls), sweep.n_designs, progress)
     return Reserves(sweep, joined_tables(tables, sweep, judges, "boulder_sweep.capacity"))

@@ -197,6 +197,17 @@ def stands(designs: Designs, law: str, present: str, limits: Any, longest_s: flo
     return passes
 
 
+def stands_under_the_weakest(designs: Designs, present: str, limits: Any, longest_s: float) -> np.ndarray:
+    """Return which of n designs pass by the laws that decide, bool, shape (n,); arguments: see `stands`."""
+    there = stands(designs, DECISIVE, present, limits, longest_s)
+    resistance = with_law(designs.table, DECISIVE, present).K_epsilon
+    for law in SECOND_OPINIONS:
+        if law != DECISIVE:
+            rows = np.flatnonzero(there & (with_law(designs.table, law, present).K_epsilon < resistance))
+            there[rows] = stands(designs.rows(rows), law, present, limits, longest_s)
+    return there
+
+
 def standing(judged: Judged) -> np.ndarray:
     """Return which judged rows are robust, or would be inside the ranges of the study, bool, shape (n,)."""
     grade, under, bit = judged["robustness"], judged["stands_under"], 1 << SECOND_OPINIONS.index(DECISIVE)
@@ -210,8 +221,6 @@ def with_second_opinions(
     present: str,
     limits: Any,
     longest_s: float,
-    *,
-    told: bool = True,
 ) -> Judged:
     """Return judged rows with passes simulated again.
 
@@ -227,8 +236,6 @@ def with_second_opinions(
         Designs of those that pass.
     laws, present, limits, longest_s
         See `stands`.
-    told
-        Whether passes that `DECISIVE` overturns are simulated under another law, only to tell whether they stand there.
     """
     passing = np.flatnonzero(judged.verdict == PASS)
     grade, under = judged["robustness"].copy(), judged["stands_under"].copy()
@@ -251,8 +258,7 @@ def with_second_opinions(
         resistance = with_law(passes.table, DECISIVE, present).K_epsilon
         for law in SECOND_OPINIONS:
             if law != DECISIVE:
-                weaker = with_law(passes.table, law, present).K_epsilon < resistance
-                ask(law, np.flatnonzero(turned | weaker if told else weaker & ~turned))
+                ask(law, np.flatnonzero(turned | (with_law(passes.table, law, present).K_epsilon < resistance)))
     grade[passing[turned]] = SENSITIVE
     if DECISIVE in laws:
         studied = are_studied(passes, limits)
