@@ -23,6 +23,7 @@ from boulder_sweep.answers.search import (
     Search,
     search,
     searched_again,
+    settled,
     shorter,
     steady,
 )
@@ -133,7 +134,7 @@ class ValueSearch:
         every = np.arange(len(low))
         first, last = self.lattice(low, high)
         trial = self.trial(rows)
-        result = search(trial.coarse, first, last, self.cells)
+        result = trial.settled(search(trial.rough, first, last, self.cells), first, last)
         result = self._again(result, every[trial.slides], trial, first, last, quick=True)
         wrong = trial.contradicted(result)
         block, judged = trial.judged(every, result.shown)
@@ -303,6 +304,10 @@ class Trial:
         self._final = Remembered(judges)
         self._alone = [replace(each, against_slower=False) for each in (judges.final, judges.coarse)]
 
+    def rough(self, index: np.ndarray, positions: np.ndarray) -> np.ndarray:
+        """Predicate of the search like `coarse`, but by rough second opinions, if any are asked."""
+        return self._codes(index, positions, quick=True, roughly=True)
+
     def coarse(self, index: np.ndarray, positions: np.ndarray) -> np.ndarray:
         """Predicate of the search, without an error estimate."""
         return self._codes(index, positions, quick=True)
@@ -339,6 +344,10 @@ class Trial:
         depth = depth_within(low, high, share, height, bumper, self.least_overlap_m)
         return block_of(rows | {DEPTH: depth})
 
+    def settled(self, result: Search, first: np.ndarray, last: np.ndarray) -> Search:
+        """Return the results of a rough search by `coarse`."""
+        return settled(self.coarse, result, first, last) if self.judges.robust else result
+
     def contradicted(self, result: Search) -> np.ndarray:
         """Return the rows of a quick search that the accuracy of the sweep does not confirm, shape (m,)."""
         bracketed = np.flatnonzero(result.has_holds & result.has_fails)
@@ -354,18 +363,18 @@ class Trial:
         """Return the probabilities at some values, one for each row; None if none is asked for."""
         return None
 
-    def _codes(self, index: np.ndarray, positions: np.ndarray, *, quick: bool) -> np.ndarray:
+    def _codes(self, index: np.ndarray, positions: np.ndarray, *, quick: bool, roughly: bool = False) -> np.ndarray:
         block, judged = self.judged(index, positions, quick=quick)
-        codes = self.codes(block, judged)
+        codes = self.codes(block, judged, roughly=roughly)
         if self.key.is_steady:
             depth, height = (block.columns[name].to_numpy() for name in ("embedment_depth_m", "boulder_height_m"))
             sliding = (depth < SHALLOW * height) & (judged["max_displacement_m"] > SLIDES_M)
             self.slides[index[sliding & (codes == HOLDS)]] = True
         return codes
 
-    def codes(self, block: DesignBlock, judged: Judged) -> np.ndarray:
+    def codes(self, block: DesignBlock, judged: Judged, *, roughly: bool = False) -> np.ndarray:
         """Return what a search asks of judged designs."""
-        codes = np.where(self._final.holds(judged, block), HOLDS, FAILS)
+        codes = np.where(self._final.holds(judged, block, roughly=roughly), HOLDS, FAILS)
         codes[judged["time_to_limit_s"] < FAST_OVERTURN_S] = FAR
         return np.where(beyond_reach(block, judged), BEYOND, codes)
 

@@ -151,6 +151,44 @@ def shorter(one: Search, other: Search, last: np.ndarray) -> Search:
     return _replace_rows(one, rows, Search(**{name: getattr(other, name)[rows] for name in PER_ROW}, changes=changes))
 
 
+def settled(predicate: Predicate, result: Search, first: np.ndarray, last: np.ndarray) -> Search:
+    """Return a search by a predicate that is nearly the one it was made by: changes found once are moved a little.
+
+    From where it was found to hold, the predicate is tried at twice the distance each time, forward until it holds or
+    backward until it fails. A row in which that leads to an end of its range is left as it is.
+
+    Parameters
+    ----------
+    predicate, first, last
+        See `search`.
+    result
+        The search.
+    """
+    rows = np.flatnonzero(result.kind == FOUND)
+    low, high = result.fails[rows].copy(), result.holds[rows].copy()
+    onward = np.sign(high - low)
+    ends = np.minimum(first, last)[rows], np.maximum(first, last)[rows]
+    held = predicate(rows, high) == HOLDS
+    low = np.where(held, low, high)
+    at, direction = high.copy(), np.where(held, -onward, onward)
+    inside, open_, reach = np.ones(len(rows), dtype=bool), np.ones(len(rows), dtype=bool), 1
+    while open_.any():
+        at[open_] += (direction * reach)[open_]
+        inside &= (at >= ends[0]) & (at <= ends[1])
+        open_ &= inside
+        holds = np.zeros(len(rows), dtype=bool)
+        holds[open_] = predicate(rows[open_], at[open_]) == HOLDS
+        high = np.where(open_ & holds, at, high)
+        low = np.where(open_ & ~holds, at, low)
+        open_ &= holds == held
+        reach *= 2
+    rows, low, high = rows[inside], low[inside], high[inside]
+    low, high = _bisect_changes(predicate, rows, low, high, np.ones(len(rows), dtype=bool))
+    fails, held_at, shown = result.fails.copy(), result.holds.copy(), result.shown.copy()
+    fails[rows], held_at[rows], shown[rows] = low, high, high
+    return replace(result, fails=fails, holds=held_at, shown=shown)
+
+
 def contradicted(predicate: Predicate, result: Search) -> np.ndarray:
     """Return the rows of a search of which another predicate does not confirm both ends of the bracket, shape (m,)."""
     failing, holding = np.flatnonzero(result.has_fails), np.flatnonzero(result.has_holds)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -201,9 +202,10 @@ class Remembered:
         indices = [self._indices[key] for key in keys]
         return joined([self._judged[0].rows(np.array(indices, dtype=np.int64))])
 
-    def holds(self, judged: Judged, block: DesignBlock) -> np.ndarray:
-        """Return what `Judges.holds` does; second opinions, too, are asked of each design only once."""
-        return self._judges.holds(judged, block, self._stands)
+    def holds(self, judged: Judged, block: DesignBlock, *, roughly: bool = False) -> np.ndarray:
+        """Return what `Judges.holds` does; second opinions, too, are asked of each design only once, if not roughly."""
+        stand = partial(self._judges.final.stand, roughly=True) if roughly else self._stands
+        return self._judges.holds(judged, block, stand)
 
     def _stands(self, block: DesignBlock) -> np.ndarray:
         keys = _keys_of(block)

@@ -245,13 +245,17 @@ class Evaluation:
     def _graded(self, judged: Judged, passes: Designs, laws: tuple[str, ...]) -> Judged:
         return with_second_opinions(judged, passes, laws, self.model.resistance, self.limits, self.longest_s)
 
-    def stand(self, block: DesignBlock) -> np.ndarray:
-        """Return which designs pass, in all cases, with the margin under the laws that decide, bool, shape (n,)."""
+    def stand(self, block: DesignBlock, *, roughly: bool = False) -> np.ndarray:
+        """Return which designs pass, in all cases, with the margin under the laws that decide, bool, shape (n,).
+
+        `roughly` where it is only to be known where to look closer.
+        """
         limits, present = self._reduced_limits, self.model.resistance
         there = np.ones(len(block), dtype=bool)
         for case in (replace(block, cases=()), *block.cases):
             rows = np.flatnonzero(there)
-            there[rows] = stands_under_the_weakest(self.designs(case, rows), present, limits, self.longest_s)
+            designs = self.designs(case, rows)
+            there[rows] = stands_under_the_weakest(designs, present, limits, self.longest_s, roughly=roughly)
         return there
 
     def robust_unasked(self, judged: Judged) -> np.ndarray:
