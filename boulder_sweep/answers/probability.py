@@ -162,7 +162,9 @@ class ProbabilityTrial(Trial):
         self.simulated += chances.points
         return chances
 
-    def _codes(self, index: np.ndarray, positions: np.ndarray, *, quick: bool, roughly: bool = False) -> np.ndarray:
+    def _codes(
+        self, index: np.ndarray, positions: np.ndarray, *, quick: bool, tolerance_m: float | None = None
+    ) -> np.ndarray:
         block, judged = self.judged(index, positions, quick=True)
         sampling = self.asked.sampling
         codes = sampling.codes(self.draws, index, self._inputs(block, positions), self.points)

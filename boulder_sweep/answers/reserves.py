@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
     from boulder_sweep.settings.loader import Settings
 
-ROWS_AT_ONCE = 512
+ROWS_AT_ONCE = 2048
 MPH = 0.44704
 CLASSES = {"M30": 30 * MPH, "M40": 40 * MPH, "M50": 50 * MPH}
 """Nominal speeds [m/s] of the ASTM F2656 classes for a medium-duty truck."""

@@ -62,7 +62,9 @@ PER_ROW = ("kind", "fails", "holds", "has_fails", "has_holds", "shown", "holds_l
 """Attributes of a `Search` that have a value for each row."""
 
 
-def search(predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int = CELLS) -> Search:
+def search(
+    predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int = CELLS, closer: Predicate | None = None
+) -> Search:
     """Search n rows.
 
     Parameters
@@ -74,6 +76,8 @@ def search(predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int
     cells
         Pieces that a range is cut into. An interval shorter than a cell may be missed, and so may one between two
         positions that are far from holding and at most `STRIDE` cells apart.
+    closer
+        Predicate by which changes are located, nearly the same; the same by default.
 
     Returns
     -------
@@ -102,7 +106,7 @@ def search(predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int
     edge_rows, edge_columns = _edges(codes, kind, at)
     low, high = positions[edge_rows, edge_columns], positions[edge_rows, edge_columns + 1]
     rises = codes[edge_rows, edge_columns + 1] == HOLDS
-    low, high = _bisect_changes(predicate, edge_rows, low, high, rises)
+    low, high = _bisect_changes(closer or predicate, edge_rows, low, high, rises)
 
     fails, held = shown.copy(), shown.copy()
     has_fails = none.copy()

@@ -202,9 +202,10 @@ class Remembered:
         indices = [self._indices[key] for key in keys]
         return joined([self._judged[0].rows(np.array(indices, dtype=np.int64))])
 
-    def holds(self, judged: Judged, block: DesignBlock, *, roughly: bool = False) -> np.ndarray:
-        """Return what `Judges.holds` does; second opinions, too, are asked of each design only once, if not roughly."""
-        stand = partial(self._judges.final.stand, roughly=True) if roughly else self._stands
+    def holds(self, judged: Judged, block: DesignBlock, tolerance_m: float | None = None) -> np.ndarray:
+        """Return what `Judges.holds` does; second opinions without a tolerance, too, are asked only once."""
+        final = self._judges.final
+        stand = self._stands if tolerance_m is None else partial(final.stand, tolerance_m=tolerance_m)
         return self._judges.holds(judged, block, stand)
 
     def _stands(self, block: DesignBlock) -> np.ndarray:

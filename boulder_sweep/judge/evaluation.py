@@ -245,17 +245,17 @@ class Evaluation:
     def _graded(self, judged: Judged, passes: Designs, laws: tuple[str, ...]) -> Judged:
         return with_second_opinions(judged, passes, laws, self.model.resistance, self.limits, self.longest_s)
 
-    def stand(self, block: DesignBlock, *, roughly: bool = False) -> np.ndarray:
+    def stand(self, block: DesignBlock, tolerance_m: float | None = None) -> np.ndarray:
         """Return which designs pass, in all cases, with the margin under the laws that decide, bool, shape (n,).
 
-        `roughly` where it is only to be known where to look closer.
+        With a tolerance, nearly so, by one solution; see `boulder_sweep.judge.robustness.stands`.
         """
         limits, present = self._reduced_limits, self.model.resistance
         there = np.ones(len(block), dtype=bool)
         for case in (replace(block, cases=()), *block.cases):
             rows = np.flatnonzero(there)
             designs = self.designs(case, rows)
-            there[rows] = stands_under_the_weakest(designs, present, limits, self.longest_s, roughly=roughly)
+            there[rows] = stands_under_the_weakest(designs, present, limits, self.longest_s, tolerance_m=tolerance_m)
         return there
 
     def robust_unasked(self, judged: Judged) -> np.ndarray:

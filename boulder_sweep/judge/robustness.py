@@ -90,8 +90,6 @@ ROUNDING = 1e-9
 QUICK_M = 5e-4
 """Error of a step of a second opinion [m]: of 6,800 random designs that turn about as far as the limit, none turned by
 0.6 deg too little. Shallow ones may err more, by shorter steps, too; `benchmarks.grades` holds their grades."""
-ROUGH_M = 2e-4
-"""Error of a step of one solution that decides nearly as a quick and a fine one do: within 0.05 deg [m]."""
 NEAR_DEG = 1.0
 """Distance from the limit of rotation within which a second opinion is simulated again finely."""
 NEAR_M = 0.01
@@ -161,7 +159,7 @@ def is_free(table: DesignTable) -> np.ndarray:
 
 
 def stands(
-    designs: Designs, law: str, present: str, limits: Any, longest_s: float, *, roughly: bool = False
+    designs: Designs, law: str, present: str, limits: Any, longest_s: float, *, tolerance_m: float | None = None
 ) -> np.ndarray:
     """Return which of n designs pass by a second opinion, bool, shape (n,).
 
@@ -177,14 +175,14 @@ def stands(
         Limits of the criterion (`boulder_sweep.judge.verdict.Limits`).
     longest_s
         Longest simulated time; what is not proved to stand by then does not.
-    roughly
-        Whether one solution for all (`ROUGH_M`) decides in place of a quick and a fine one.
+    tolerance_m
+        Error of a step [m] of one solution that decides in place of a quick and a fine one, nearly as they do.
     """
     table = with_law(designs.table, law, present)
     fine = HeaveControl(limits.rotation - math.radians(ERROR_DEG), longest_s, TOLERANCE_M, FINENESS)
     usual = HeaveControl(limits.rotation, longest_s, QUICK_M, margin=math.radians(NEAR_DEG))
-    if roughly:
-        usual = fine._replace(tolerance=ROUGH_M, fineness=1)
+    if tolerance_m is not None:
+        usual = fine._replace(tolerance=tolerance_m, fineness=1)
     passes = np.empty(designs.size, dtype=bool)
 
     def below(some: np.ndarray, control: HeaveControl) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -199,22 +197,22 @@ def stands(
         passes[some] = stays & (penetration <= limits.penetration)
         near = (turned >= usual.theta_limit - usual.margin) | (np.abs(penetration - limits.penetration) < NEAR_M)
         again = some[stays & near]
-        if len(again) and not roughly:
+        if len(again) and tolerance_m is None:
             stays, _, penetration = below(again, fine)
             passes[again] = stays & (penetration <= limits.penetration - ERROR_M)
     return passes
 
 
 def stands_under_the_weakest(
-    designs: Designs, present: str, limits: Any, longest_s: float, *, roughly: bool = False
+    designs: Designs, present: str, limits: Any, longest_s: float, *, tolerance_m: float | None = None
 ) -> np.ndarray:
     """Return which of n designs pass by the laws that decide, bool, shape (n,); arguments: see `stands`."""
-    there = stands(designs, DECISIVE, present, limits, longest_s, roughly=roughly)
+    there = stands(designs, DECISIVE, present, limits, longest_s, tolerance_m=tolerance_m)
     resistance = with_law(designs.table, DECISIVE, present).K_epsilon
     for law in SECOND_OPINIONS:
         if law != DECISIVE:
             rows = np.flatnonzero(there & (with_law(designs.table, law, present).K_epsilon < resistance))
-            there[rows] = stands(designs.rows(rows), law, present, limits, longest_s, roughly=roughly)
+            there[rows] = stands(designs.rows(rows), law, present, limits, longest_s, tolerance_m=tolerance_m)
     return there
 
 
