@@ -82,8 +82,11 @@ class Draws:
         given, judges = self.given(index, z, inputs), self.judges
 
         def judged_by(evaluation: Evaluation, rows: InputRows) -> tuple[Judged, np.ndarray]:
-            judged = evaluation(block_of(rows))
-            return judged, np.stack([_distance_of(judged, judges), _known(judged, judges)])
+            block = block_of(rows)
+            judged = evaluation(block)
+            holds = judges.holds(judged, block)
+            known = np.where(judged.verdict == UNDECIDED, -judged.reason, holds.astype(np.int64))
+            return judged, np.stack([_distance_of(judged, holds, judges.least_margin), known])
 
         judged, measures = judged_by(judges.coarse, given)
         if judges.coarse is not judges.final:
@@ -93,16 +96,11 @@ class Draws:
         return measures
 
 
-def _known(judged: Judged, judges: Judges) -> np.ndarray:
-    """Return what is known of designs; see `Draws.drawn`."""
-    return np.where(judged.verdict == UNDECIDED, -judged.reason, judges.holds(judged).astype(np.int64))
-
-
-def _distance_of(judged: Judged, judges: Judges) -> np.ndarray:
+def _distance_of(judged: Judged, holds: np.ndarray, least_margin: float) -> np.ndarray:
     """Return the distance of designs from failing; see `Draws.distance`."""
-    margin, time = judged["margin"] - judges.least_margin, judged["time_to_limit_s"]
+    margin, time = judged["margin"] - least_margin, judged["time_to_limit_s"]
     distance = np.where(np.isnan(margin), np.where(np.isnan(time), WORST, -FAST_OVERTURN_S / time), margin)
     # On a limit or undecided: neither counts as passing. An undecided row may have no margin.
     distance = np.where(np.isnan(margin) & (judged.verdict == UNDECIDED), 0.0, distance)
     smallest = np.finfo(float).tiny
-    return np.where(judges.holds(judged), np.maximum(distance, smallest), np.minimum(distance, -smallest))
+    return np.where(holds, np.maximum(distance, smallest), np.minimum(distance, -smallest))

@@ -137,7 +137,7 @@ class LightestQuestion:
     def answered(self, start: int, stop: int) -> Answers:
         """Answer the rows ``[start, stop)``."""
         rows = self.given(start, stop)
-        final = Remembered(self.judges.final)
+        final = Remembered(self.judges)
         # If the lightest boulder is as long, wide or high as it may be, a search for this side has no way to vary the
         # others at that end; the search for another side has.
         trials = [self.trial(rows, side, final) for side in reversed(self.free or [SCALE])]
@@ -220,7 +220,7 @@ class Boulders:
         block = self.block(index, positions, others)
         self.simulated += len(block) if quick else 0
         judged = self.judges.coarse(block) if quick else self._final(block)
-        return np.where(beyond_reach(block, judged), BEYOND, np.where(self.judges.holds(judged), HOLDS, FAILS))
+        return np.where(beyond_reach(block, judged), BEYOND, np.where(self._final.holds(judged, block), HOLDS, FAILS))
 
     def block(self, index: np.ndarray, positions: np.ndarray, others: Sides) -> DesignBlock:
         """Return the designs with boulders of these sizes."""

@@ -249,7 +249,7 @@ def _answered(
 ) -> Need:
     """Return the answers to a question; arguments: see `need`."""
     judges, key = asked.judges, asked.key
-    judges.final.warm_up()
+    judges.final.asked().warm_up()
     done = _Progress(progress, asked)
     pieces = list(ranges(asked.count, asked.rows_at_once))
     tables, simulated = [], 0

@@ -147,6 +147,10 @@ class ProbabilityTrial(Trial):
         super().__init__(asked.key, asked.judges, rows, asked.sweep.criterion.min_overlap_m)
         self.asked, self.draws, self.points = asked, asked.sampling.draws(rows), points
 
+    def settled(self, result: Search, first: np.ndarray, last: np.ndarray) -> Search:
+        """Return the search as it is."""
+        return result
+
     def contradicted(self, result: Search) -> np.ndarray:
         """Return no rows: the designs drawn near a limit are judged with the accuracy of the sweep anyway."""
         return np.empty(0, dtype=np.int64)
@@ -158,7 +162,9 @@ class ProbabilityTrial(Trial):
         self.simulated += chances.points
         return chances
 
-    def _codes(self, index: np.ndarray, positions: np.ndarray, *, quick: bool) -> np.ndarray:
+    def _codes(
+        self, index: np.ndarray, positions: np.ndarray, *, quick: bool, tolerance_m: float | None = None
+    ) -> np.ndarray:
         block, judged = self.judged(index, positions, quick=True)
         sampling = self.asked.sampling
         codes = sampling.codes(self.draws, index, self._inputs(block, positions), self.points)

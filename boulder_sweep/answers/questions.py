@@ -23,6 +23,7 @@ from boulder_sweep.answers.search import (
     Search,
     search,
     searched_again,
+    settled,
     shorter,
     steady,
 )
@@ -60,6 +61,10 @@ DEPTH = EMBEDMENT[1]
 COARSE_DEPTHS, FINE_DEPTHS, DEPTH_ROUNDS = 7, 5, 5
 """Number of depths, where it is to be found: on the first lattice, on each finer one, and of finer ones, each half as
 wide as the one before: in the end they are 1/128 of the range apart, some 10 mm."""
+
+SCANNED_M, LOCATED_M = 2e-3, 2e-4
+"""Errors of a step of second opinions [m] that scan a range and that locate a change: near the answer they turn designs
+by up to 0.3 and 0.05 deg more or less than a fine solution. From there on, second opinions of full accuracy decide."""
 
 if TYPE_CHECKING:
     from boulder_sweep.answers.chance import Chances
@@ -133,7 +138,7 @@ class ValueSearch:
         every = np.arange(len(low))
         first, last = self.lattice(low, high)
         trial = self.trial(rows)
-        result = search(trial.coarse, first, last, self.cells)
+        result = trial.settled(search(trial.rough, first, last, self.cells, trial.closer), first, last)
         result = self._again(result, every[trial.slides], trial, first, last, quick=True)
         wrong = trial.contradicted(result)
         block, judged = trial.judged(every, result.shown)
@@ -204,7 +209,7 @@ class Question(ValueSearch):
         The search range is empty, too narrow or not admitted, or it reaches below the readings of the soil that count.
     """
 
-    rows_at_once = 2048
+    rows_at_once = 4096
     """Rows of a block; small enough that an interruption takes effect soon."""
     tried: Callable[[int], None] | None = None
     """Called with how many values have been tried, by the threads that try them; for questions with slow rows."""
@@ -304,8 +309,16 @@ class Trial:
         self.simulated = 0
         self.slides = np.zeros(len(next(iter(rows.values()))), dtype=bool)
         """Rows of which some value that passes makes a shallow boulder slide, shape (n,)."""
-        self._final = Remembered(judges.final)
+        self._final = Remembered(judges)
         self._alone = [replace(each, against_slower=False) for each in (judges.final, judges.coarse)]
+
+    def rough(self, index: np.ndarray, positions: np.ndarray) -> np.ndarray:
+        """Predicate of the search like `coarse`, but by rough second opinions, if any are asked."""
+        return self._codes(index, positions, quick=True, tolerance_m=SCANNED_M)
+
+    def closer(self, index: np.ndarray, positions: np.ndarray) -> np.ndarray:
+        """Predicate of the search between `rough` and `coarse`."""
+        return self._codes(index, positions, quick=True, tolerance_m=LOCATED_M)
 
     def coarse(self, index: np.ndarray, positions: np.ndarray) -> np.ndarray:
         """Predicate of the search, without an error estimate."""
@@ -343,6 +356,10 @@ class Trial:
         depth = depth_within(low, high, share, height, bumper, self.least_overlap_m)
         return block_of(rows | {DEPTH: depth})
 
+    def settled(self, result: Search, first: np.ndarray, last: np.ndarray) -> Search:
+        """Return the results of a rough search by `coarse`."""
+        return settled(self.coarse, result, first, last) if self.judges.robust else result
+
     def contradicted(self, result: Search) -> np.ndarray:
         """Return the rows of a quick search that the accuracy of the sweep does not confirm, shape (m,)."""
         bracketed = np.flatnonzero(result.has_holds & result.has_fails)
@@ -358,18 +375,20 @@ class Trial:
         """Return the probabilities at some values, one for each row; None if none is asked for."""
         return None
 
-    def _codes(self, index: np.ndarray, positions: np.ndarray, *, quick: bool) -> np.ndarray:
+    def _codes(
+        self, index: np.ndarray, positions: np.ndarray, *, quick: bool, tolerance_m: float | None = None
+    ) -> np.ndarray:
         block, judged = self.judged(index, positions, quick=quick)
-        codes = self.codes(block, judged)
+        codes = self.codes(block, judged, tolerance_m)
         if self.key.is_steady:
             depth, height = (block.columns[name].to_numpy() for name in ("embedment_depth_m", "boulder_height_m"))
             sliding = (depth < SHALLOW * height) & (judged["max_displacement_m"] > SLIDES_M)
             self.slides[index[sliding & (codes == HOLDS)]] = True
         return codes
 
-    def codes(self, block: DesignBlock, judged: Judged) -> np.ndarray:
+    def codes(self, block: DesignBlock, judged: Judged, tolerance_m: float | None = None) -> np.ndarray:
         """Return what a search asks of judged designs."""
-        codes = np.where(self.judges.holds(judged), HOLDS, FAILS)
+        codes = np.where(self._final.holds(judged, block, tolerance_m), HOLDS, FAILS)
         codes[judged["time_to_limit_s"] < FAST_OVERTURN_S] = FAR
         return np.where(beyond_reach(block, judged), BEYOND, codes)
 

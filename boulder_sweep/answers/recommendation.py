@@ -354,7 +354,7 @@ class _Boulders:
         block = replace(block, labels={name: label.at(rows) for name, label in self.labels.items()})
         judged, columns = judges.final(block), to_build(block, self.asked.sweep)
         if self.sampling is None:
-            if not judges.holds(judged).all():
+            if not judges.holds(judged, block).all():
                 return None
             judged = judges.final.graded(judged, block)
         else:

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
     from boulder_sweep.settings.loader import Settings
 
-ROWS_AT_ONCE = 512
+ROWS_AT_ONCE = 2048
 MPH = 0.44704
 CLASSES = {"M30": 30 * MPH, "M40": 40 * MPH, "M50": 50 * MPH}
 """Nominal speeds [m/s] of the ASTM F2656 classes for a medium-duty truck."""
@@ -104,7 +104,7 @@ def capacity(sweep: Settings, *, jobs: int | None = None, progress: ProgressCall
     sweep = at_values(sweep_of(sweep))
     sweep.need_depth()
     judges = judges_of(sweep)
-    judges.final.warm_up()
+    judges.final.asked().warm_up()
     calls = (call(_table, sweep, judges, start, stop) for start, stop in ranges(sweep.n_designs, ROWS_AT_ONCE))
     tables = collected(Pool(jobs)(calls), sweep.n_designs, progress)
     return Reserves(sweep, joined_tables(tables, sweep, judges, "boulder_sweep.capacity"))

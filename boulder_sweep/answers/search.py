@@ -62,7 +62,9 @@ PER_ROW = ("kind", "fails", "holds", "has_fails", "has_holds", "shown", "holds_l
 """Attributes of a `Search` that have a value for each row."""
 
 
-def search(predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int = CELLS) -> Search:
+def search(
+    predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int = CELLS, closer: Predicate | None = None
+) -> Search:
     """Search n rows.
 
     Parameters
@@ -74,6 +76,8 @@ def search(predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int
     cells
         Pieces that a range is cut into. An interval shorter than a cell may be missed, and so may one between two
         positions that are far from holding and at most `STRIDE` cells apart.
+    closer
+        Predicate by which changes are located, nearly the same; the same by default.
 
     Returns
     -------
@@ -102,7 +106,7 @@ def search(predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int
     edge_rows, edge_columns = _edges(codes, kind, at)
     low, high = positions[edge_rows, edge_columns], positions[edge_rows, edge_columns + 1]
     rises = codes[edge_rows, edge_columns + 1] == HOLDS
-    low, high = _bisect_changes(predicate, edge_rows, low, high, rises)
+    low, high = _bisect_changes(closer or predicate, edge_rows, low, high, rises)
 
     fails, held = shown.copy(), shown.copy()
     has_fails = none.copy()
@@ -149,6 +153,44 @@ def shorter(one: Search, other: Search, last: np.ndarray) -> Search:
     rows = np.flatnonzero(left[1] < left[0])
     changes = {k: other.changes[row] for k, row in enumerate(rows.tolist()) if row in other.changes}
     return _replace_rows(one, rows, Search(**{name: getattr(other, name)[rows] for name in PER_ROW}, changes=changes))
+
+
+def settled(predicate: Predicate, result: Search, first: np.ndarray, last: np.ndarray) -> Search:
+    """Return a search by a predicate that is nearly the one it was made by: changes found once are moved a little.
+
+    From where it was found to hold, the predicate is tried at twice the distance each time, forward until it holds or
+    backward until it fails. A row in which that leads to an end of its range is left as it is.
+
+    Parameters
+    ----------
+    predicate, first, last
+        See `search`.
+    result
+        The search.
+    """
+    rows = np.flatnonzero(result.kind == FOUND)
+    low, high = result.fails[rows].copy(), result.holds[rows].copy()
+    onward = np.sign(high - low)
+    ends = np.minimum(first, last)[rows], np.maximum(first, last)[rows]
+    held = predicate(rows, high) == HOLDS
+    low = np.where(held, low, high)
+    at, direction = high.copy(), np.where(held, -onward, onward)
+    inside, open_, reach = np.ones(len(rows), dtype=bool), np.ones(len(rows), dtype=bool), 1
+    while open_.any():
+        at[open_] += (direction * reach)[open_]
+        inside &= (at >= ends[0]) & (at <= ends[1])
+        open_ &= inside
+        holds = np.zeros(len(rows), dtype=bool)
+        holds[open_] = predicate(rows[open_], at[open_]) == HOLDS
+        high = np.where(open_ & holds, at, high)
+        low = np.where(open_ & ~holds, at, low)
+        open_ &= holds == held
+        reach *= 2
+    rows, low, high = rows[inside], low[inside], high[inside]
+    low, high = _bisect_changes(predicate, rows, low, high, np.ones(len(rows), dtype=bool))
+    fails, held_at, shown = result.fails.copy(), result.holds.copy(), result.shown.copy()
+    fails[rows], held_at[rows], shown[rows] = low, high, high
+    return replace(result, fails=fails, holds=held_at, shown=shown)
 
 
 def contradicted(predicate: Predicate, result: Search) -> np.ndarray:

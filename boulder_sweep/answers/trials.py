@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,6 @@ from boulder_sweep.designs import REASONS, DesignBlock, Label, block_of, input_o
 from boulder_sweep.judge.accuracy import Accuracy, accuracy_of, steps_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 from boulder_sweep.judge.judged import PASS, Judged, joined
-from boulder_sweep.judge.robustness import standing
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.model import SetDistributions
 from boulder_sweep.settings.sweep import DesignList
@@ -40,8 +40,8 @@ USUALLY = (LEAST_RATIO, 0.75)
 """Embedments, as shares of the height, in which a depth is searched beside another input; the study of grades has the
 same."""
 SEARCHED = ("verdict", "reason", "margin", "time_to_limit_s", "max_displacement_m")
-GRADED = ("robustness", "stands_under")
 """Outcomes that searches look at; others are not worked out for the many designs that are only tried."""
+GRADED = ("robustness", "stands_under")
 
 InputRows = dict[str, np.ndarray]
 """Inputs of n designs by column name (or ``embedment_ratio``), each of shape (n,), as given by a file."""
@@ -107,8 +107,7 @@ class Judges:
     least_margin
         Margin that a design must have to count as passing. Both evaluations prove that it lasts.
     robust
-        Whether only a pass that stands under the second opinion that decides counts, for which both evaluations then
-        ask: robust, or open outside the study.
+        Whether only a pass that stands under the second opinion that decides counts: robust, or open outside the study.
     """
 
     coarse: Evaluation
@@ -119,16 +118,28 @@ class Judges:
 
     def of_any_pass(self) -> Judges:
         """Return the same, to count any pass."""
-        final = dataclasses.replace(self.final, second_opinion=())
-        coarse = final if self.coarse is self.final else dataclasses.replace(self.coarse, second_opinion=())
-        return dataclasses.replace(self, coarse=coarse, final=final, robust=False)
+        return dataclasses.replace(self, robust=False)
 
-    def holds(self, judged: Judged) -> np.ndarray:
-        """Return whether rows pass with the requested margin and robustness, bool, shape (n,)."""
+    def holds(
+        self, judged: Judged, block: DesignBlock, stand: Callable[[DesignBlock], np.ndarray] | None = None
+    ) -> np.ndarray:
+        """Return whether designs pass with the requested margin and robustness, bool, shape (n,).
+
+        Parameters
+        ----------
+        judged, block
+            The designs, judged by one of the evaluations, and themselves.
+        stand
+            Asks second opinions, as `Evaluation.stand` does, which it is by default.
+        """
         passes = judged.verdict == PASS
+        if self.least_margin > 0.0:
+            passes &= judged["margin"] >= self.least_margin
         if self.robust:
-            passes &= standing(judged)
-        return passes & (judged["margin"] >= self.least_margin) if self.least_margin > 0.0 else passes
+            rows = np.flatnonzero(passes & ~self.final.robust_unasked(judged))
+            if len(rows):
+                passes[rows] = (stand or self.final.stand)(some(block, rows))
+        return passes
 
 
 def depth_within(
@@ -168,28 +179,48 @@ def millimetres(lengths: np.ndarray) -> np.ndarray:
 
 
 class Remembered:
-    """Judges designs as an evaluation does, each only once: searches ask often for the ends of brackets.
+    """Judges designs by the accuracy of a sweep, each only once: searches ask often for the ends of brackets.
 
     It keeps what it has judged, so every block of rows has one of its own; `count` designs were judged so far.
     """
 
-    def __init__(self, evaluation: Evaluation) -> None:
-        self._evaluation, self.count = evaluation, 0
+    def __init__(self, judges: Judges) -> None:
+        self._judges, self.count = judges, 0
         self._indices: dict[bytes, int] = {}
         self._judged: list[Judged] = []
+        self._stand: dict[bytes, bool] = {}
 
     def __call__(self, block: DesignBlock) -> Judged:
         """Return the judged rows of a block."""
-        inputs = [column.to_numpy() for each in (block, *block.cases) for column in each.columns.values()]
-        keys = [row.tobytes() for row in np.stack(inputs, axis=1)]
+        keys = _keys_of(block)
         new = {key: row for row, key in enumerate(keys) if key not in self._indices}
         if new or not self._judged:
             self._indices |= {key: len(self._indices) + count for count, key in enumerate(new)}
-            self._judged.append(self._evaluation(some(block, np.fromiter(new.values(), np.int64, len(new)))))
+            self._judged.append(self._judges.final(some(block, np.fromiter(new.values(), np.int64, len(new)))))
             self._judged = [joined(self._judged)]
             self.count += len(new)
         indices = [self._indices[key] for key in keys]
         return joined([self._judged[0].rows(np.array(indices, dtype=np.int64))])
+
+    def holds(self, judged: Judged, block: DesignBlock, tolerance_m: float | None = None) -> np.ndarray:
+        """Return what `Judges.holds` does; second opinions without a tolerance, too, are asked only once."""
+        final = self._judges.final
+        stand = self._stands if tolerance_m is None else partial(final.stand, tolerance_m=tolerance_m)
+        return self._judges.holds(judged, block, stand)
+
+    def _stands(self, block: DesignBlock) -> np.ndarray:
+        keys = _keys_of(block)
+        new = {key: row for row, key in enumerate(keys) if key not in self._stand}
+        if new:
+            stand = self._judges.final.stand(some(block, np.fromiter(new.values(), np.int64, len(new))))
+            self._stand |= zip(new, stand.tolist(), strict=True)
+        return np.array([self._stand[key] for key in keys], dtype=bool)
+
+
+def _keys_of(block: DesignBlock) -> list[bytes]:
+    """Return the bits of the inputs of each design."""
+    inputs = [column.to_numpy() for each in (block, *block.cases) for column in each.columns.values()]
+    return [row.tobytes() for row in np.stack(inputs, axis=1)]
 
 
 def judges_of(sweep: Sweep, least_margin: float = 0.0, *, robust: bool = False) -> Judges:
@@ -201,12 +232,10 @@ def judges_of(sweep: Sweep, least_margin: float = 0.0, *, robust: bool = False) 
     searched = coarse.limits._replace(guarded=False)
     # A late row is found by the quick solution, too, and confirmed by the other.
     control = coarse.control._replace(longest_horizon=final.control.longest_horizon)
-    coarse = dataclasses.replace(coarse, only=SEARCHED, least_margin=least_margin, limits=searched, control=control)
-    if robust:
-        final = final.asked()
-        coarse = dataclasses.replace(coarse.asked(), only=(*SEARCHED, *GRADED), deciding_laws_only=True)
-    else:  # asked of the answers alone
-        final, coarse = (dataclasses.replace(each, second_opinion=()) for each in (final, coarse))
+    columns = (*SEARCHED, "robustness") if robust else SEARCHED
+    coarse = dataclasses.replace(coarse, only=columns, least_margin=least_margin, limits=searched, control=control)
+    # Second opinions are asked of the answers, and of what passes where only what is robust counts.
+    final, coarse = (dataclasses.replace(each, second_opinion=()) for each in (final, coarse))
     if not accuracy.error_estimate and accuracy.steps.step_s >= coarse.control.h:
         coarse = final
     return Judges(coarse, final, accuracy, least_margin, robust)

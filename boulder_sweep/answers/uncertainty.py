@@ -150,7 +150,7 @@ def uncertainty(
     asked = _Arguments(sweep, spread, judges.of_any_pass(), judges if graded else None, width, sure, most)
     if ready is not None:
         ready()
-    judges.final.warm_up()
+    judges.final.asked().warm_up()
     points = Points(len(asked.spread.names), seed)
     threads = Pool(jobs)
     pieces = ranges(sweep.n_designs, ROWS_AT_ONCE)

@@ -34,7 +34,14 @@ from boulder_sweep.judge.accuracy import (
 )
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import FAIL, PASS, Judged, joined, merged, not_computed, with_rows, worst_case, worst_of
-from boulder_sweep.judge.robustness import DECISIVE, can_be_asked, with_second_opinions
+from boulder_sweep.judge.robustness import (
+    DECISIVE,
+    ROBUST,
+    can_be_asked,
+    least_free_rotation,
+    stands_under_the_weakest,
+    with_second_opinions,
+)
 from boulder_sweep.judge.verdict import Limits, judged_rows, limits_of, rows_of
 from boulder_sweep.settings.model import Model
 from boulder_sweep.soils import with_soil
@@ -82,8 +89,6 @@ class Evaluation:
         Margin that a question asks for, from 0 to less than 1; see `judged`.
     second_opinion
         Laws of the soil's resistance under which every pass is simulated again, see `boulder_sweep.judge.robustness`.
-    deciding_laws_only
-        Whether passes that one law overturns are not simulated under the others, which then decide nothing.
     askable
         Whether second opinions know such designs.
     against_slower
@@ -100,7 +105,6 @@ class Evaluation:
     model: Model = field(default_factory=Model)
     least_margin: float = 0.0
     second_opinion: tuple[str, ...] = ()
-    deciding_laws_only: bool = False
     askable: bool = False
     against_slower: bool = True
     outlines_in_lanes: bool = False
@@ -159,7 +163,7 @@ class Evaluation:
         A simulation may end with a proof of its verdict while the rotation can still grow, so its margin is one up to
         then. Where a question asks for a margin, the rows that have it are simulated again with the limit of rotation
         reduced by it. Those that do not pass so, too, keep their verdict and get a margin just below the one asked for.
-        Second opinions are asked with the reduced limit.
+        Grades know no margin; `stand` does.
         """
         taped = designs.taped
         if taped.any():
@@ -172,10 +176,7 @@ class Evaluation:
             judged = self._margins_proved(judged, designs)
         if not self.second_opinion or (self.only and "robustness" not in self.only):
             return judged
-        limits = self.limits._replace(rotation=(1.0 - self.least_margin) * self.limits.rotation)
-        passes = designs.rows(judged.verdict == PASS)
-        asked, told = self.second_opinion, not self.deciding_laws_only
-        return with_second_opinions(judged, passes, asked, self.model, limits, self.longest_s, told=told)
+        return self._graded(judged, designs.rows(judged.verdict == PASS), self.second_opinion)
 
     def _worst_shapes(self, designs: Designs) -> Judged:
         """Judge boulders as taped and weighed by the worst of their shapes; by the first in which one fails."""
@@ -231,8 +232,31 @@ class Evaluation:
         passing = judged.verdict == PASS
         if not self.askable or not passing.any():
             return judged
-        passes = self.designs(block, passing)
-        return with_second_opinions(judged, passes, (DECISIVE,), self.model, self.limits, self.longest_s)
+        return self._graded(judged, self.designs(block, passing), (DECISIVE,))
+
+    def _graded(self, judged: Judged, passes: Designs, laws: tuple[str, ...]) -> Judged:
+        return with_second_opinions(judged, passes, laws, self.model, self.limits, self.longest_s)
+
+    def stand(self, block: DesignBlock, tolerance_m: float | None = None) -> np.ndarray:
+        """Return which designs pass, in all cases, with the margin under the laws that decide, bool, shape (n,).
+
+        With a tolerance, nearly so, by one solution; see `boulder_sweep.judge.robustness.stands`.
+        """
+        limits = self._reduced_limits
+        there = np.ones(len(block), dtype=bool)
+        for case in (replace(block, cases=()), *block.cases):
+            rows = np.flatnonzero(there)
+            designs = self.designs(case, rows)
+            there[rows] = stands_under_the_weakest(designs, self.model, limits, self.longest_s, tolerance_m=tolerance_m)
+        return there
+
+    def robust_unasked(self, judged: Judged) -> np.ndarray:
+        """Return which judged rows, with the margin, are robust without a second opinion, bool, shape (n,)."""
+        return (judged["robustness"] == ROBUST) & (self._reduced_limits.rotation >= least_free_rotation())
+
+    @property
+    def _reduced_limits(self) -> Limits:
+        return self.limits._replace(rotation=(1.0 - self.least_margin) * self.limits.rotation)
 
     @property
     def longest_s(self) -> float:
@@ -244,11 +268,10 @@ class Evaluation:
         there = np.flatnonzero((judged.verdict == PASS) & (judged["margin"] >= self.least_margin))
         if not len(there):
             return judged
-        left = 1.0 - self.least_margin
         reduced = replace(
             self,
-            control=self.control._replace(theta_limit=left * self.control.theta_limit),
-            limits=self.limits._replace(rotation=left * self.limits.rotation),
+            control=self.control._replace(theta_limit=(1.0 - self.least_margin) * self.control.theta_limit),
+            limits=self._reduced_limits,
             only=("verdict", "reason"),
             least_margin=0.0,
             second_opinion=(),

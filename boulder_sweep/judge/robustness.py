@@ -161,7 +161,14 @@ def base_under(ground: Ground) -> Base:
     return USUAL_BASE._replace(water=water, slope=math.radians(ground.slope_deg))
 
 
-def stands(designs: Designs, law: str, model: Model, limits: Any, longest_s: float) -> np.ndarray:
+def resists_less(table: DesignTable, law: str) -> np.ndarray:
+    """Return where a soil model resists less than `DECISIVE`, in some layer of the soil, bool, shape (n,)."""
+    return np.asarray((layer_coefficients(table, law) < layer_coefficients(table, DECISIVE)).any(axis=1))
+
+
+def stands(
+    designs: Designs, law: str, model: Model, limits: Any, longest_s: float, *, tolerance_m: float | None = None
+) -> np.ndarray:
     """Return which of n designs pass by a second opinion, bool, shape (n,).
 
     Parameters
@@ -176,10 +183,14 @@ def stands(designs: Designs, law: str, model: Model, limits: Any, longest_s: flo
         Limits of the criterion (`boulder_sweep.judge.verdict.Limits`).
     longest_s
         Longest simulated time; what is not proved to stand by then does not.
+    tolerance_m
+        Error of a step [m] of one solution that decides in place of a quick and a fine one, nearly as they do.
     """
     table, base = with_law(designs.table, law, model.resistance), base_under(model.ground)
-    usual = HeaveControl(limits.rotation, longest_s, QUICK_M, margin=math.radians(NEAR_DEG))
     fine = HeaveControl(limits.rotation - math.radians(ERROR_DEG), longest_s, TOLERANCE_M, FINENESS)
+    usual = HeaveControl(limits.rotation, longest_s, QUICK_M, margin=math.radians(NEAR_DEG))
+    if tolerance_m is not None:
+        usual = fine._replace(tolerance=tolerance_m, fineness=1)
     passes = np.empty(designs.size, dtype=bool)
 
     def below(some: np.ndarray, control: HeaveControl) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -194,10 +205,22 @@ def stands(designs: Designs, law: str, model: Model, limits: Any, longest_s: flo
         passes[some] = stays & (penetration <= limits.penetration)
         near = (turned >= usual.theta_limit - usual.margin) | (np.abs(penetration - limits.penetration) < NEAR_M)
         again = some[stays & near]
-        if len(again):
+        if len(again) and tolerance_m is None:
             stays, _, penetration = below(again, fine)
             passes[again] = stays & (penetration <= limits.penetration - ERROR_M)
     return passes
+
+
+def stands_under_the_weakest(
+    designs: Designs, model: Model, limits: Any, longest_s: float, *, tolerance_m: float | None = None
+) -> np.ndarray:
+    """Return which of n designs pass by the laws that decide, bool, shape (n,); arguments: see `stands`."""
+    there = stands(designs, DECISIVE, model, limits, longest_s, tolerance_m=tolerance_m)
+    for law in SECOND_OPINIONS:
+        if law != DECISIVE:
+            rows = np.flatnonzero(there & resists_less(designs.table, law))
+            there[rows] = stands(designs.rows(rows), law, model, limits, longest_s, tolerance_m=tolerance_m)
+    return there
 
 
 def standing(judged: Judged) -> np.ndarray:
@@ -213,8 +236,6 @@ def with_second_opinions(
     model: Model,
     limits: Any,
     longest_s: float,
-    *,
-    told: bool = True,
 ) -> Judged:
     """Return judged rows with passes simulated again.
 
@@ -230,8 +251,6 @@ def with_second_opinions(
         Designs of those that pass.
     laws, model, limits, longest_s
         See `stands`.
-    told
-        Whether passes that `DECISIVE` overturns are simulated under another law, only to tell whether they stand there.
     """
     passing = np.flatnonzero(judged.verdict == PASS)
     grade, under = judged["robustness"].copy(), judged["stands_under"].copy()
@@ -251,11 +270,9 @@ def with_second_opinions(
     for law in laws:
         ask(law, np.arange(len(passing)))
     if laws == (DECISIVE,):
-        resistance = layer_coefficients(passes.table, DECISIVE)
         for law in SECOND_OPINIONS:
             if law != DECISIVE:
-                weaker = (layer_coefficients(passes.table, law) < resistance).any(axis=1)
-                ask(law, np.flatnonzero(turned | weaker if told else weaker & ~turned))
+                ask(law, np.flatnonzero(turned | resists_less(passes.table, law)))
     grade[passing[turned]] = SENSITIVE
     if DECISIVE in laws:
         studied = are_studied(passes, limits)

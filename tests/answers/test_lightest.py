@@ -17,6 +17,8 @@ from boulder_sweep.answers.lightest import Boulders, LightestQuestion
 from boulder_sweep.answers.trials import Remembered, judges_of
 from boulder_sweep.designs import block_of
 from boulder_sweep.errors import QuestionError
+from boulder_sweep.judge.accuracy import accuracy_of
+from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.judged import PASS
 from boulder_sweep.settings import Sweep, load_text
 from boulder_sweep.settings.model import tapered
@@ -76,7 +78,7 @@ def test_the_deepest_embedment_tried_overlaps_enough_by_the_sums_of_the_verdict(
     sweep = site(height="[1.6, 4.0] m", site="embedment_depth: [0.1, 4.0] m")
     sweep = dataclasses.replace(sweep, criterion=dataclasses.replace(sweep.criterion, min_overlap_m=least))
     asked = LightestQuestion(sweep, key_of("mass"), judges_of(sweep))
-    trial = Boulders(asked, asked.open.rows(0, 1), "boulder_height_m", Remembered(judges_of(sweep).final))
+    trial = Boulders(asked, asked.open.rows(0, 1), "boulder_height_m", Remembered(judges_of(sweep)))
     height = np.arange(1600, 4001) / 1000
     depth = trial.depth(np.zeros(len(height), dtype=int), height, np.ones(len(height)))
     overlap = height - depth - 0.5
@@ -185,13 +187,18 @@ def shallow_bounds(rng: np.random.Generator) -> dict[str, str]:
 
 
 @pytest.mark.nightly
-def test_a_boulder_that_slides_far_is_no_answer() -> None:
-    """Shallow boulders of 16.3 t stay below the limit, but slide by 0.7 m and more, and slower trucks overturn some."""
+def test_a_boulder_that_slides_beyond_the_model_is_not_the_lightest() -> None:
+    """One of 16.3 t stays below the limits but slides by 4 m, for which the model is not valid: it is undecided."""
     sides = {"length": "[0.94, 2.0] m", "width": "[1.16, 2.27] m", "height": "[1.4, 2.91] m"}
     soil = {"friction": "37.7 deg", "subgrade": "62 MN/m^3"}
     answer = assert_lightest(site(**sides, **soil, site="embedment_ratio: [0.06, 0.57]"))
-    assert answer.least_boulder_mass_kg == pytest.approx(28_842.0, abs=30.0)
-    assert answer[DEPTH] / answer.boulder_height_m == pytest.approx(0.57, abs=1e-3)
+    assert answer[DEPTH] / answer.boulder_height_m > 0.45
+    slides = {"length": "1.999 m", "width": "2.185 m", "height": "1.435 m"}
+    sweep = site(**slides, **soil, site="embedment_depth: 0.309 m")
+    judged = evaluation_of(sweep, accuracy_of(sweep))(sweep.block(0, 1)).row(0)
+    assert (judged["verdict"], judged["reason"]) == ("undecided", "validity")
+    assert judged["max_rotation_deg"] < 19.6
+    assert judged["max_displacement_m"] > 4.0
 
 
 @pytest.mark.nightly

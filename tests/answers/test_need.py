@@ -127,7 +127,7 @@ def test_a_margin_is_proved_to_last() -> None:
             for evaluation in (judges.coarse, judges.final):
                 rows = evaluation(sweep.block(0, 1))
                 assert rows.verdict[0] == PASS
-                assert judges.holds(rows)[0] == holds
+                assert judges.holds(rows, sweep.block(0, 1))[0] == holds
                 assert rows["margin"][0] >= 0.375 or not holds or sweep is long
     question = {"margin": "36 %", "between": ("1.2 m", "1.4 m")}
     one, other = (bare_need(sweep, "embedment_depth", **question).frame.iloc[0] for sweep in (brief, long))
@@ -327,7 +327,7 @@ def test_a_design_is_judged_once_with_the_accuracy_of_the_sweep(monkeypatch: pyt
 def test_judging_again_gives_the_same_rows() -> None:
     sweep = site(height="[3, 3.4] m", site="embedment_depth: [2.0, 2.1, 2.2] m")
     block = sweep.block(0, sweep.n_designs)
-    remembered, direct = Remembered(judges_of(sweep).final), judges_of(sweep).final
+    remembered, direct = Remembered(judges_of(sweep)), judges_of(sweep).final
     some_rows, again = some(block, np.array([3, 1, 3])), some(block, np.arange(len(block))[::-1])
     for asked, count in ((some_rows, 2), (again, len(block)), (some_rows, len(block))):
         mine, theirs = remembered(asked), direct(asked)

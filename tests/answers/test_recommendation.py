@@ -54,7 +54,8 @@ def holds(found: Need, sizes: dict[str, float]) -> np.ndarray:
     fixed = {name: value for name, value in sizes.items() if name != "boulder_mass_kg"}
     one = replace(sweep, axes=axes, constants=constants | fixed, cases=())
     judges = judges_of(one, found.least_margin, robust=found.robust)
-    return judges.holds(judges.final(one.block(0, one.n_designs)))
+    block = one.block(0, one.n_designs)
+    return judges.holds(judges.final(block), block)
 
 
 def changed(sweep: Sweep, **inputs: float) -> Sweep:

@@ -17,6 +17,7 @@ from boulder_sweep.answers.search import (
     Predicate,
     last_before,
     search,
+    settled,
     steady,
 )
 
@@ -148,6 +149,28 @@ def test_the_last_before_is_that_of_a_loop() -> None:
         assert found[row] == place
         assert has_fails[row] == (place > first[row])
         assert fails[row] == place - 1 or not has_fails[row]
+
+
+def test_a_change_is_moved_to_where_a_predicate_changes_that_is_nearly_the_same() -> None:
+    """Upwards and downwards, by little or much; what does not change up to an end of its range is left."""
+    rng = np.random.default_rng(9)
+    first, last = np.tile([0, 1000], 150), np.tile([1000, 0], 150)
+    roughly, begins = rng.integers(200, 800, 300), np.empty(300, dtype=np.int64)
+    begins[:] = roughly + rng.integers(-1, 2, 300) * 2 ** rng.integers(0, 7, 300)
+    begins[:4] = 5000, -5000, -5000, 5000  # never holds, always, and the same downwards
+
+    def predicate(at: np.ndarray) -> Predicate:
+        return lambda rows, places: np.where((places >= at[rows]) ^ (first[rows] > last[rows]), HOLDS, FAILS)
+
+    rough, exact = (search(predicate(at), first, last) for at in (roughly, begins))
+    found = settled(predicate(begins), rough, first, last)
+    for name in ("fails", "holds", "shown"):
+        assert np.array_equal(getattr(found, name)[4:], getattr(exact, name)[4:])
+        assert np.array_equal(getattr(found, name)[:4], getattr(rough, name)[:4])
+    again = search(predicate(roughly), first, last, closer=predicate(begins))
+    near = np.abs(begins - roughly) <= 1
+    assert near.sum() > 20
+    assert np.mean(again.holds[near] == exact.holds[near]) > 0.9
 
 
 def test_before_a_gap_that_is_stepped_over_the_last_is_of_the_next_one() -> None:

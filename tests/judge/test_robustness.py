@@ -13,6 +13,7 @@ from boulder_kernels import Status
 from boulder_kernels.heave import FINEST, Base
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_sweep.columns import GRADES, STANDINGS
+from boulder_sweep.designs import some
 from boulder_sweep.judge import robustness
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
@@ -173,7 +174,7 @@ def test_where_broms_resists_less_it_is_asked_too() -> None:
 
 
 def test_what_is_robust_without_asking_is_not_simulated(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where the law that decides is asked, by the whole limit; with a margin it is."""
+    """Where the law that decides is asked, by the whole limit; nothing is so by a reduced one."""
     sweep = load("configs/m30_sizing.yaml", ["boulder.width=2.4 m", "boulder.height=[3.2, 3.4] m"])
     evaluation, without = evaluated(sweep)
     free = without["robustness"] == ROBUST
@@ -187,8 +188,8 @@ def test_what_is_robust_without_asking_is_not_simulated(monkeypatch: pytest.Monk
     assert np.all(decided["robustness"][free] == ROBUST)
     assert np.all(decided["stands_under"][free] == -1)
     assert np.all(standing(decided)[free])
-    careful = replace(evaluation.asked(), least_margin=0.1)(block)
-    assert np.all(careful["stands_under"][free] >= 0)
+    assert np.array_equal(evaluation.robust_unasked(without), free)
+    assert not replace(evaluation, least_margin=0.1).robust_unasked(without).any()
     monkeypatch.undo()
     assert np.all(evaluated(sweep, *SECOND_OPINIONS)[1]["stands_under"][free] == 3)
 
@@ -269,19 +270,28 @@ def test_a_boulder_that_the_ground_cannot_carry_is_told_in_words_of_its_own() ->
 
 
 def test_a_margin_is_asked_of_second_opinions_too() -> None:
-    """With it they have to stand below the reduced limit; the grade of an answer is that without it."""
+    """With it they have to stand below the reduced limit, in every case; the grade of an answer knows no margin."""
     sweep = grid()
-    evaluation, judged = evaluated(sweep, *SECOND_OPINIONS)
+    evaluation, judged = evaluated(sweep, DECISIVE)
     block = sweep.block(0, sweep.n_designs)
     careful = replace(evaluation, least_margin=0.4)
-    reduced = careful(block)
-    passing = designs_of(block).rows(judged.verdict == PASS)
     limits = evaluation.limits._replace(rotation=0.6 * evaluation.limits.rotation)
-    known = [robustness.stands(passing, law, Model(), limits, evaluation.longest_s) for law in SECOND_OPINIONS]
-    found = reduced["stands_under"][judged.verdict == PASS]
-    assert np.array_equal(found, known[0] + 2 * known[1])
-    assert not np.array_equal(found, judged["stands_under"][judged.verdict == PASS])
-    assert np.array_equal(careful.graded(reduced, block)["robustness"], judged["robustness"])
+    known = robustness.stands(designs_of(block), DECISIVE, Model(), limits, evaluation.longest_s)
+    assert np.array_equal(careful.stand(block), known)
+    assert not np.array_equal(known[judged.verdict == PASS], standing(judged)[judged.verdict == PASS])
+    assert np.array_equal(careful(block)["robustness"], judged["robustness"])
+    backwards = some(block, np.arange(len(block))[::-1])
+    assert np.array_equal(careful.stand(replace(block, cases=(backwards,))), known & known[::-1])
+
+
+def test_one_solution_tells_roughly_what_stands() -> None:
+    sweep = grid()
+    evaluation, _ = evaluated(sweep, DECISIVE)
+    block = sweep.block(0, sweep.n_designs)
+    stand = evaluation.stand(block)
+    for tolerance_m, differ in ((2e-3, 0.05), (2e-4, 0.02)):
+        assert 0 < np.count_nonzero(stand) < len(stand)
+        assert np.mean(evaluation.stand(block, tolerance_m) != stand) < differ
 
 
 def test_a_penetration_beyond_the_rating_overturns_a_pass() -> None:
