@@ -7,7 +7,7 @@ import pytest
 from benchmarks.report import README, Table, significant, write_between_markers
 
 TABLE = Table("speed", "Speed", "on a machine", ["what", "figure"], [["lanes", "1 us"]], ["a note"])
-TABLES = ("score", "kernel", "named", "rates", "peers")
+TABLES = ("kernel", "named", "rates", "peers")
 
 
 def test_prose_stays_as_it_is(tmp_path: Path) -> None:
