@@ -147,8 +147,8 @@ def test_the_comparison_with_others_is_that_of_the_benchmark() -> None:
         found = re.search(words, text)
         assert found
         assert costs.pop(solver)[1] == pytest.approx(int(found[1]), rel=0.15)
-    best = re.search(r"the best other solvers tried, LSODA and DOP853 compiled into the loop, (\d+) times", text)
+    best = re.search(r"SciPy's LSODA over the compiled closed form, some (\d+) times", text)
     assert best
     solver = min(costs, key=lambda name: costs[name][1])
-    assert solver.startswith("numbalsoda ")
+    assert solver == "SciPy LSODA, Numba closed form"
     assert costs[solver][1] == pytest.approx(int(best[1]), rel=0.15)
