@@ -23,11 +23,12 @@ from boulder_kernels.control import STEP_RATIO
 from boulder_kernels.design import design_at
 from boulder_kernels.soil import Kinematics, Reaction, closed_form, element_sums
 from boulder_kernels.table import is_paired
+from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED, Steps
 
 from .designs import DESIGNS, HORIZON, ROTATION_LIMIT, sample
-from .report import FOLDER, Table, significant, write_between_markers
-from .timing import interleaved, machine, median_ratio, timed, versions
+from .report import FOLDER, described, significant, write
+from .timing import here, interleaved, median_ratio, timed
 
 STEPS_MS = (16.0, 14.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.5)
 FIGURE = FOLDER / "figures" / "accuracy.png"
@@ -110,40 +111,32 @@ def wrong_verdicts(found: bk.OutcomeTable, known: bk.OutcomeTable) -> int:
     return int(np.sum(((found.status == LIMIT) != (known.status == LIMIT)) & ~unsure))
 
 
-def named_table(rounds: int = ROUNDS) -> Table:
+def named_table() -> str:
     """Measure all named accuracies in both presets."""
     designs = sample(DESIGNS)
-    table = Table(
-        "named",
-        "The named accuracies",
-        f"{machine()}; {versions('numba', 'llvmlite', 'numpy')}; {DESIGNS} random designs; CPU time of one thread",
-        [
-            *("readings", "accuracy", "steps", "CPU time per design", "over `fast`"),
-            *("rotation: max [deg]", "displacement: max [mm]", "wrong verdicts"),
-        ],
-    )
+    errors = ("rotation: max [deg]", "displacement: max [mm]", "wrong verdicts")
+    table = Table(("readings", "accuracy", "steps", "CPU time per design", "over `fast`", *errors))
     for preset, readings in PRESETS.items():
         known = reference_of(designs, readings)
         named = STEPS if readings.restoring_gravity else STEPS_PRINTED
         ways = {name: named_control(name, steps) for name, steps in named.items()}
         works = {name: partial(bk.simulate_table, designs, readings, how) for name, how in ways.items()}
-        times = interleaved(works, rounds)
+        times = interleaved(works, ROUNDS)
         for name, work in works.items():
             found = work()
             degrees, millimetres = (errors.max() for errors in errors_of(found, known))
-            table.rows.append(
-                [
-                    preset,
-                    f"`{name}`",
-                    steps_text(name, named[name], readings),
-                    f"{1e6 * min(times[name]) / DESIGNS:.2f} us",
-                    f"{median_ratio(times[name], times['fast']):.2f}",
-                    significant(degrees),
-                    significant(millimetres),
-                    str(wrong_verdicts(found, known)),
-                ]
+            table.add(
+                preset,
+                f"`{name}`",
+                steps_text(name, named[name], readings),
+                f"{1e6 * min(times[name]) / DESIGNS:.2f} us",
+                f"{median_ratio(times[name], times['fast']):.2f}",
+                significant(degrees),
+                significant(millimetres),
+                str(wrong_verdicts(found, known)),
             )
-    return table
+    conditions = f"{here()}; {DESIGNS} random designs; CPU time of one thread"
+    return described("The named accuracies", conditions, table)
 
 
 ASKED = {
@@ -169,36 +162,25 @@ def rate(designs: bk.DesignTable, how: bk.Control, threads: int) -> float:
     return threads * REPEATS * designs.L.size / (time.monotonic() - begun)
 
 
-def rates_table(rounds: int = ROUNDS) -> Table:
+def rates_table() -> str:
     """Measure all ways with one thread and with two, in turn."""
     designs = sample(DESIGNS)
     known = reference_of(designs, bk.corrected())
-    conditions = f"{DESIGNS} random designs, corrected readings; wall time, the best of {rounds} rounds"
-    table = Table(
-        "rates",
-        "Designs a second",
-        f"{machine()}; {versions('numba', 'llvmlite', 'numpy')}; {conditions}",
-        [
-            *("accuracy asked for", "step", "rotation: max [deg]", "displacement: max [mm]"),
-            *("one thread", "two threads", "ratio"),
-        ],
-    )
+    errors = ("rotation: max [deg]", "displacement: max [mm]")
+    table = Table(("accuracy asked for", "step", *errors, "one thread", "two threads", "ratio"))
     for name, how in ASKED.items():
         found = bk.simulate_table(designs, bk.corrected(), how)
         degrees, millimetres = (errors.max() for errors in errors_of(found, known))
         rates: dict[int, list[float]] = {1: [], 2: []}
-        for _ in range(rounds):
+        for _ in range(ROUNDS):
             for threads, values in rates.items():
                 values.append(rate(designs, how, threads))
         one, two = max(rates[1]), max(rates[2])
         steps = f"{1e3 * how.h / (STEP_RATIO if how.error_estimate else 1.0):g} ms"
-        table.rows.append(
-            [
-                *(name, steps, significant(degrees), significant(millimetres)),
-                *(f"{one:,.0f}", f"{two:,.0f}", f"{two / one:.2f}"),
-            ]
-        )
-    return table
+        per_second = (f"{one:,.0f}", f"{two:,.0f}", f"{two / one:.2f}")
+        table.add(name, steps, significant(degrees), significant(millimetres), *per_second)
+    conditions = f"{here()}; {DESIGNS} random designs, corrected readings; wall time, the best of {ROUNDS} rounds"
+    return described("Designs a second", conditions, table)
 
 
 def repeated(reaction: Callable[[Kinematics, Constants], Reaction]) -> Callable[[Kinematics, Constants, int], float]:
@@ -215,7 +197,7 @@ def repeated(reaction: Callable[[Kinematics, Constants], Reaction]) -> Callable[
     return often
 
 
-def kernel_table(rounds: int = ROUNDS) -> Table:
+def kernel_table() -> str:
     """Measure a whole design, and the soil by sums and in closed form, in turn."""
     designs, readings, how = sample(DESIGNS), bk.corrected(), ASKED["0.01 deg, 0.1 mm"]
     summed, closed = (bk.constants_of(design_at(designs, 0), readings, elements) for elements in (ELEMENTS, 0))
@@ -226,25 +208,22 @@ def kernel_table(rounds: int = ROUNDS) -> Table:
             "sums": partial(repeated(element_sums), lines, summed, SUMS),
             "closed form": partial(repeated(closed_form), lines, closed, CLOSED_FORMS),
         },
-        rounds,
+        ROUNDS,
     )
     design, of_sums, of_closed_forms = (min(seconds) for seconds in times.values())
     sum_ns = 1e9 * of_sums / (SUMS * ELEMENTS)
-    return Table(
-        "kernel",
-        "Kernels on one core",
-        f"{machine()}; {versions('numba', 'llvmlite', 'numpy')}; corrected readings; CPU time of one thread, least of "
-        f"{rounds} rounds; designs: {DESIGNS} random ones, step {1e3 * how.h:g} ms, no error estimate",
-        ["what", "figure"],
-        [
-            ["a whole design", f"{1e6 * design / DESIGNS:.2f} us"],
-            ["element sums", f"{sum_ns:.2f} ns per element, {1e-3 * sum_ns * ELEMENTS:.1f} us for N = {ELEMENTS}"],
-            ["closed form instead, one by one", f"{1e9 * of_closed_forms / CLOSED_FORMS:.0f} ns"],
-        ],
+    table = Table(("what", "figure"))
+    table.add("a whole design", f"{1e6 * design / DESIGNS:.2f} us")
+    table.add("element sums", f"{sum_ns:.2f} ns per element, {1e-3 * sum_ns * ELEMENTS:.1f} us for N = {ELEMENTS}")
+    table.add("closed form instead, one by one", f"{1e9 * of_closed_forms / CLOSED_FORMS:.0f} ns")
+    conditions = (
+        f"{here()}; corrected readings; CPU time of one thread, least of {ROUNDS} rounds; designs: {DESIGNS} random "
+        f"ones, step {1e3 * how.h:g} ms, no error estimate"
     )
+    return described("Kernels on one core", conditions, table)
 
 
-TABLES: dict[str, Callable[[], Table]] = {"named": named_table, "rates": rates_table, "kernel": kernel_table}
+TABLES: dict[str, Callable[[], str]] = {"named": named_table, "rates": rates_table, "kernel": kernel_table}
 
 
 def main() -> None:
@@ -256,11 +235,10 @@ def main() -> None:
     if asked.draw:
         draw_steps()
         return
-    tables = [TABLES[name]() for name in asked.tables or TABLES]
-    for table in tables:
-        print(table.markdown(), end="\n\n")
+    computed = {name: TABLES[name]() for name in asked.tables or TABLES}
+    print("\n\n".join(computed.values()))
     if asked.write:
-        write_between_markers(tables)
+        write(computed)
 
 
 if __name__ == "__main__":

@@ -40,10 +40,11 @@ from boulder_kernels.dynamics import (
 )
 from boulder_kernels.numerics import sine_versine
 from boulder_kernels.soil import soil_kinematics
+from boulder_sweep.crash_tests.tables import Table
 
 from .designs import DESIGNS, HORIZON, ROTATION_LIMIT, first, sample
-from .report import Table, significant, write_between_markers
-from .timing import machine, timed, versions
+from .report import described, significant, write
+from .timing import here, timed
 
 READINGS = bk.corrected()
 ACCURACY_DEG = 0.01
@@ -440,38 +441,36 @@ def _try_fewer_outputs(measured: Measurement, solver: Solver, problem: Problem) 
         measured.outputs, measured.with_fewest = outputs, point
 
 
-def measure(count: int = DESIGNS) -> Table:
+def peers_table() -> str:
     """Measure the kernels and every other solver."""
-    problem = problem_of(sample(count))
+    problem = problem_of(sample(DESIGNS))
     measured = [measure_kernels(problem), measure_kernels(problem, in_lanes=False)]
     measured += [measure_solver(solver, problem) for solver in SOLVERS]
     lanes = measured[0].chosen
     assert lanes is not None, "the kernels reach the accuracy"
-    return Table(
-        "peers",
+    head = ("solver", "designs", "tolerance (step)", "output times", "error", "CPU time per design", "over the lanes")
+    table = Table(head)
+    for each in measured:
+        table.add(*each.row(lanes[1]))
+    return described(
         f"Other solvers at the same accuracy: largest error of the largest rotation at most {ACCURACY_DEG:g} deg",
-        f"{machine()}; {versions('numba', 'numpy', 'scipy')}; corrected readings; CPU time of all "
-        "threads; each solver has the first designs of the same sample, its loosest tolerance that is accurate enough "
-        "on them, and then the fewest output times that are",
-        ["solver", "designs", "tolerance (step)", "output times", "error", "CPU time per design", "over the lanes"],
-        [each.row(lanes[1]) for each in measured],
-        [
-            "The others get the end time of each design; the lanes find it themselves. Peaks of the others are "
-            "taken from the states at their output times by quintic polynomials, uncounted.",
-            "The accuracy is easier to reach with fewer designs, which favours solvers with a small sample.",
-        ],
+        f"{here()}; corrected readings; CPU time of all threads; each solver has the first designs of the same sample, "
+        "its loosest tolerance that is accurate enough on them, and then the fewest output times that are",
+        table,
+        "The others get the end time of each design; the lanes find it themselves. Peaks of the others are taken from "
+        "the states at their output times by quintic polynomials, uncounted.",
+        "The accuracy is easier to reach with fewer designs, which favours solvers with a small sample.",
     )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.peers", description=__doc__)
-    parser.add_argument("--designs", type=int, default=DESIGNS, help="size of the sample (default %(default)s)")
     parser.add_argument("--write", action="store_true", help="write the table into benchmarks/README.md")
     asked = parser.parse_args()
-    table = measure(asked.designs)
-    print(table.markdown())
+    table = peers_table()
+    print(table)
     if asked.write:
-        write_between_markers([table])
+        write({"peers": table})
 
 
 if __name__ == "__main__":

@@ -77,7 +77,7 @@ def machine() -> str:
     return f"{processor()} ({llvmlite.binding.get_host_cpu_name()}, {vectors}), {os.cpu_count()} cores"
 
 
-def versions(*packages: str) -> str:
-    """Python and packages with their versions, in one line."""
-    found = (f"{package} {version(package)}" for package in packages)
-    return ", ".join([f"Python {platform.python_version()}", *found])
+def here() -> str:
+    """Machine, Python, and versions of what speed depends on, in one line."""
+    found = (f"{package} {version(package)}" for package in ("numba", "llvmlite", "numpy", "scipy"))
+    return f"{machine()}; {', '.join([f'Python {platform.python_version()}', *found])}"
