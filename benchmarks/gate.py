@@ -237,8 +237,8 @@ def complaint(findings: Sequence[Finding]) -> str:
         return ""
     return (
         f"benchmark gate: {'; '.join(bad)}. Counts that are meant to change are written into benchmarks/{LIMITS.name} "
-        "from python -m benchmarks.gate --record; where time is lost, python -m benchmarks.kernel shows. Say in the "
-        "commit why."
+        "from python -m benchmarks.gate --record; where time is lost, python -m benchmarks.accuracy kernel shows. Say "
+        "in the commit why."
     )
 
 

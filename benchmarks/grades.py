@@ -37,7 +37,7 @@ from docs.studies.forms import BUMPER_M, HOOD_M, SPEEDS, drawn_of_grid, grid_eva
 from tests.oracle import heave as oracle
 from tests.oracle import inputs as known
 
-from .timing import machine, versions
+from .timing import here
 
 GRID = Path("configs/m30_sizing.yaml")
 PASSES = 500
@@ -195,7 +195,7 @@ def main() -> int:
     count = parser.parse_args().passes
     grid_evaluation(GRID).asked().warm_up()
     found = grades(count=count)
-    print(f"{machine()}; {versions('numba', 'llvmlite', 'numpy')}")
+    print(here())
     print(grades_table(found, cpu=True).text())
     return 1 if any(one.unsafe for one in found.values()) else 0
 

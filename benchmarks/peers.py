@@ -4,8 +4,7 @@ The other solvers get the model as a plain reading of the equations suggests, wi
 side: contact, seat and the direction of the weight's couple are decided in every evaluation. The kernels do not do
 this (see `boulder_kernels.events`). The others get an advantage over the kernels: each design ends at the time at which
 the kernels stopped, so that no solver simulates more than it needs to, and the peak is taken from the states at some
-output times afterwards, untimed. numbalsoda is best installed into a separate environment
-(``benchmarks/requirements-peers.txt``), whose interpreter then runs this; the table says what is missing.
+output times afterwards, untimed. Plain C needs gcc or the package ziglang.
 """
 
 from __future__ import annotations
@@ -41,10 +40,11 @@ from boulder_kernels.dynamics import (
 )
 from boulder_kernels.numerics import sine_versine
 from boulder_kernels.soil import soil_kinematics
+from boulder_sweep.crash_tests.tables import Table
 
 from .designs import DESIGNS, HORIZON, ROTATION_LIMIT, first, sample
-from .report import Table, significant, write_between_markers
-from .timing import machine, timed, versions
+from .report import described, significant, write
+from .timing import here, timed
 
 READINGS = bk.corrected()
 ACCURACY_DEG = 0.01
@@ -60,7 +60,6 @@ ABSOLUTE = 0.1
 LONGEST_S = 20.0
 """A solver that takes longer than this for one tolerance is not tried at a finer one."""
 ELEMENTS = 5000
-MOST_STEPS = 100_000
 PLAIN_C = Path(__file__).with_name("plain.c")
 LANES = 8
 C_OPTIONS = ("-O3", "-march=native", "-ffast-math", "-shared", "-fPIC")
@@ -266,57 +265,19 @@ def _by_scipy(method: str, problem: Problem) -> Callable[[float], np.ndarray]:
     return lambda tolerance: _solve(rates, problem, method, tolerance)
 
 
-def numbalsoda_solvers() -> list[Solver]:
-    """Return LSODA and DOP853 of numbalsoda, called from a compiled loop without any Python, on the closed form."""
-    import numbalsoda
-
-    @numba.cfunc(numbalsoda.lsoda_sig, error_model="numpy", fastmath={"contract", "nsz"})
-    def rates(t, y, rate, p):  # type of the arguments: numbalsoda.lsoda_sig
-        c = Constants(
-            p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], 0, p[10], p[11], p[12], p[13], p[14], p[15], p[16],
-            p[17], p[18], p[19], p[20], p[21], p[22],
-        )  # fmt: skip
-        k = literal_acceleration(State(y[0], y[1], y[2], y[3], y[4], y[5]), c)
-        rate[0], rate[1], rate[2] = y[1], k.a_b, y[3]
-        rate[3], rate[4], rate[5] = k.alpha_b, y[5], k.a_v
-
-    def solver(name: str, solve: Callable[..., tuple[np.ndarray, bool]]) -> Solver:
-        @numba.njit(nogil=True)
-        def solve_all(address, constants, v_0, t_end, outputs, tolerance):
-            states = np.full((len(t_end), outputs, 6), np.nan)
-            for row in range(len(t_end)):
-                start = np.array((0.0, 0.0, 0.0, 0.0, 0.0, v_0[row]))
-                times = np.linspace(0.0, t_end[row], outputs)
-                found, done = solve(address, start, times, constants[row], tolerance, ABSOLUTE * tolerance, MOST_STEPS)
-                if done:
-                    states[row] = found
-            return states
-
-        def prepare(problem: Problem) -> Callable[[float], np.ndarray]:
-            rows = [problem.constants(row) for row in range(problem.size)]
-            constants = np.array([[float(value) for value in c] for c in rows])
-            v_0 = np.array([c.v_0 for c in rows])
-            solve_all(rates.address, constants[:1], v_0[:1], problem.t_end[:1], problem.outputs, 1e-3)  # compiles
-            return partial(solve_all, rates.address, constants, v_0, problem.t_end, problem.outputs)
-
-        return Solver(f"numbalsoda {name}, closed form", 1024, prepare, TOLERANCES)
-
-    return [solver("LSODA", numbalsoda.lsoda), solver("DOP853", numbalsoda.dop853)]
-
-
 def compiler() -> list[str]:
     """Return the command of a C compiler: gcc, or the one that the package ziglang brings.
 
     Raises
     ------
-    ImportError
+    FileNotFoundError
         There is neither.
     """
     if found := shutil.which("gcc"):
         return [found, "-mprefer-vector-width=512"]
     if find_spec("ziglang"):
         return [sys.executable, "-m", "ziglang", "cc"]
-    raise ImportError("neither gcc nor ziglang is here")
+    raise FileNotFoundError("neither gcc nor ziglang is here")
 
 
 @cache
@@ -352,27 +313,13 @@ def plain_c(problem: Problem) -> Callable[[float], np.ndarray]:
     return solve_all
 
 
-SCIPY = [
+SOLVERS = [
+    Solver("plain C, RK4, 8 designs side by side, closed form", 1024, plain_c, C_STEPS_S, True),
     Solver("the paper's way: SciPy RK45, NumPy sums, N = 5000", 12, _paper, TOLERANCES),
     Solver("SciPy DOP853, Numba closed form", 32, partial(_by_scipy, "DOP853"), TOLERANCES),
     Solver("SciPy LSODA, Numba closed form", 32, partial(_by_scipy, "LSODA"), TOLERANCES),
 ]
-"""Design by design, as a user of SciPy would; the paper's way first."""
-
-
-def solvers() -> tuple[list[Solver], list[str]]:
-    """Return every solver that is installed, and what is missing."""
-    found, missing = list(SCIPY), []
-    try:
-        compiler()
-        found.insert(0, Solver("plain C, RK4, 8 designs side by side, closed form", 1024, plain_c, C_STEPS_S, True))
-    except ImportError as reason:
-        missing.append(f"plain C was not measured: {reason}")
-    try:
-        found += numbalsoda_solvers()
-    except (ImportError, OSError) as reason:
-        missing.append(f"numbalsoda was not measured: {reason}")
-    return found, missing
+"""With SciPy design by design, as its users would."""
 
 
 @dataclass
@@ -494,40 +441,36 @@ def _try_fewer_outputs(measured: Measurement, solver: Solver, problem: Problem) 
         measured.outputs, measured.with_fewest = outputs, point
 
 
-def measure(count: int = DESIGNS) -> Table:
-    """Measure the kernels and every solver that is installed."""
-    problem = problem_of(sample(count))
-    others, missing = solvers()
+def peers_table() -> str:
+    """Measure the kernels and every other solver."""
+    problem = problem_of(sample(DESIGNS))
     measured = [measure_kernels(problem), measure_kernels(problem, in_lanes=False)]
-    measured += [measure_solver(solver, problem) for solver in others]
+    measured += [measure_solver(solver, problem) for solver in SOLVERS]
     lanes = measured[0].chosen
     assert lanes is not None, "the kernels reach the accuracy"
-    return Table(
-        "peers",
+    head = ("solver", "designs", "tolerance (step)", "output times", "error", "CPU time per design", "over the lanes")
+    table = Table(head)
+    for each in measured:
+        table.add(*each.row(lanes[1]))
+    return described(
         f"Other solvers at the same accuracy: largest error of the largest rotation at most {ACCURACY_DEG:g} deg",
-        f"{machine()}; {versions('numba', 'numpy', 'scipy', 'numbalsoda')}; corrected readings; CPU time of all "
-        "threads; each solver has the first designs of the same sample, its loosest tolerance that is accurate enough "
-        "on them, and then the fewest output times that are",
-        ["solver", "designs", "tolerance (step)", "output times", "error", "CPU time per design", "over the lanes"],
-        [each.row(lanes[1]) for each in measured],
-        [
-            "The others get the end time of each design; the lanes find it themselves. Peaks of the others are "
-            "taken from the states at their output times by quintic polynomials, uncounted.",
-            "The accuracy is easier to reach with fewer designs, which favours solvers with a small sample.",
-            *missing,
-        ],
+        f"{here()}; corrected readings; CPU time of all threads; each solver has the first designs of the same sample, "
+        "its loosest tolerance that is accurate enough on them, and then the fewest output times that are",
+        table,
+        "The others get the end time of each design; the lanes find it themselves. Peaks of the others are taken from "
+        "the states at their output times by quintic polynomials, uncounted.",
+        "The accuracy is easier to reach with fewer designs, which favours solvers with a small sample.",
     )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.peers", description=__doc__)
-    parser.add_argument("--designs", type=int, default=DESIGNS, help="size of the sample (default %(default)s)")
     parser.add_argument("--write", action="store_true", help="write the table into benchmarks/README.md")
     asked = parser.parse_args()
-    table = measure(asked.designs)
-    print(table.markdown())
+    table = peers_table()
+    print(table)
     if asked.write:
-        write_between_markers([table])
+        write({"peers": table})
 
 
 if __name__ == "__main__":

@@ -1,71 +1,28 @@
-"""Results as tables: printed, and written into the README between its markers."""
+"""Results as blocks of the page of the benchmarks."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from pathlib import Path
+
+from boulder_sweep.crash_tests.tables import Table
+from docs.studies.documents import renewed
 
 FOLDER = Path(__file__).parent
 README = FOLDER / "README.md"
+BLOCKS = ("kernel", "rates", "named", "peers")
+"""Names of its blocks."""
 
 
-@dataclass
-class Table:
-    """One table of results.
-
-    Parameters
-    ----------
-    name
-        Name of its place in the README.
-    title
-        What was measured.
-    conditions
-        Machine, versions, designs, what was counted.
-    header, rows
-        Text of the cells.
-    notes
-        What a reader must know to interpret it.
-    """
-
-    name: str
-    title: str
-    conditions: str
-    header: list[str]
-    rows: list[list[str]] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-
-    def markdown(self) -> str:
-        """Return the table with title, conditions and notes."""
-        lines = [f"**{self.title}**", "", f"*{self.conditions}*", "", _row(self.header)]
-        lines.append("|" + "---|" * len(self.header))
-        lines += [_row(row) for row in self.rows]
-        if self.notes:
-            lines += [""] + [f"- {note}" for note in self.notes]
-        return "\n".join(lines)
+def described(title: str, conditions: str, table: Table, *notes: str) -> str:
+    """Return a table below what was measured, and on which machine, versions and designs; notes follow."""
+    listed = "".join(f"\n- {note}" for note in notes)
+    return f"**{title}**\n\n*{conditions}*\n\n{table.markdown()}" + (f"\n{listed}" if notes else "")
 
 
-def _row(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cells) + " |"
-
-
-def write_between_markers(tables: Sequence[Table], readme: Path = README) -> None:
-    """Write each table between its markers in the README; the prose around them is left alone.
-
-    Raises
-    ------
-    ValueError
-        The README has no place for a table.
-    """
-    text = readme.read_text()
-    for table in tables:
-        begin, end = f"<!-- begin {table.name} -->", f"<!-- end {table.name} -->"
-        if text.count(begin) != 1 or text.count(end) != 1:
-            raise ValueError(f"{readme.name} has no place for the table {table.name!r}: {begin} ... {end}")
-        before, rest = text.split(begin)
-        after = rest.split(end)[1]
-        text = f"{before}{begin}\n{table.markdown()}\n{end}{after}"
-    readme.write_text(text)
+def write(computed: Mapping[str, str]) -> None:
+    """Write blocks by name into the page; the prose around them is left alone."""
+    README.write_text(renewed(README.read_text(encoding="utf-8"), computed, BLOCKS), encoding="utf-8")
 
 
 def significant(value: float, digits: int = 2) -> str:

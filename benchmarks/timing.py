@@ -10,7 +10,7 @@ import os
 import platform
 import time
 from collections.abc import Callable, Mapping
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from statistics import median
 from typing import TypeVar
@@ -62,10 +62,8 @@ def median_ratio(times: list[float], others: list[float]) -> float:
 
 def processor() -> str:
     """Name of the processor."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        lines = []
+    file = Path("/proc/cpuinfo")
+    lines = file.read_text().splitlines() if file.exists() else []
     names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
     return names[0] if names else platform.processor() or platform.machine()
 
@@ -79,12 +77,7 @@ def machine() -> str:
     return f"{processor()} ({llvmlite.binding.get_host_cpu_name()}, {vectors}), {os.cpu_count()} cores"
 
 
-def versions(*packages: str) -> str:
-    """Python and packages with their versions, in one line."""
-    found = [f"Python {platform.python_version()}"]
-    for package in packages:
-        try:
-            found.append(f"{package} {version(package)}")
-        except PackageNotFoundError:
-            found.append(f"{package} not installed")
-    return ", ".join(found)
+def here() -> str:
+    """Machine, Python, and versions of what speed depends on, in one line."""
+    found = (f"{package} {version(package)}" for package in ("numba", "llvmlite", "numpy", "scipy"))
+    return f"{machine()}; {', '.join([f'Python {platform.python_version()}', *found])}"

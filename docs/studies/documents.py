@@ -89,20 +89,24 @@ def write(root: Path, computed: Mapping[str, str], others: Collection[str] = ())
     changed = []
     for page in pages(root):
         text = page.read_text(encoding="utf-8")
-        renewed = _BLOCK.sub(lambda match: _renewed(match, computed, others), text)
-        if renewed != text:
-            page.write_text(renewed, encoding="utf-8")
+        if (now := renewed(text, computed, others)) != text:
+            page.write_text(now, encoding="utf-8")
             changed.append(page)
     return changed
 
 
-def _renewed(match: re.Match[str], computed: Mapping[str, str], others: Collection[str]) -> str:
-    name = match["name"]
-    if name not in computed and name not in others:
-        raise DocumentError(f"nothing computes the block {name}")
-    if name not in computed or not drift(match["text"], computed[name]):
-        return match[0]  # rounding alone is no reason to change a page
-    return f"<!-- {name} -->\n{computed[name].strip()}\n<!-- end -->"
+def renewed(text: str, computed: Mapping[str, str], others: Collection[str] = ()) -> str:
+    """Return the text of a page with its blocks as `write` puts them."""
+
+    def block(match: re.Match[str]) -> str:
+        name = match["name"]
+        if name not in computed and name not in others:
+            raise DocumentError(f"nothing computes the block {name}")
+        if name not in computed or not drift(match["text"], computed[name]):
+            return match[0]  # rounding alone is no reason to change a page
+        return f"<!-- {name} -->\n{computed[name].strip()}\n<!-- end -->"
+
+    return _BLOCK.sub(block, text)
 
 
 def points(*texts: str) -> str:

@@ -41,15 +41,6 @@ LITTLE_DEG = 12.0
 SCATTER = 0.3
 """Standard deviation of the logarithm of the subgrade reaction about the API curve."""
 BINS_DEG = (0.0, 6.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 16.0, 18.0, 20.0)
-BASES = {
-    "as chosen": USUAL_BASE,
-    "k_b 30 MN/m³": Base(stiffness=30e6),
-    "k_b 300 MN/m³": Base(stiffness=300e6),
-    "no damping of the base": Base(wave_speed=0.0),
-    "v_s 0.002 m/s": Base(slip_speed=0.002),
-    "v_s 0.05 m/s": Base(slip_speed=0.05),
-}
-"""Constants of the second opinion that nobody has measured for boulders."""
 WATCHED_S = 1.5
 """How long the crash tests are watched [s]."""
 
@@ -88,25 +79,23 @@ def by_second_opinion(
     return second_opinions(with_law(designs.table, law), control, form, base)
 
 
-def passing(
-    designs: Designs, law: str, evaluation: Evaluation, form: HeaveOptions = WHOLE, base: Base = USUAL_BASE
-) -> np.ndarray:
+def passing(designs: Designs, law: str, evaluation: Evaluation, form: HeaveOptions = WHOLE) -> np.ndarray:
     """Return which designs pass by a law and a form, bool, shape (n,)."""
-    found = by_second_opinion(designs, law, evaluation, form, base)
+    found = by_second_opinion(designs, law, evaluation, form)
     penetration = found.x_v_max - designs.bed_offset - designs.table.L
     return (found.status == Status.BELOW_LIMIT.value) & (penetration <= evaluation.limits.penetration)
 
 
-def robust(designs: Designs, evaluation: Evaluation, base: Base = USUAL_BASE) -> np.ndarray:
+def robust(designs: Designs, evaluation: Evaluation) -> np.ndarray:
     """Return which designs stand under both second opinions, bool, shape (n,)."""
-    return np.logical_and.reduce([passing(designs, law, evaluation, WHOLE, base) for law in SECOND_OPINIONS])
+    return np.logical_and.reduce([passing(designs, law, evaluation) for law in SECOND_OPINIONS])
 
 
-def grids_words(grid: Path, count: int = DRAWN) -> str:
+def grids_words(grid: Path) -> str:
     """Return how many passes of a grid are robust at two speeds, and of those that turn little."""
     shares, few = [], np.array([], dtype=bool)
     for name, speed in SPEEDS.items():
-        evaluation, (passes, _) = grid_evaluation(grid, speed), drawn_of_grid(grid, speed, count)
+        evaluation, (passes, _) = grid_evaluation(grid, speed), drawn_of_grid(grid, speed)
         standing = robust(passes, evaluation)
         few = np.append(few, standing[evaluation.judged(passes)["max_rotation_deg"] <= LITTLE_DEG])
         shares.append(f"{standing.mean():.0%} of the passes of {name}")

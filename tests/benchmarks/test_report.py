@@ -1,40 +1,30 @@
-"""Tables get into the README without touching its prose."""
+"""Tables get into the page of the benchmarks without touching its prose."""
 
 from pathlib import Path
 
 import pytest
 
-from benchmarks.report import README, Table, significant, write_between_markers
-
-TABLE = Table("speed", "Speed", "on a machine", ["what", "figure"], [["lanes", "1 us"]], ["a note"])
-TABLES = ("score", "kernel", "named", "rates", "peers")
-
-
-def test_prose_stays_as_it_is(tmp_path: Path) -> None:
-    readme = tmp_path / "README.md"
-    readme.write_text("before\n<!-- begin speed -->\nold\n<!-- end speed -->\nafter\n")
-    write_between_markers([TABLE], readme)
-    text = readme.read_text()
-    assert text.startswith("before\n")
-    assert text.endswith("\nafter\n")
-    assert "old" not in text
-    assert "| lanes | 1 us |" in text
-    write_between_markers([TABLE], readme)
-    assert readme.read_text() == text
+from benchmarks import report
+from benchmarks.report import BLOCKS, README, described, significant
+from boulder_sweep.crash_tests.tables import Table
 
 
-def test_a_table_without_a_place_is_refused(tmp_path: Path) -> None:
-    readme = tmp_path / "README.md"
-    readme.write_text("no place\n")
-    with pytest.raises(ValueError, match="speed"):
-        write_between_markers([TABLE], readme)
-    assert readme.read_text() == "no place\n"
+def test_a_table_is_written_below_its_conditions_and_the_rest_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = README.read_text(encoding="utf-8")
+    monkeypatch.setattr(report, "README", tmp_path / "README.md")
+    report.README.write_text(page, encoding="utf-8")
+    report.write({"peers": described("Speed", "on a machine", Table(("what",), [("lanes",)]), "one note", "another")})
+    text = report.README.read_text(encoding="utf-8")
+    before, after = page.split("<!-- peers -->")
+    shown = "**Speed**\n\n*on a machine*\n\n| what |\n| --- |\n| lanes |\n\n- one note\n- another"
+    assert text == f"{before}<!-- peers -->\n{shown}\n<!-- end -->{after.split('<!-- end -->')[1]}"
 
 
-def test_readme_has_a_place_for_every_table() -> None:
-    text = README.read_text()
-    for name in TABLES:
-        assert text.index(f"<!-- begin {name} -->") < text.index(f"<!-- end {name} -->")
+def test_the_page_has_a_place_for_every_table() -> None:
+    text = README.read_text(encoding="utf-8")
+    assert all(text.count(f"<!-- {name} -->") == 1 for name in BLOCKS)
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from boulder_kernels.heave import Base
+from boulder_kernels.second_opinion import USUAL_BASE
 from boulder_sweep.judge.judged import PASS
 from boulder_sweep.judge.robustness import FREE_ROTATION_DEG, is_free
 from docs.studies import forms, free_region
@@ -17,7 +18,23 @@ ROOT = Path(__file__).parents[2]
 GRID = ROOT / "configs" / "m30_sizing.yaml"
 
 
-@pytest.mark.parametrize("base", forms.BASES.values(), ids=forms.BASES)
+BASES = {
+    "as chosen": USUAL_BASE,
+    "k_b 30 MN/m³": Base(stiffness=30e6),
+    "k_b 300 MN/m³": Base(stiffness=300e6),
+    "no damping of the base": Base(wave_speed=0.0),
+    "v_s 0.002 m/s": Base(slip_speed=0.002),
+    "v_s 0.05 m/s": Base(slip_speed=0.05),
+}
+"""Constants of the second opinion that nobody has measured for boulders."""
+
+
+def evenly(rng: np.random.Generator) -> np.ndarray:
+    """Draw places in the free region evenly."""
+    return rng.random((free_region.AT_ONCE, len(free_region.RANGES)))
+
+
+@pytest.mark.parametrize("base", BASES.values(), ids=BASES)
 def test_crash_tests_come_out_as_they_did_by_every_law_and_constant(base: Base) -> None:
     for title, *cells in forms.crash_table(GRID, base).rows:
         overturned = [cell.startswith("20° after") for cell in cells]
@@ -40,16 +57,18 @@ def test_lost_passes_are_counted_once_and_in_their_bin() -> None:
     assert passes[0] == np.count_nonzero(rotation <= forms.BINS_DEG[1])
 
 
-@pytest.mark.parametrize("draw", [free_region.even, free_region.cornered])
-def test_what_is_drawn_of_the_free_region_is_what_the_judge_calls_free(draw: Callable[..., np.ndarray]) -> None:
-    _, designs = free_region.drawn(GRID, draw, tuple(free_region.FREE_RANGES.items()), 50)
+@pytest.mark.parametrize("draw", [evenly, free_region.cornered])
+def test_what_is_drawn_of_the_free_region_is_what_the_judge_calls_free(
+    draw: Callable[[np.random.Generator], np.ndarray],
+) -> None:
+    _, designs = free_region.drawn(GRID, draw, 50)
     assert designs.size >= 50
     assert is_free(designs.table).all()
     judged = forms.grid_evaluation(GRID).judged(designs)
     assert (judged.verdict == PASS).all()
     assert judged["max_rotation_deg"].max() <= FREE_ROTATION_DEG
     ends = np.isin(designs.table.W, (0.8, 2.5)).mean()
-    assert ends == 0.0 if draw is free_region.even else 0.3 < ends < 0.7
+    assert ends == 0.0 if draw is evenly else 0.3 < ends < 0.7
 
 
 def test_numbers_in_prose_are_those_of_the_study() -> None:
@@ -60,7 +79,8 @@ def test_numbers_in_prose_are_those_of_the_study() -> None:
 
 @pytest.mark.nightly
 def test_nothing_is_lost_in_the_free_region() -> None:
-    *free, _ = free_region.region_table(GRID).rows
-    assert all(int(passes) >= 3000 and lost == "0" for _, passes, lost, *_ in free)
+    for draw in (evenly, free_region.cornered):
+        _, designs = free_region.drawn(GRID, draw, free_region.LEAST)
+        assert forms.robust(designs, forms.grid_evaluation(GRID)).all()
     for n in range(free_region.SEARCHES):
-        assert free_region.worst_found(GRID, free_region.LEAST, free_region.SEED + n) < 20.0
+        assert free_region.worst_found(GRID, free_region.SEED + n) < 20.0

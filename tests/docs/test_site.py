@@ -66,7 +66,7 @@ def test_every_link_leads_somewhere_and_nothing_is_fetched(site: Path) -> None:
 def test_pages_from_elsewhere_are_in_it(site: Path) -> None:
     words = {
         "quick_start.html": "Which boulder, buried how deep",
-        "benchmarks/index.html": "numbalsoda",
+        "benchmarks/index.html": "plain C, RK4",
         "command_line.html": "sweep fit-vehicle",
         "python.html": "boulder_sweep.runner.run.run",
         "settings.html": "constant of horizontal subgrade reaction of the soil",

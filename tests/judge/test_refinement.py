@@ -148,7 +148,7 @@ def test_only_open_rows_are_simulated_again() -> None:
 
 
 SHALLOW = Path(__file__).parent / "late_designs.csv"
-"""Boulders that rock for seconds. An independent integration by steps of 0.1 ms (`benchmarks.late`) finds: the first
+"""Boulders that rock for seconds. An independent integration by steps of 0.1 ms (`tests.rk4`) finds: the first
 two overturn at 7.0313 s and 6.769 s, the third stands for 10 s and overturns later, the fourth stands, at most 16.034
 deg. But slower trucks overturn the first, second and fourth."""
 

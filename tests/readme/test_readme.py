@@ -102,7 +102,7 @@ def test_links_lead_somewhere() -> None:
 def test_the_named_accuracies_are_those_of_the_benchmark() -> None:
     """Same cells as the rows of the corrected readings in the table that the benchmark wrote."""
     benchmark = (ROOT / "benchmarks" / "README.md").read_text(encoding="utf-8")
-    table = benchmark.split("<!-- begin named -->")[1].split("<!-- end named -->")[0]
+    table = marked("named", benchmark)
     rows = [line.removeprefix("| corrected ") for line in table.splitlines() if line.startswith("| corrected ")]
     assert len(rows) == 3
     assert [line for line in ACCURACY.splitlines() if line.startswith(tuple(row[:8] for row in rows))] == rows
@@ -128,7 +128,7 @@ def test_the_comparison_with_others_is_that_of_the_benchmark() -> None:
     """Milliseconds of the paper's way and the factors of both ways, in round numbers."""
     benchmark = (ROOT / "benchmarks" / "README.md").read_text(encoding="utf-8")
     costs = {}
-    for line in benchmark.split("<!-- begin peers -->")[1].split("<!-- end peers -->")[0].splitlines():
+    for line in marked("peers", benchmark).splitlines():
         cells = [cell.strip() for cell in line.split("|")[1:-1]]
         if len(cells) > 5 and cells[0] not in ("solver", "---"):
             costs[cells[0]] = (cells[-2], float(cells[-1].replace(",", "")))
@@ -147,8 +147,8 @@ def test_the_comparison_with_others_is_that_of_the_benchmark() -> None:
         found = re.search(words, text)
         assert found
         assert costs.pop(solver)[1] == pytest.approx(int(found[1]), rel=0.15)
-    best = re.search(r"the best other solvers tried, LSODA and DOP853 compiled into the loop, (\d+) times", text)
+    best = re.search(r"SciPy's LSODA over the compiled closed form, some (\d+) times", text)
     assert best
     solver = min(costs, key=lambda name: costs[name][1])
-    assert solver.startswith("numbalsoda ")
+    assert solver == "SciPy LSODA, Numba closed form"
     assert costs[solver][1] == pytest.approx(int(best[1]), rel=0.15)

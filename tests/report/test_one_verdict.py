@@ -11,7 +11,6 @@ import pytest
 
 import boulder_sweep
 from benchmarks.flips import RANGES
-from benchmarks.late import shallow
 from boulder_sweep.answers.placing import placed
 from boulder_sweep.answers.reserves import capacity
 from boulder_sweep.judge.quantiles import at_values
@@ -19,7 +18,7 @@ from boulder_sweep.report import write_explorer
 from boulder_sweep.settings import Sweep
 from boulder_sweep.stones.weighing import scanned
 from tests.answers.designs import bare_need
-from tests.report.test_verdicts import designs
+from tests.report.test_verdicts import designs, shallow
 from tests.stones.shapes import box, written
 
 DESIGNS = 200

@@ -5,7 +5,6 @@ import pandas as pd
 import pytest
 
 import boulder_sweep
-from benchmarks.late import shallow
 from boulder_sweep.report import write_explorer
 
 DESIGNS = 1000
@@ -40,6 +39,34 @@ def designs(path, n=DESIGNS, damper=138.91e3):
         "hood_height_m": np.full(n, 1.4),
     }
     pd.DataFrame(columns).to_parquet(path)
+
+
+def shallow(count, seed):
+    """Draw shallow designs that the truck hits, with the columns of a table of designs."""
+    rng = np.random.default_rng(seed)
+    n = 4 * count
+    H = rng.uniform(1.2, 4.0, n)
+    drawn = pd.DataFrame(
+        {
+            "boulder_length_m": rng.uniform(1.0, 3.0, n),
+            "boulder_width_m": rng.uniform(0.8, 2.5, n),
+            "boulder_height_m": H,
+            "boulder_density_kg_m3": rng.uniform(2400.0, 3074.0, n),
+            "embedment_depth_m": rng.uniform(0.02, 0.35, n) * H,
+            "soil_density_kg_m3": rng.uniform(1520.0, 2240.0, n),
+            "friction_angle_deg": rng.uniform(27.0, 49.0, n),
+            "subgrade_reaction_MN_m3": rng.uniform(10.0, 110.0, n),
+            "strain_rate_factor": rng.uniform(1.0, 1.2, n),
+            "vehicle_mass_kg": rng.uniform(1500.0, 7500.0, n),
+            "impact_speed_m_s": rng.uniform(4.0, 14.0, n),
+            "vehicle_spring_N_m": rng.uniform(1.5e6, 4.0e6, n),
+            "vehicle_damper_N_s_m": rng.uniform(0.9e5, 2.4e5, n),
+            "bumper_height_m": rng.uniform(0.3, 0.55, n),
+            "hood_height_m": rng.uniform(0.8, 1.6, n),
+        }
+    )
+    reached = drawn.boulder_height_m - drawn.embedment_depth_m > drawn.bumper_height_m + 0.3
+    return drawn[reached].head(count).reset_index(drop=True)
 
 
 def judged_by_both(folder, overrides, opened):
