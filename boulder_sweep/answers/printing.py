@@ -92,12 +92,16 @@ Column = tuple[tuple[str, str], Cell]
 
 
 class Screen(NamedTuple):
-    """A table as the terminal and the first sheet of a spreadsheet show it."""
+    """A table as the terminal, the page and the first sheet of a spreadsheet show it."""
 
     columns: list[Column]
     rows: Sequence[Row]
     part: str = ""
     """Which rows these are, where there are more."""
+    signs: Sequence[str] = ()
+    """What the signs of the answers mean."""
+    has_each: bool = True
+    """Whether a row shows every answer that it stands for."""
 
     def lines(self, rest: str) -> list[str]:
         """Return the table as lines, and where the rest is if there is more."""
@@ -247,13 +251,9 @@ def reserve_lines(result: Reserves, units: str = "si") -> list[str]:
 
     It takes the same parameters as `uncertainty_lines`.
     """
-    from boulder_sweep.answers.reserves import RESERVES
-
     screen = reserve_screen(result, units)
     lines = screen.lines(WRITTEN)
-    lines += volume_lines(lines[0])
-    kinds = {row[f"{reserve.word}_found"] for row in screen.rows for reserve in RESERVES}
-    lines += wrapped(words for kind, words in WITHSTOOD.items() if kind in kinds)
+    lines += [*volume_lines(lines[0]), *wrapped(screen.signs)]
     return [*lines, *grade_lines(screen.rows), *foot_lines(result.sweep.model, reasons_in(result.arrow), units)]
 
 
@@ -265,7 +265,9 @@ def reserve_screen(result: Reserves, units: str = "si") -> Screen:
     for key, column, word, _ in RESERVES:
         columns.append((head_of(key.name, units), _format_withstood(key, column, f"{word}_found", units)))
     columns.append((("class,", "simulated"), lambda row: row["simulated_class"] or row["simulated_iso_speed"] or "-"))
-    return _rows_screen(result, [*columns, *volume_columns(units)], units)
+    screen = _rows_screen(result, [*columns, *volume_columns(units)], units)
+    kinds = {row[f"{reserve.word}_found"] for row in screen.rows for reserve in RESERVES}
+    return screen._replace(signs=[words for kind, words in WITHSTOOD.items() if kind in kinds])
 
 
 def _format_withstood(key: Key, column: str, found: str, units: str) -> Cell:
@@ -440,12 +442,11 @@ def need_screen(need: Need, units: str = "si") -> Screen:
     Of more than fit, those come first that pass under the most conditions, and of these the ones that are preferred.
     """
     found, rows = need.recommendation, rows_of(_shown_part(need), units)
-    lines: list[Row] = list(rows)
-    columns = _need_columns(need, units)
+    shown = Screen(_need_columns(need, units), rows)
     alone = need.key.name != BOULDER_MASS.name and not need.seeks_depth
     if found is not None and found.conditions > 1 and need.sweep.table is None and alone:
-        lines, columns = _by_boulder(need, rows, units)
-    count = len(lines)
+        shown = _by_boulder(need, rows, units)
+    lines, count = [*shown.rows], len(shown.rows)
     if is_yard(need):
         lines.sort(key=lambda row: (row["passes_at"] is None, row["passes_at"]))
     elif count > MOST_SHOWN and found is not None:
@@ -453,7 +454,8 @@ def need_screen(need: Need, units: str = "si") -> Screen:
         lines.sort(key=lambda row: (row.get("failing", row["passes_at"] is None), row[least]))
     best = ", the shallowest first" if is_yard(need) else ", the best first" if found else ""
     part = f"{MOST_SHOWN} of {count:,}{best}" if count > MOST_SHOWN else ""
-    return Screen([*([_marker(need, units)] if count > 1 else []), *columns], lines[:MOST_SHOWN], part)
+    columns = [*([_marker(need, units)] if count > 1 else []), *shown.columns]
+    return Screen(columns, lines[:MOST_SHOWN], part, _legend(need), shown.has_each)
 
 
 def is_yard(need: Need) -> bool:
@@ -474,8 +476,8 @@ def yard_lines(need: Need) -> list[str]:
     return [f"{len(serve)} of the {counted(len(rows), 'boulder')} {does} at this site{some}"]
 
 
-def _by_boulder(need: Need, rows: Sequence[Row], units: str) -> tuple[list[Row], list[Column]]:
-    """Return the boulders, each with its rows, and columns: the value that all rows need, and each row's if they fit.
+def _by_boulder(need: Need, rows: Sequence[Row], units: str) -> Screen:
+    """Return a line for each boulder, with columns: the value that all its rows need, and each row's if they fit.
 
     Whoever builds chooses the boulder and its embedment; the other inputs are conditions.
     """
@@ -498,8 +500,9 @@ def _by_boulder(need: Need, rows: Sequence[Row], units: str) -> tuple[list[Row],
     edge.append((("all", head_of(key.name, units)[1]), lambda row: "-" if row["failing"] else answer(row)))
     wide = _across(need, names, boulders[0]["rows"], answer, units)
     if len(table_lines([*edge, *wide], boulders, math.inf)[2]) <= WIDTH:
-        return boulders, [*edge, *wide]
-    return boulders, [*edge, (("passes", f"in, of {count}"), lambda row: str(count - row["failing"]))]
+        return Screen([*edge, *wide], boulders)
+    passes: Column = (("passes", f"in, of {count}"), lambda row: str(count - row["failing"]))
+    return Screen([*edge, passes], boulders, has_each=False)
 
 
 def _across(need: Need, names: Sequence[str], rows: Sequence[Row], cell: Cell, units: str) -> list[Column]:
@@ -529,7 +532,7 @@ def designs_screen(need: Need, units: str = "si") -> Screen:
         named = [Design(found.nearest.rows)]
     boulders: list[Row] = []
     for design in {tuple(one.sizes.values()): one for one in named}.values():
-        rows = [_in_units(row, units) for row in design.rows]
+        rows = [in_units(row, units) for row in design.rows]
         worst = min(rows, key=lambda row: -1.0 if row["margin"] is None else row["margin"])
         most = {spec.name: max(row[spec.name] for row in rows) for spec in (EXCAVATED, BACKFILLED)}
         boulders.append({**worst, **most, "robustness": design.grade, "rows": rows})
@@ -538,17 +541,17 @@ def designs_screen(need: Need, units: str = "si") -> Screen:
     columns: list[Column] = [(("", ""), lambda row: MARK if found.design and row is boulders[0] else "")]
     columns += [(("design", ""), word_of("design_id"))] if need.sweep.table is not None else []
     columns += [(head_of(name, units), number_of(name, units)) for name in SIDES]
-    columns += [(head_of(DEPTH, units), _length(DEPTH)), _mass(units), (("least", "margin"), _margin), GRADE]
+    columns += [(head_of(DEPTH, units), _length(DEPTH)), _mass(units), (("least", "margin"), margin_of), GRADE]
     columns += volume_columns(units)
     first = boulders[0]["rows"]
     table = pa.Table.from_pylist(first)
     names = [name for name in HEADS if varies(need.sweep, table, name)]
     if need.sweep.table is None and 1 < len(first) <= MOST_SHOWN:
-        columns += _across(need, names, first, _margin, units)
+        columns += _across(need, names, first, margin_of, units)
     return Screen(columns, boulders)
 
 
-def _in_units(row: Row, units: str) -> Row:
+def in_units(row: Row, units: str) -> Row:
     """Return a row of a run in some units."""
     sizes = {name: shown_unit(COLUMNS[name].unit, units).size for name in row if name in COLUMNS}
     return {name: value / sizes.get(name, 1.0) if isinstance(value, float) else value for name, value in row.items()}
@@ -642,7 +645,7 @@ def _need_columns(need: Need, units: str) -> list[Column]:
             columns.append((("P(robust)", ""), _chance("p_robust")))
         columns += undecided_columns(need.arrow)
     else:
-        columns.append((("margin", ""), _where_it_passes(_margin)))
+        columns.append((("margin", ""), _where_it_passes(margin_of)))
         columns.append((GRADE[0], lambda row: (row["passes_at"] and row["robustness"]) or "-"))
     return [*columns, *((head, _where_it_passes(cell)) for head, cell in volume_columns(units))]
 
@@ -662,7 +665,8 @@ def _chance(name: str) -> Cell:
     return lambda row: "" if row["passes_at"] is None and not row["p_undecided"] else f"{row[name]:.3f}"
 
 
-def _margin(row: Row) -> str:
+def margin_of(row: Row) -> str:
+    """Return the margin of a row as a cell."""
     return "" if row["margin"] is None else f"{row['margin']:.1%}"
 
 

@@ -21,7 +21,7 @@ from boulder_sweep.answers.outputs import AnswerFile
 from boulder_sweep.answers.reserves import capacity
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report
-from boulder_sweep.report.answers import Measure, answer_of, answers_table
+from boulder_sweep.report.answers import SCREENS, Measure, answer_of, screens
 from boulder_sweep.report.comparison import compare
 from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import load_text
@@ -97,19 +97,14 @@ def test_of_a_question_without_a_recommendation_the_governing_answer_is_named(fi
     assert str(governing[2]).startswith(f" (design {speeds.idxmin()}, margin ")
 
 
-def test_what_has_no_answer_says_why(files: dict[str, Path]) -> None:
-    said = [str(sentence[0]) for sentence in answer_of(read_rows(files["nothing"])).sentences]
-    assert said == [
-        "The boulder does not pass by what was asked, up to where the truck would pass or ride over the boulder."
+def test_what_has_no_answer_says_why(files: dict[str, Path], tmp_path: Path) -> None:
+    bare_need(site(height="2.0 m"), most="speed").write(tmp_path / "speed.parquet")
+    assert answer_of(read_rows(tmp_path / "speed.parquet")).sentences == (("Nothing that was tried passes.",),)
+    assert screens(read_rows(files["nothing"]))["si"].signs == [
+        "blocked: does not pass by what was asked, up to where the truck would pass or ride over the boulder (1 row)"
     ]
     rows = read_rows(files["depth"])
-    found = answers_table(rows)
-    assert found is not None
     table = pq.read_table(files["depth"]).to_pylist()
-    column = found.heads.index("least embedment depth")
-    assert {row[column] for row in found.rows if isinstance(row[column], str)} == {
-        row["found"].replace("_", " ") for row in table if row["passes_at"] is None
-    }
     assert rows.counts() == {
         name: sum(_name(row) == name for row in table) for name in dict.fromkeys(map(_name, table))
     }
@@ -117,24 +112,6 @@ def test_what_has_no_answer_says_why(files: dict[str, Path]) -> None:
 
 def _name(row: dict[str, Any]) -> str:
     return f"fail: {row['found']}" if row["passes_at"] is None else f"pass: {row['robustness']}"
-
-
-def test_the_table_has_every_answer_with_its_inputs(files: dict[str, Path]) -> None:
-    for name, file in files.items():
-        found, table = answers_table(read_rows(file)), pq.read_table(file)
-        if len(table) == 1:
-            assert found is None
-            continue
-        assert found is not None
-        assert len(found.rows) == len(table)
-        assert all(len(row) == len(found.heads) for row in found.rows)
-        if name == "sets":
-            assert [row[found.heads.index("soil")] for row in found.rows] == table["soil"].to_pylist()
-        if name == "capacity":
-            speeds = [row[found.heads.index("withstands speed")] for row in found.rows]
-            assert [part.value for part in speeds if isinstance(part, Measure)] == [
-                value for value in table["withstands_speed_m_s"].to_pylist() if value is not None
-            ]
 
 
 RARELY_OPENED = ("sets", "mass", "speed", "chance", "uncertainty", "nothing")
@@ -148,15 +125,22 @@ def test_the_page_opens_without_a_complaint(files: dict[str, Path], name: str, t
     table = pq.read_table(files[name]).to_pylist()
     assert page.complaints == []
     assert not page.is_visible("#failure")
+    answers = AnswerFile(files[name], ReportError)
+    for units in ("us", "si"):
+        page.select_option("#units", units)
+        screen = SCREENS[answers.kind](answers.answers(), units)
+        lines = [[word for head, _ in screen.columns for word in head]]
+        lines += [[cell(row) for _, cell in screen.columns] for row in screen.rows]
+        shown = page.locator(".answers:visible tr").all_inner_texts()
+        assert [line.split() for line in shown] == [" ".join(line).split() for line in lines]
+        assert page.locator("[data-in]:visible > .wide ~ .hint").all_inner_texts() == screen.signs
     if len(table) > 1:
-        assert page.locator(".answers tbody tr").count() == len(table)
         assert re.match(rf"\d+ of the {len(table)} designs shown pass", page.inner_text("#sweep-words"))
     chosen = page.evaluate("page.data.chosen[0]")
     row = table[chosen["number"]]
     for column in ("embedment_depth_m", "boulder_height_m", "friction_angle_deg", "impact_speed_m_s"):
         assert chosen["inputs"][column] == row[column]
     assert page.inner_text("#chosen0-verdict")[2:].startswith(row["verdict"])
-    page.select_option("#units", "us")
     assert page.complaints == []
 
 
