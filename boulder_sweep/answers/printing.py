@@ -37,7 +37,7 @@ RATIO, DEPTH = EMBEDMENT
 HEIGHT = SIDES[2]
 WIDTH = 80
 MOST_LINES = 40
-"""Most rows of a table of designs; of longer ones evenly spaced rows are shown."""
+"""Most rows of a table of designs."""
 MOST_SHOWN = 16
 """Most rows of the table below a recommendation."""
 HEADS = {
@@ -532,7 +532,7 @@ def designs_screen(need: Need, units: str = "si") -> Screen:
         named = [Design(found.nearest.rows)]
     boulders: list[Row] = []
     for design in {tuple(one.sizes.values()): one for one in named}.values():
-        rows = [in_units(row, units) for row in design.rows]
+        rows = [_in_units(row, units) for row in design.rows]
         worst = min(rows, key=lambda row: -1.0 if row["margin"] is None else row["margin"])
         most = {spec.name: max(row[spec.name] for row in rows) for spec in (EXCAVATED, BACKFILLED)}
         boulders.append({**worst, **most, "robustness": design.grade, "rows": rows})
@@ -541,17 +541,41 @@ def designs_screen(need: Need, units: str = "si") -> Screen:
     columns: list[Column] = [(("", ""), lambda row: MARK if found.design and row is boulders[0] else "")]
     columns += [(("design", ""), word_of("design_id"))] if need.sweep.table is not None else []
     columns += [(head_of(name, units), number_of(name, units)) for name in SIDES]
-    columns += [(head_of(DEPTH, units), _length(DEPTH)), _mass(units), (("least", "margin"), margin_of), GRADE]
+    columns += [(head_of(DEPTH, units), _length(DEPTH)), _mass(units), (("least", "margin"), _margin), GRADE]
     columns += volume_columns(units)
     first = boulders[0]["rows"]
     table = pa.Table.from_pylist(first)
     names = [name for name in HEADS if varies(need.sweep, table, name)]
     if need.sweep.table is None and 1 < len(first) <= MOST_SHOWN:
-        columns += _across(need, names, first, margin_of, units)
+        columns += _across(need, names, first, _margin, units)
     return Screen(columns, boulders)
 
 
-def in_units(row: Row, units: str) -> Row:
+def cases_screen(design: Design, names: Sequence[str], units: str = "si") -> Screen:
+    """Return a design in all its soils and before all its vehicles; the names are what tells these apart."""
+    count, table = len(design.rows), [_in_units(row, units) for row in design.rows[:MOST_LINES]]
+    columns: list[Column] = [
+        (head_of(name, units), number_of(name, units)) if name in HEADS else ((name, ""), word_of(name))
+        for name in names
+    ]
+    columns += [(("rotation", "deg"), _rotation), (("penetration", shown_unit("m", units).unit), _penetration)]
+    if "p_pass" in table[0]:
+        columns.append((("P(pass)", ""), lambda row: f"{row['p_pass']:.4f}"))
+    else:
+        columns += [(("margin", ""), _margin), (GRADE[0], lambda row: row["robustness"] or row["reason"] or "-")]
+    return Screen(columns, table, f"the first {MOST_LINES} of {count:,} cases" if count > MOST_LINES else "")
+
+
+def _rotation(row: Row) -> str:
+    return "-" if row["max_rotation_deg"] is None else f"{row['max_rotation_deg']:.1f}"
+
+
+def _penetration(row: Row) -> str:
+    value = row["penetration_m"]
+    return "-" if value is None else "none" if value <= 0.0 else f"{value:.2f}"
+
+
+def _in_units(row: Row, units: str) -> Row:
     """Return a row of a run in some units."""
     sizes = {name: shown_unit(COLUMNS[name].unit, units).size for name in row if name in COLUMNS}
     return {name: value / sizes.get(name, 1.0) if isinstance(value, float) else value for name, value in row.items()}
@@ -645,7 +669,7 @@ def _need_columns(need: Need, units: str) -> list[Column]:
             columns.append((("P(robust)", ""), _chance("p_robust")))
         columns += undecided_columns(need.arrow)
     else:
-        columns.append((("margin", ""), _where_it_passes(margin_of)))
+        columns.append((("margin", ""), _where_it_passes(_margin)))
         columns.append((GRADE[0], lambda row: (row["passes_at"] and row["robustness"]) or "-"))
     return [*columns, *((head, _where_it_passes(cell)) for head, cell in volume_columns(units))]
 
@@ -665,8 +689,7 @@ def _chance(name: str) -> Cell:
     return lambda row: "" if row["passes_at"] is None and not row["p_undecided"] else f"{row[name]:.3f}"
 
 
-def margin_of(row: Row) -> str:
-    """Return the margin of a row as a cell."""
+def _margin(row: Row) -> str:
     return "" if row["margin"] is None else f"{row['margin']:.1%}"
 
 

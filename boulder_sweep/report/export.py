@@ -18,14 +18,7 @@ import numpy as np
 from boulder_sweep.answers.advice import advice
 from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.outputs import NEED, AnswerFile, kind_of, result_of
-from boulder_sweep.answers.printing import (
-    MARK,
-    Screen,
-    designs_screen,
-    title,
-    wrapped,
-    yard_lines,
-)
+from boulder_sweep.answers.printing import MARK, Screen, designs_screen, title, wrapped, yard_lines
 from boulder_sweep.columns import BOULDER_MASS, BY_NAME, DESIGN_ID
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.quantities import NEEDED, QUANTITIES, quantities_by

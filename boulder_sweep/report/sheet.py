@@ -5,7 +5,7 @@ Sentences that hold units are made in both systems; numbers are `Measure`, which
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,17 +13,7 @@ import numpy as np
 from boulder_kernels.rules import ISLAND_RATIO, ISLAND_SLIDE
 from boulder_sweep.answers.advice import advice, question
 from boulder_sweep.answers.need import Need
-from boulder_sweep.answers.printing import (
-    HEADS,
-    MOST_LINES,
-    Column,
-    Screen,
-    head_of,
-    in_units,
-    margin_of,
-    number_of,
-    word_of,
-)
+from boulder_sweep.answers.printing import Screen, cases_screen
 from boulder_sweep.answers.recommendation import Design
 from boulder_sweep.columns import BOULDER_MASS, SHAPES, TO_BUILD
 from boulder_sweep.judge.robustness import meaning_of
@@ -33,7 +23,7 @@ from boulder_sweep.report.figures import Sketch, sketch_of
 from boulder_sweep.report.rows import DEPTH, ResultRows, inputs_of
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import ProfilePoint
-from boulder_sweep.settings.units import SYSTEMS, quantity_text, shown_unit
+from boulder_sweep.settings.units import SYSTEMS, quantity_text
 from boulder_sweep.stones.taped import taped_profiles
 from boulder_sweep.views.wording import ground_words
 
@@ -130,7 +120,7 @@ def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
         soil=_inputs(design.rows, SOIL, settings),
         vehicle=_inputs(design.rows, VEHICLE, settings),
         grade=opinion if "p_pass" not in row else DRAWN if row.get("p_robust") is not None else NOT_ASKED,
-        cases={system: _cases(design.rows, [*named, *several], system) for system in SYSTEMS if len(design.rows) > 1},
+        cases={one: cases_screen(design, [*named, *several], one) for one in SYSTEMS if len(design.rows) > 1},
     )
 
 
@@ -193,14 +183,10 @@ def _checks(
 
 def _outcome(row: Mapping[str, Any], name: str, unit: str) -> Cell:
     """Return an outcome of a row; of a cargo bed that stays before the boulder, that it does not penetrate."""
-    if name == "penetration_m" and _is_short(row):
+    value = row[name]
+    if name == "penetration_m" and value is not None and value <= 0.0:
         return "none"
-    return "–" if row[name] is None else Measure(row[name], unit)
-
-
-def _is_short(row: Mapping[str, Any]) -> bool:
-    """Whether the cargo bed stays before the boulder."""
-    return row["penetration_m"] is not None and row["penetration_m"] <= 0.0
+    return "–" if value is None else Measure(value, unit)
 
 
 def _build(rows: ResultRows, row: Mapping[str, Any], design: Design) -> tuple[tuple[str, Cell], ...]:
@@ -271,26 +257,3 @@ def _spread(own: Mapping[str, Any]) -> str:
     if own.get("cov") is not None:
         return f"cov {100.0 * own['cov']:.0f} %"
     return f"sd {own['sd']:.3g}" if own.get("sd") is not None else str(own.get("kind", "uncertain"))
-
-
-def _cases(cases: Sequence[Mapping[str, Any]], names: Sequence[str], units: str) -> Screen:
-    """Return a design in all its cases as a table."""
-    columns: list[Column] = [
-        (head_of(name, units), number_of(name, units)) if name in HEADS else ((name, ""), word_of(name))
-        for name in names
-    ]
-    columns.append((("rotation", "deg"), _number_in("max_rotation_deg", ".1f")))
-    far = _number_in("penetration_m", ".2f")
-    columns.append((("penetration", shown_unit("m", units).unit), lambda row: "none" if _is_short(row) else far(row)))
-    if "p_pass" in cases[0]:
-        columns.append((("P(pass)", ""), _number_in("p_pass", ".4f")))
-    else:
-        columns.append((("margin", ""), margin_of))
-        columns.append((("second", "opinion"), lambda row: row["robustness"] or row["reason"] or "-"))
-    part = f"the first {MOST_LINES} of {len(cases):,} cases" if len(cases) > MOST_LINES else ""
-    return Screen(columns, [in_units(row, units) for row in cases[:MOST_LINES]], part)
-
-
-def _number_in(name: str, digits: str) -> Callable[[Mapping[str, Any]], str]:
-    """Return a formatter for a number of a row."""
-    return lambda row: "-" if row[name] is None else f"{row[name]:{digits}}"

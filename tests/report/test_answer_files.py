@@ -6,7 +6,6 @@ import json
 import random
 import re
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +27,7 @@ from boulder_sweep.settings import load_text
 from boulder_sweep.store.provenance import settings_sha256
 from tests.answers.designs import bare_need, site
 from tests.conftest import Command
-from tests.report.conftest import SETS
+from tests.report.conftest import OTHER_VALUES, SETS, places, put
 
 RATIOS = "embedment_ratio: {from: 0.5, to: 0.8, count: 4}"
 UNCERTAIN = {"friction": "{mean: [36, 40] deg, cov: 5 %}", "site": "embedment_depth: 2.2 m"}
@@ -249,35 +248,20 @@ def test_more_rows_than_designs_are_refused(files: dict[str, Path], tmp_path: Pa
         AnswerFile(tmp_path / "twice.parquet", ReportError)
 
 
-OTHER_VALUES = (None, True, -1, 0, 1.5, 1e300, 10**30, "", "x", "table", [], ["x"], [1, "a"], {}, {"a": 1}, "gone")
 PARSED = ("settings", "control", "readings", "versions", "accuracy", "question")
-
-
-def places(tree: Any, above: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:
-    """Every place of plain data; of lists the first two items."""
-    keys = tree if isinstance(tree, dict) else range(min(len(tree), 2)) if isinstance(tree, list) else ()
-    for key in keys:
-        yield (*above, key)
-        yield from places(tree[key], (*above, key))
 
 
 def changed(table: pa.Table, chance: random.Random) -> tuple[pa.Table, str]:
     """Return answers with one place of their settings changed, and their hash made right again; and which place."""
     keys = [name for name in PARSED if f"boulder_sweep.{name}".encode() in table.schema.metadata]
     parts = {name: json.loads(table.schema.metadata[f"boulder_sweep.{name}".encode()]) for name in keys}
-    *above, last = chance.choice([place for place in places(parts) if len(place) > 1])
-    inner: Any = parts
-    for key in above:
-        inner = inner[key]
+    place = chance.choice([place for place in places(parts) if len(place) > 1])
     value = chance.choice(OTHER_VALUES)
-    if value == "gone":
-        del inner[last]
-    else:
-        inner[last] = value
+    put(parts, place, value)
     metadata = dict(table.schema.metadata)
     metadata |= {f"boulder_sweep.{name}".encode(): json.dumps(part).encode() for name, part in parts.items()}
     metadata[b"boulder_sweep.settings_sha256"] = settings_sha256(parts["settings"]).encode()
-    return table.replace_schema_metadata(metadata), f"{[*above, last]}: {value!r}"
+    return table.replace_schema_metadata(metadata), f"{place}: {value!r}"
 
 
 @pytest.mark.parametrize("many", [pytest.param(6, id="some"), pytest.param(120, id="many", marks=pytest.mark.nightly)])
