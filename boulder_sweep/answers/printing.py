@@ -37,7 +37,7 @@ RATIO, DEPTH = EMBEDMENT
 HEIGHT = SIDES[2]
 WIDTH = 80
 MOST_LINES = 40
-"""Most rows of a table of designs; of longer ones evenly spaced rows are shown."""
+"""Most rows of a table of designs."""
 MOST_SHOWN = 16
 """Most rows of the table below a recommendation."""
 HEADS = {
@@ -92,12 +92,16 @@ Column = tuple[tuple[str, str], Cell]
 
 
 class Screen(NamedTuple):
-    """A table as the terminal and the first sheet of a spreadsheet show it."""
+    """A table as the terminal, the page and the first sheet of a spreadsheet show it."""
 
     columns: list[Column]
     rows: Sequence[Row]
     part: str = ""
     """Which rows these are, where there are more."""
+    signs: Sequence[str] = ()
+    """What the signs of the answers mean."""
+    has_each: bool = True
+    """Whether a row shows every answer that it stands for."""
 
     def lines(self, rest: str) -> list[str]:
         """Return the table as lines, and where the rest is if there is more."""
@@ -247,13 +251,9 @@ def reserve_lines(result: Reserves, units: str = "si") -> list[str]:
 
     It takes the same parameters as `uncertainty_lines`.
     """
-    from boulder_sweep.answers.reserves import RESERVES
-
     screen = reserve_screen(result, units)
     lines = screen.lines(WRITTEN)
-    lines += volume_lines(lines[0])
-    kinds = {row[f"{reserve.word}_found"] for row in screen.rows for reserve in RESERVES}
-    lines += wrapped(words for kind, words in WITHSTOOD.items() if kind in kinds)
+    lines += [*volume_lines(lines[0]), *wrapped(screen.signs)]
     return [*lines, *grade_lines(screen.rows), *foot_lines(result.sweep.model, reasons_in(result.arrow), units)]
 
 
@@ -265,7 +265,9 @@ def reserve_screen(result: Reserves, units: str = "si") -> Screen:
     for key, column, word, _ in RESERVES:
         columns.append((head_of(key.name, units), _format_withstood(key, column, f"{word}_found", units)))
     columns.append((("class,", "simulated"), lambda row: row["simulated_class"] or row["simulated_iso_speed"] or "-"))
-    return _rows_screen(result, [*columns, *volume_columns(units)], units)
+    screen = _rows_screen(result, [*columns, *volume_columns(units)], units)
+    kinds = {row[f"{reserve.word}_found"] for row in screen.rows for reserve in RESERVES}
+    return screen._replace(signs=[words for kind, words in WITHSTOOD.items() if kind in kinds])
 
 
 def _format_withstood(key: Key, column: str, found: str, units: str) -> Cell:
@@ -440,12 +442,11 @@ def need_screen(need: Need, units: str = "si") -> Screen:
     Of more than fit, those come first that pass under the most conditions, and of these the ones that are preferred.
     """
     found, rows = need.recommendation, rows_of(_shown_part(need), units)
-    lines: list[Row] = list(rows)
-    columns = _need_columns(need, units)
+    shown = Screen(_need_columns(need, units), rows)
     alone = need.key.name != BOULDER_MASS.name and not need.seeks_depth
     if found is not None and found.conditions > 1 and need.sweep.table is None and alone:
-        lines, columns = _by_boulder(need, rows, units)
-    count = len(lines)
+        shown = _by_boulder(need, rows, units)
+    lines, count = [*shown.rows], len(shown.rows)
     if is_yard(need):
         lines.sort(key=lambda row: (row["passes_at"] is None, row["passes_at"]))
     elif count > MOST_SHOWN and found is not None:
@@ -453,7 +454,8 @@ def need_screen(need: Need, units: str = "si") -> Screen:
         lines.sort(key=lambda row: (row.get("failing", row["passes_at"] is None), row[least]))
     best = ", the shallowest first" if is_yard(need) else ", the best first" if found else ""
     part = f"{MOST_SHOWN} of {count:,}{best}" if count > MOST_SHOWN else ""
-    return Screen([*([_marker(need, units)] if count > 1 else []), *columns], lines[:MOST_SHOWN], part)
+    columns = [*([_marker(need, units)] if count > 1 else []), *shown.columns]
+    return Screen(columns, lines[:MOST_SHOWN], part, _legend(need), shown.has_each)
 
 
 def is_yard(need: Need) -> bool:
@@ -474,8 +476,8 @@ def yard_lines(need: Need) -> list[str]:
     return [f"{len(serve)} of the {counted(len(rows), 'boulder')} {does} at this site{some}"]
 
 
-def _by_boulder(need: Need, rows: Sequence[Row], units: str) -> tuple[list[Row], list[Column]]:
-    """Return the boulders, each with its rows, and columns: the value that all rows need, and each row's if they fit.
+def _by_boulder(need: Need, rows: Sequence[Row], units: str) -> Screen:
+    """Return a line for each boulder, with columns: the value that all its rows need, and each row's if they fit.
 
     Whoever builds chooses the boulder and its embedment; the other inputs are conditions.
     """
@@ -498,8 +500,9 @@ def _by_boulder(need: Need, rows: Sequence[Row], units: str) -> tuple[list[Row],
     edge.append((("all", head_of(key.name, units)[1]), lambda row: "-" if row["failing"] else answer(row)))
     wide = _across(need, names, boulders[0]["rows"], answer, units)
     if len(table_lines([*edge, *wide], boulders, math.inf)[2]) <= WIDTH:
-        return boulders, [*edge, *wide]
-    return boulders, [*edge, (("passes", f"in, of {count}"), lambda row: str(count - row["failing"]))]
+        return Screen([*edge, *wide], boulders)
+    passes: Column = (("passes", f"in, of {count}"), lambda row: str(count - row["failing"]))
+    return Screen([*edge, passes], boulders, has_each=False)
 
 
 def _across(need: Need, names: Sequence[str], rows: Sequence[Row], cell: Cell, units: str) -> list[Column]:
@@ -546,6 +549,30 @@ def designs_screen(need: Need, units: str = "si") -> Screen:
     if need.sweep.table is None and 1 < len(first) <= MOST_SHOWN:
         columns += _across(need, names, first, _margin, units)
     return Screen(columns, boulders)
+
+
+def cases_screen(design: Design, names: Sequence[str], units: str = "si") -> Screen:
+    """Return a design in all its soils and before all its vehicles; the names are what tells these apart."""
+    count, table = len(design.rows), [_in_units(row, units) for row in design.rows[:MOST_LINES]]
+    columns: list[Column] = [
+        (head_of(name, units), number_of(name, units)) if name in HEADS else ((name, ""), word_of(name))
+        for name in names
+    ]
+    columns += [(("rotation", "deg"), _rotation), (("penetration", shown_unit("m", units).unit), _penetration)]
+    if "p_pass" in table[0]:
+        columns.append((("P(pass)", ""), lambda row: f"{row['p_pass']:.4f}"))
+    else:
+        columns += [(("margin", ""), _margin), (GRADE[0], lambda row: row["robustness"] or row["reason"] or "-")]
+    return Screen(columns, table, f"the first {MOST_LINES} of {count:,} cases" if count > MOST_LINES else "")
+
+
+def _rotation(row: Row) -> str:
+    return "-" if row["max_rotation_deg"] is None else f"{row['max_rotation_deg']:.1f}"
+
+
+def _penetration(row: Row) -> str:
+    value = row["penetration_m"]
+    return "-" if value is None else "none" if value <= 0.0 else f"{value:.2f}"
 
 
 def _in_units(row: Row, units: str) -> Row:

@@ -17,18 +17,8 @@ import numpy as np
 
 from boulder_sweep.answers.advice import advice
 from boulder_sweep.answers.need import Need
-from boulder_sweep.answers.outputs import CAPACITY, NEED, UNCERTAINTY, AnswerFile, kind_of, result_of
-from boulder_sweep.answers.printing import (
-    MARK,
-    Screen,
-    designs_screen,
-    need_screen,
-    reserve_screen,
-    title,
-    uncertainty_screen,
-    wrapped,
-    yard_lines,
-)
+from boulder_sweep.answers.outputs import NEED, AnswerFile, kind_of, result_of
+from boulder_sweep.answers.printing import MARK, Screen, designs_screen, title, wrapped, yard_lines
 from boulder_sweep.columns import BOULDER_MASS, BY_NAME, DESIGN_ID
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.quantities import NEEDED, QUANTITIES, quantities_by
@@ -357,16 +347,18 @@ def _ordered(finished: Exportable, units: str) -> list[ShownColumn]:
 
 def _answer(location: Location, finished: Exportable, units: str) -> tuple[list[str], Screen]:
     """Return what the terminal says of answers, or the page of a run; nothing of a time history."""
+    from boulder_sweep.report.answers import SCREENS, answer_of  # loads the kernels
+    from boulder_sweep.report.rows import read_rows
+
     if isinstance(finished, AnswerFile):
-        answers = finished.answers() if finished.kind else None
+        if not finished.kind:
+            return [], Screen([], [])
+        answers, said = finished.answers(), list[str]()
         if isinstance(answers, Need):
-            return [*(advice(answers, units) or [title(answers)]), *yard_lines(answers)], need_screen(answers, units)
-        screens: dict[str, Callable[..., Screen]] = {UNCERTAINTY: uncertainty_screen, CAPACITY: reserve_screen}
-        return [], Screen([], []) if answers is None else screens[finished.kind](answers, units)
+            said = [*(advice(answers, units) or [title(answers)]), *yard_lines(answers)]
+        return said, SCREENS[finished.kind](answers, units)
     if not finished.rows_done:
         return ["No design is computed yet."], Screen([], [])
-    from boulder_sweep.report.answers import answer_of  # loads the kernels
-    from boulder_sweep.report.rows import read_rows
 
     answer = answer_of(read_rows(location, finished))
     counts = ["".join(map(str, sentence)) for sentence in answer.sentences]

@@ -48,13 +48,14 @@ from boulder_sweep.text import script_data
 from boulder_sweep.views.wording import LAW_WORDS, REASON_WORDS, ground_words
 
 if TYPE_CHECKING:
-    from boulder_sweep.report.answers import AnswerTable, Sentence
+    from boulder_sweep.answers.printing import Screen
+    from boulder_sweep.report.answers import Sentence
     from boulder_sweep.report.sheet import Sheet
 
 ASSETS = Path(__file__).with_name("assets")
 SCRIPTS = ("kernel", "simulator", "controls", "plots", "scene", "page")
 """Our own script, in this order."""
-NOTHING: Mapping[str, str] = {}
+NOTHING: Mapping[str, Any] = {}
 UNPRINTED = ("derived", "judged_at", "report")
 """Parts of the settings that are not printed: the document says them in words, or draws them."""
 MAIN = (
@@ -114,7 +115,7 @@ def assembled(
     start: Mapping[str, float],
     sheet: Sheet | None = None,
     sentences: Sequence[Sentence] = (),
-    answers: AnswerTable | None = None,
+    answers: Mapping[str, Screen] = NOTHING,
     rows: ResultRows | None = None,
     chosen: Sequence[Mapping[str, Any]] = (),
     facts: Sequence[tuple[str, str]],
@@ -137,7 +138,7 @@ def assembled(
     sentences
         What else there is to say of it.
     answers
-        The answers one by one, of a file of them.
+        The answers by system of units, of a file of them.
     rows
         Rows of a result; None for a single design.
     chosen
@@ -201,7 +202,7 @@ def assembled(
         chosen=data["chosen"],
         thinned=kept.words if kept is not None else None,
         mapped=mapped,
-        said=rows is None or sheet is None or not mapped or _is_listed(rows, sheet, answers),
+        said=rows is None or sheet is None or not mapped or _is_listed(rows, sheet, answers.get("si")),
         facts=facts,
         notes=[*notes],
         heading=heading,
@@ -224,11 +225,11 @@ def assembled(
     )
 
 
-def _is_listed(rows: ResultRows, sheet: Sheet, answers: AnswerTable | None) -> bool:
+def _is_listed(rows: ResultRows, sheet: Sheet, answers: Screen | None) -> bool:
     """Whether every row of a result is in a table, so that a map of them says nothing on paper."""
     if answers is not None:
-        return not answers.left_out
-    return sheet.cases is not None and len(sheet.cases.rows) == len(rows.codes)
+        return answers.has_each and not answers.part
+    return "si" in sheet.cases and len(sheet.cases["si"].rows) == len(rows.codes)
 
 
 def _css_text(text: str) -> str:

@@ -13,13 +13,14 @@ import numpy as np
 from boulder_kernels.rules import ISLAND_RATIO, ISLAND_SLIDE
 from boulder_sweep.answers.advice import advice, question
 from boulder_sweep.answers.need import Need
+from boulder_sweep.answers.printing import Screen, cases_screen
 from boulder_sweep.answers.recommendation import Design
 from boulder_sweep.columns import BOULDER_MASS, SHAPES, TO_BUILD
 from boulder_sweep.judge.robustness import meaning_of
 from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
-from boulder_sweep.report.answers import Answer, AnswerTable, Measure
+from boulder_sweep.report.answers import Answer, Measure
 from boulder_sweep.report.figures import Sketch, sketch_of
-from boulder_sweep.report.rows import DEPTH, ResultRows, inputs_of, label_of
+from boulder_sweep.report.rows import DEPTH, ResultRows, inputs_of
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import ProfilePoint
 from boulder_sweep.settings.units import SYSTEMS, quantity_text
@@ -50,8 +51,6 @@ DRAWN = (
     "asked of every design that was drawn at random; the share of robust passes stands among the checks",
 )
 """Grade and note of a design with a probability of a robust pass."""
-MOST_CASES = 40
-"""Most cases of soil and vehicle that are listed."""
 Cell = str | Measure
 
 
@@ -85,8 +84,8 @@ class Sheet(NamedTuple):
     """Name, value and source of each input."""
     grade: tuple[str, str]
     """Grade of the recommended design over all cases, and its meaning."""
-    cases: AnswerTable | None
-    """The recommended design in every soil and before every vehicle."""
+    cases: dict[str, Screen]
+    """The recommended design in every soil and before every vehicle, by system of units; empty where there is one."""
 
 
 def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
@@ -121,7 +120,7 @@ def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
         soil=_inputs(design.rows, SOIL, settings),
         vehicle=_inputs(design.rows, VEHICLE, settings),
         grade=opinion if "p_pass" not in row else DRAWN if row.get("p_robust") is not None else NOT_ASKED,
-        cases=_cases(design.rows, [*named, *several]) if len(design.rows) > 1 else None,
+        cases={one: cases_screen(design, [*named, *several], one) for one in SYSTEMS if len(design.rows) > 1},
     )
 
 
@@ -258,20 +257,3 @@ def _spread(own: Mapping[str, Any]) -> str:
     if own.get("cov") is not None:
         return f"cov {100.0 * own['cov']:.0f} %"
     return f"sd {own['sd']:.3g}" if own.get("sd") is not None else str(own.get("kind", "uncertain"))
-
-
-def _cases(cases: Sequence[Mapping[str, Any]], names: Sequence[str]) -> AnswerTable:
-    """Return a design in all its cases as a table."""
-    outcomes = [("max_rotation_deg", "rotation", "deg"), ("penetration_m", "penetration", "m")]
-    heads = [label_of(name) for name in names] + [head for _, head, _ in outcomes]
-    chance = "p_pass" in cases[0]
-    heads += ["P(pass)"] if chance else ["margin", "second opinion"]
-    lines = []
-    for row in cases[:MOST_CASES]:
-        line: list[Cell] = [row[n] if isinstance(row[n], str) else Measure(row[n], BY_NAME[n].unit) for n in names]
-        line += [_outcome(row, name, unit) for name, _, unit in outcomes]
-        margin = "–" if row["margin"] is None else f"{row['margin']:.1%}"
-        line += [f"{row['p_pass']:.1%}"] if chance else [margin, row["robustness"] or row["reason"] or "–"]
-        lines.append(tuple(line))
-    left = f"the first {MOST_CASES} of {len(cases):,} cases" if len(cases) > MOST_CASES else ""
-    return AnswerTable(tuple(heads), tuple(lines), left)

@@ -19,7 +19,7 @@ from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.accuracy import accuracy_of, control_of, readings_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import Location, location_of, replacing
-from boulder_sweep.report.answers import NamedDesign, answer_of, answers_table
+from boulder_sweep.report.answers import NamedDesign, answer_of, screens
 from boulder_sweep.report.build import kernel
 from boulder_sweep.report.rows import MOST_ELEMENTS, inputs_of, read_rows
 from boulder_sweep.settings import Sweep
@@ -137,7 +137,7 @@ def write_report(
         start=chosen[0]["inputs"],
         sheet=sheet_of(rows, answer, units),
         sentences=answer.sentences,
-        answers=answers_table(rows),
+        answers=screens(rows),
         rows=rows,
         chosen=chosen,
         facts=_facts(identity, command, str(out)),

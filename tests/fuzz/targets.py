@@ -29,7 +29,7 @@ import boulder_sweep
 from boulder_sweep.answers.outputs import AnswerFile
 from boulder_sweep.answers.reserves import capacity
 from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning, ReportError
-from boulder_sweep.report.answers import answer_of, answers_table
+from boulder_sweep.report.answers import answer_of, screens
 from boulder_sweep.report.comparison import compare
 from boulder_sweep.report.export import export
 from boulder_sweep.report.rows import read_rows
@@ -294,7 +294,7 @@ def described(path: Path) -> None:
     """Read what the page of a report says."""
     rows = read_rows(path)
     answer_of(rows)
-    answers_table(rows)
+    screens(rows)
 
 
 def with_column(table: pa.Table, name: str, value: Any) -> pa.Table:

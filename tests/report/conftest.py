@@ -1,5 +1,8 @@
 """A result, its report, and a browser that opens pages from disk with every way to the network closed."""
 
+from collections.abc import Iterator
+from typing import Any
+
 import pytest
 
 import boulder_sweep
@@ -36,6 +39,29 @@ boulder: {length: 1.65 m, width: 1.68 m, density: 2600 kg/m^3}
 soil: {density: 1860 kg/m^3, subgrade_reaction: 60 MN/m^3}
 vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*s/m}
 """
+
+
+OTHER_VALUES = (None, True, -1, 0, 1.5, 1e300, 10**30, "", "x", "table", [], ["x"], [1, "a"], {}, {"a": 1}, "gone")
+"""What stands in a damaged place of a file; `gone` takes the place away."""
+
+
+def places(tree: Any, above: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:
+    """Every place of plain data; of lists the first two items."""
+    keys = tree if isinstance(tree, dict) else range(min(len(tree), 2)) if isinstance(tree, list) else ()
+    for key in keys:
+        yield (*above, key)
+        yield from places(tree[key], (*above, key))
+
+
+def put(tree: Any, place: tuple[str | int, ...], value: Any) -> None:
+    """Put another value in a place of plain data."""
+    *above, last = place
+    for key in above:
+        tree = tree[key]
+    if value == "gone":
+        del tree[last]
+    else:
+        tree[last] = value
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,6 @@ import json
 import random
 import re
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +20,14 @@ from boulder_sweep.answers.outputs import AnswerFile
 from boulder_sweep.answers.reserves import capacity
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report
-from boulder_sweep.report.answers import Measure, answer_of, answers_table
+from boulder_sweep.report.answers import SCREENS, Measure, answer_of, screens
 from boulder_sweep.report.comparison import compare
 from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import load_text
 from boulder_sweep.store.provenance import settings_sha256
 from tests.answers.designs import bare_need, site
 from tests.conftest import Command
-from tests.report.conftest import SETS
+from tests.report.conftest import OTHER_VALUES, SETS, places, put
 
 RATIOS = "embedment_ratio: {from: 0.5, to: 0.8, count: 4}"
 UNCERTAIN = {"friction": "{mean: [36, 40] deg, cov: 5 %}", "site": "embedment_depth: 2.2 m"}
@@ -97,19 +96,14 @@ def test_of_a_question_without_a_recommendation_the_governing_answer_is_named(fi
     assert str(governing[2]).startswith(f" (design {speeds.idxmin()}, margin ")
 
 
-def test_what_has_no_answer_says_why(files: dict[str, Path]) -> None:
-    said = [str(sentence[0]) for sentence in answer_of(read_rows(files["nothing"])).sentences]
-    assert said == [
-        "The boulder does not pass by what was asked, up to where the truck would pass or ride over the boulder."
+def test_what_has_no_answer_says_why(files: dict[str, Path], tmp_path: Path) -> None:
+    bare_need(site(height="2.0 m"), most="speed").write(tmp_path / "speed.parquet")
+    assert answer_of(read_rows(tmp_path / "speed.parquet")).sentences == (("Nothing that was tried passes.",),)
+    assert screens(read_rows(files["nothing"]))["si"].signs == [
+        "blocked: does not pass by what was asked, up to where the truck would pass or ride over the boulder (1 row)"
     ]
     rows = read_rows(files["depth"])
-    found = answers_table(rows)
-    assert found is not None
     table = pq.read_table(files["depth"]).to_pylist()
-    column = found.heads.index("least embedment depth")
-    assert {row[column] for row in found.rows if isinstance(row[column], str)} == {
-        row["found"].replace("_", " ") for row in table if row["passes_at"] is None
-    }
     assert rows.counts() == {
         name: sum(_name(row) == name for row in table) for name in dict.fromkeys(map(_name, table))
     }
@@ -117,24 +111,6 @@ def test_what_has_no_answer_says_why(files: dict[str, Path]) -> None:
 
 def _name(row: dict[str, Any]) -> str:
     return f"fail: {row['found']}" if row["passes_at"] is None else f"pass: {row['robustness']}"
-
-
-def test_the_table_has_every_answer_with_its_inputs(files: dict[str, Path]) -> None:
-    for name, file in files.items():
-        found, table = answers_table(read_rows(file)), pq.read_table(file)
-        if len(table) == 1:
-            assert found is None
-            continue
-        assert found is not None
-        assert len(found.rows) == len(table)
-        assert all(len(row) == len(found.heads) for row in found.rows)
-        if name == "sets":
-            assert [row[found.heads.index("soil")] for row in found.rows] == table["soil"].to_pylist()
-        if name == "capacity":
-            speeds = [row[found.heads.index("withstands speed")] for row in found.rows]
-            assert [part.value for part in speeds if isinstance(part, Measure)] == [
-                value for value in table["withstands_speed_m_s"].to_pylist() if value is not None
-            ]
 
 
 RARELY_OPENED = ("sets", "mass", "speed", "chance", "uncertainty", "nothing")
@@ -148,15 +124,22 @@ def test_the_page_opens_without_a_complaint(files: dict[str, Path], name: str, t
     table = pq.read_table(files[name]).to_pylist()
     assert page.complaints == []
     assert not page.is_visible("#failure")
+    answers = AnswerFile(files[name], ReportError)
+    for units in ("us", "si"):
+        page.select_option("#units", units)
+        screen = SCREENS[answers.kind](answers.answers(), units)
+        lines = [[word for head, _ in screen.columns for word in head]]
+        lines += [[cell(row) for _, cell in screen.columns] for row in screen.rows]
+        shown = page.locator(".answers:visible tr").all_inner_texts()
+        assert [line.split() for line in shown] == [" ".join(line).split() for line in lines]
+        assert page.locator("[data-in]:visible > .wide ~ .hint").all_inner_texts() == screen.signs
     if len(table) > 1:
-        assert page.locator(".answers tbody tr").count() == len(table)
         assert re.match(rf"\d+ of the {len(table)} designs shown pass", page.inner_text("#sweep-words"))
     chosen = page.evaluate("page.data.chosen[0]")
     row = table[chosen["number"]]
     for column in ("embedment_depth_m", "boulder_height_m", "friction_angle_deg", "impact_speed_m_s"):
         assert chosen["inputs"][column] == row[column]
     assert page.inner_text("#chosen0-verdict")[2:].startswith(row["verdict"])
-    page.select_option("#units", "us")
     assert page.complaints == []
 
 
@@ -265,35 +248,20 @@ def test_more_rows_than_designs_are_refused(files: dict[str, Path], tmp_path: Pa
         AnswerFile(tmp_path / "twice.parquet", ReportError)
 
 
-OTHER_VALUES = (None, True, -1, 0, 1.5, 1e300, 10**30, "", "x", "table", [], ["x"], [1, "a"], {}, {"a": 1}, "gone")
 PARSED = ("settings", "control", "readings", "versions", "accuracy", "question")
-
-
-def places(tree: Any, above: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:
-    """Every place of plain data; of lists the first two items."""
-    keys = tree if isinstance(tree, dict) else range(min(len(tree), 2)) if isinstance(tree, list) else ()
-    for key in keys:
-        yield (*above, key)
-        yield from places(tree[key], (*above, key))
 
 
 def changed(table: pa.Table, chance: random.Random) -> tuple[pa.Table, str]:
     """Return answers with one place of their settings changed, and their hash made right again; and which place."""
     keys = [name for name in PARSED if f"boulder_sweep.{name}".encode() in table.schema.metadata]
     parts = {name: json.loads(table.schema.metadata[f"boulder_sweep.{name}".encode()]) for name in keys}
-    *above, last = chance.choice([place for place in places(parts) if len(place) > 1])
-    inner: Any = parts
-    for key in above:
-        inner = inner[key]
+    place = chance.choice([place for place in places(parts) if len(place) > 1])
     value = chance.choice(OTHER_VALUES)
-    if value == "gone":
-        del inner[last]
-    else:
-        inner[last] = value
+    put(parts, place, value)
     metadata = dict(table.schema.metadata)
     metadata |= {f"boulder_sweep.{name}".encode(): json.dumps(part).encode() for name, part in parts.items()}
     metadata[b"boulder_sweep.settings_sha256"] = settings_sha256(parts["settings"]).encode()
-    return table.replace_schema_metadata(metadata), f"{[*above, last]}: {value!r}"
+    return table.replace_schema_metadata(metadata), f"{place}: {value!r}"
 
 
 @pytest.mark.parametrize("many", [pytest.param(6, id="some"), pytest.param(120, id="many", marks=pytest.mark.nightly)])

@@ -15,7 +15,7 @@ from boulder_sweep.answers.advice import advice
 from boulder_sweep.answers.outputs import AnswerFile
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report
-from boulder_sweep.report.answers import answer_of, answers_table
+from boulder_sweep.report.answers import answer_of, screens
 from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import load_text
 from boulder_sweep.store.provenance import sha256_of
@@ -75,12 +75,11 @@ def test_one_design_has_its_interval_and_what_decides(tmp_path: Path) -> None:
     found = boulder_sweep.uncertainty(one, half_width=0.1)
     found.write(tmp_path / "one.parquet")
     row = found.frame.iloc[0]
-    table = answers_table(read_rows(tmp_path / "one.parquet"))
-    assert table is not None
-    shown = dict(zip(table.heads, table.rows[0], strict=True))
-    chances = {"P(pass)": row.p_pass, "from": row.p_pass_low, "to": row.p_pass_high}
-    assert {name: shown[name] for name in chances} == {name: f"{chance:.1%}" for name, chance in chances.items()}
-    assert shown["decided by"] == "soil.friction_angle"
+    screen = screens(read_rows(tmp_path / "one.parquet"))["si"]
+    heads, shown = zip(*((head[0], cell(screen.rows[0])) for head, cell in screen.columns), strict=True)
+    begin = heads.index("P(pass)")
+    assert shown[begin : begin + 3] == tuple(f"{one:.4f}" for one in (row.p_pass, row.p_pass_low, row.p_pass_high))
+    assert shown[heads.index("decided")] == "soil.friction_angle"
 
 
 def test_no_design_may_be_safe(tmp_path: Path) -> None:

@@ -25,6 +25,7 @@ from boulder_sweep.report.rows import read_rows
 from boulder_sweep.report.sheet import Sheet, sheet_of
 from boulder_sweep.settings.sweep import Heading
 from tests.answers.designs import UNCERTAIN_FRICTION, site
+from tests.report.conftest import OTHER_VALUES, places, put
 
 HEADING = Heading("Main Street", "City", "North gate", "2026-11-28", "A", "C. Day", "E. Fox")
 
@@ -39,6 +40,7 @@ def needs() -> dict[str, Need]:
         ),
         "chance": boulder_sweep.need(site(height="3.4 m", **UNCERTAIN_FRICTION), probability=0.9),
         "nearest": boulder_sweep.need(site(height="3.0 m")),
+        "soils": boulder_sweep.need(site(height="3.4 m", friction="{from: 34, to: 40, count: 9}")),
         "never": boulder_sweep.need(site(height="2.0 m", friction="36 deg")),
     }
 
@@ -109,8 +111,7 @@ def test_the_limits_are_those_of_the_case_with_the_least_margin(needs: dict[str,
     used = [int(line[2].split()[0]) for line in (lines["rotation"], lines["penetration of cargo bed, P1"])]
     assert 100 - max(used) == round(100 * worst["margin"])
     assert f"friction angle φ′ {worst['friction_angle_deg']:g}°" in found.words["si"].governs
-    assert found.cases is not None
-    assert len(found.cases.rows) == len(best.design.rows) == 2
+    assert len(found.cases["si"].rows) == len(best.design.rows) == 2
     assert ("friction angle φ′, least", Measure(36.0, "deg"), "settings") in found.soil
     assert ("bumper above ground", Measure(0.5, "m"), "default") in found.vehicle
     assert found.grade[0] == "robust"
@@ -125,7 +126,7 @@ def test_what_does_not_qualify_is_not_recommended(files: dict[str, Path]) -> Non
         assert "does not pass" in found.words["si"].recommendation[0]
 
 
-@pytest.mark.parametrize(("name", "printed"), [("depth", False), ("grid", True)])
+@pytest.mark.parametrize(("name", "printed"), [("depth", False), ("soils", True), ("grid", True)])
 def test_a_map_is_printed_only_where_no_table_says_the_same(
     files: dict[str, Path], result: Path, name: str, printed: bool, tmp_path: Path, opened: Any
 ) -> None:
@@ -142,15 +143,6 @@ def test_a_spreadsheet_says_what_is_recommended(needs: dict[str, Need], files: d
     assert [row[0] for row in book["about"].iter_rows(max_row=len(said), values_only=True)] == said
 
 
-OTHERS = (None, True, -1, 0, 1.5, 1e300, math.nan, "", "x", [], ["x"], {}, {"a": 1}, "gone")
-
-
-def places(tree: Any, above: tuple[str | int, ...] = ()) -> list[tuple[str | int, ...]]:
-    """Every place of plain data."""
-    keys = tree if isinstance(tree, dict) else range(len(tree)) if isinstance(tree, list) else ()
-    return [place for key in keys for place in [(*above, key), *places(tree[key], (*above, key))]]
-
-
 @pytest.mark.parametrize("name", ["depth", "chance", "nearest"])
 def test_a_damaged_recommendation_ends_in_words(files: dict[str, Path], name: str, tmp_path: Path) -> None:
     """Or in a sheet, where the place holds what a recommendation may say."""
@@ -158,19 +150,12 @@ def test_a_damaged_recommendation_ends_in_words(files: dict[str, Path], name: st
     key = b"boulder_sweep.recommendation"
     for _ in range(40):
         tree = json.loads(table.schema.metadata[key])
-        *above, last = chance.choice(places(tree))
-        inner: Any = tree
-        for step in above:
-            inner = inner[step]
-        value = chance.choice(OTHERS)
-        if value == "gone":
-            del inner[last]
-        else:
-            inner[last] = value
+        place, value = chance.choice([*places(tree)]), chance.choice((*OTHER_VALUES, math.nan))
+        put(tree, place, value)
         metadata = table.schema.metadata | {key: json.dumps(tree).encode()}
         pq.write_table(table.replace_schema_metadata(metadata), tmp_path / "changed.parquet")
         try:
-            assert sheet(tmp_path / "changed.parquet").words["si"].recommendation, (last, value)
+            assert sheet(tmp_path / "changed.parquet").words["si"].recommendation, (place, value)
         except ReportError as problem:
             said.append(str(problem))
     assert len(said) > 10
@@ -181,23 +166,19 @@ def test_a_damaged_recommendation_ends_in_words(files: dict[str, Path], name: st
 def test_no_null_in_a_recommendation_is_said(files: dict[str, Path], name: str, tmp_path: Path) -> None:
     table, changed, refused = pq.read_table(files[name]), tmp_path / "changed.parquet", list[tuple[str | int, ...]]()
     key = b"boulder_sweep.recommendation"
-    tree = json.loads(table.schema.metadata[key])
-    for *above, last in places(tree):
-        if 1 in above:
+    for place in places(json.loads(table.schema.metadata[key])):
+        if 1 in place[:-1]:
             continue  # a second soil is read as the first
-        inner: Any = tree
-        for step in above:
-            inner = inner[step]
-        kept, inner[last] = inner[last], None
+        tree = json.loads(table.schema.metadata[key])
+        put(tree, place, None)
         metadata = table.schema.metadata | {key: json.dumps(tree).encode()}
         pq.write_table(table.replace_schema_metadata(metadata), changed)
         try:
             found = AnswerFile(changed, ReportError).answers()
             assert isinstance(found, Need)
-            assert "None" not in " ".join(advice(found, "us")), (above, last)
+            assert "None" not in " ".join(advice(found, "us")), place
         except ReportError:
-            refused.append((*above, last))
-        inner[last] = kept
+            refused.append(place)
     assert {last for *_, last in refused} >= {
         "boulder_density_kg_m3",
         "boulder_mass_kg",
