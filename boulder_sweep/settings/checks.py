@@ -72,7 +72,7 @@ def check_complete(entries: Entries) -> None:
         for name, leaf in entries.leaves.items():
             if leaf.is_axis:
                 message = "must be one value beside a table; lists and ranges are axes of a grid"
-                entries.problems.add(leaf.position, BY_NAME[name].path, message)
+                entries.problems.add(leaf.position, message, BY_NAME[name].path)
 
 
 def check_usual(entries: Entries) -> None:
@@ -95,7 +95,7 @@ def check_usual(entries: Entries) -> None:
     ]
     remedy = _allowing([*entries.allowed, *(field.path for _, _, field, _, _ in far)])
     for position, path, field, values, written in far:
-        entries.problems.add(position, path, f"{_far_words(values, field, written)}; {remedy}")
+        entries.problems.add(position, f"{_far_words(values, field, written)}; {remedy}", path)
 
 
 def _ends(spread: Distribution | SetDistributions | None) -> Iterator[tuple[Position, float]]:
@@ -128,7 +128,7 @@ def _check_embedment(entries: Entries, present: set[str], table_refused: bool) -
     if len(given) > 1:
         entries.report(given[1], f"give {keys}, not both")
     elif not given and not table_refused and not {field.path for field in ways} & entries.misspelled:
-        entries.problems.add(entries.position_of(ways[0].path), "site", f"{keys} is required and missing")
+        entries.problems.add(entries.position_of(ways[0].path), f"{keys} is required and missing", "site")
 
 
 def check_pairs(entries: Entries) -> None:
@@ -154,7 +154,7 @@ def _check_impact_height(entries: Entries, bumper: float | None) -> None:
     exposed = height - depth
     if exposed > bumper and impact > exposed * (1 + 1e-12):
         message = f"{impact:g} m is above the top of the boulder, which stands {exposed:g} m out of the ground"
-        entries.problems.add(entries.leaves["impact_height_m"].position, "site.impact_height", message)
+        entries.problems.add(entries.leaves["impact_height_m"].position, message, "site.impact_height")
 
 
 def _check_mass(entries: Entries) -> None:
@@ -238,7 +238,7 @@ def notes_on(sweep: Sweep, positions: Mapping[str, Position], written: Mapping[s
     for path, message in _remarks(sweep, written):
         if message:
             at = positions.get(path, Position(str(sweep.path)))
-            yield Problem(at.file, at.line, at.column, path, message)
+            yield Problem(at, message, path)
 
 
 def _remarks(sweep: Sweep, written: Mapping[str, str]) -> Iterator[tuple[str, str]]:
