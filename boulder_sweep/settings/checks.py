@@ -243,10 +243,7 @@ def notes_on(sweep: Sweep, positions: Mapping[str, Position], written: Mapping[s
 
 def _remarks(sweep: Sweep, written: Mapping[str, str]) -> Iterator[tuple[str, str]]:
     """Yield dotted keys, and what is to be remarked of each; empty where nothing is. Arguments: see `notes_on`."""
-    values = {name: np.array([value]) for name, value in sweep.constants.items()}
-    groups = [axis.columns for axis in sweep.axes] + ([] if sweep.table is None else [sweep.table.columns])
-    for group in groups:
-        values |= group
+    values, groups = sweep.values, sweep.groups
     for name, of_input in values.items():
         field = BY_NAME[name]
         off = is_unusual(of_input, field) if sweep.is_held(name) else np.zeros(of_input.shape, dtype=bool)
