@@ -243,7 +243,7 @@ def notes_on(sweep: Sweep, positions: Mapping[str, Position], written: Mapping[s
 
 def _remarks(sweep: Sweep, written: Mapping[str, str]) -> Iterator[tuple[str, str]]:
     """Yield dotted keys, and what is to be remarked of each; empty where nothing is. Arguments: see `notes_on`."""
-    values, groups = sweep.values, sweep.groups
+    values = sweep.values
     for name, of_input in values.items():
         field = BY_NAME[name]
         off = is_unusual(of_input, field) if sweep.is_held(name) else np.zeros(of_input.shape, dtype=bool)
@@ -256,13 +256,13 @@ def _remarks(sweep: Sweep, written: Mapping[str, str]) -> Iterator[tuple[str, st
         if len(set(axis.values.tolist())) < len(axis.values):
             yield BY_NAME[axis.name].path, "contains a value more than once"
     if "embedment_depth_m" in values:
-        depth, height = _pairs(values, groups, "embedment_depth_m", "boulder_height_m")
+        depth, height = _pairs(sweep, "embedment_depth_m", "boulder_height_m")
         ratio = depth / height
         off = _without_partner(_outside(ratio, BY_NAME["embedment_ratio"]))
         if off.any():
             yield "site.embedment_depth", f"depth over height: {_unusual('embedment_ratio', ratio[off])}"
     yield "boulder.mass", _on_mass(sweep)
-    yield "vehicle.spring", _off_front(values, groups, sweep.model.calibrated_crush_m)
+    yield "vehicle.spring", _off_front(sweep)
     if not sweep.model.shape.stands_flat:
         foot = "its foot is less than half as wide or long as the largest section"
         yield "boulder", f"{foot}: undecided (foot), {WAY_OUT['foot']}"
@@ -277,7 +277,7 @@ def _remarks(sweep: Sweep, written: Mapping[str, str]) -> Iterator[tuple[str, st
         ends = " to ".join(dict.fromkeys((f"{angles.min():.4g}", f"{angles.max():.4g}")))
         message = f"tan(friction angle) is divided by {sweep.partial_factor:g}: simulated and listed as {ends} deg"
         yield "partial_factor.friction_angle", message
-    angle, reaction = _pairs(values, groups, "friction_angle_deg", "subgrade_reaction_MN_m3")
+    angle, reaction = _pairs(sweep, "friction_angle_deg", "subgrade_reaction_MN_m3")
     yield "soil.subgrade_reaction", _off_families(angle, reaction) or _mixed_families(angle, reaction)
 
 
@@ -300,14 +300,12 @@ def _on_mass(sweep: Sweep) -> str:
     return "; ".join(words) if len(words) > 1 or sweep.model.rock_assumed else ""
 
 
-def _pairs(
-    values: Mapping[str, np.ndarray], groups: list[dict[str, np.ndarray]], one: str, other: str
-) -> tuple[np.ndarray, np.ndarray]:
+def _pairs(sweep: Sweep, one: str, other: str) -> tuple[np.ndarray, np.ndarray]:
     """Return the pairs of two inputs that occur, shape (n,) where they are listed together, (n, m) where crossed."""
-    for group in groups:
+    for group in sweep.groups:
         if one in group and other in group:
             return group[one], group[other]
-    ones, others = np.meshgrid(_thinned(values[one]), _thinned(values[other]))
+    ones, others = np.meshgrid(_thinned(sweep.values[one]), _thinned(sweep.values[other]))
     return ones, others
 
 
@@ -328,12 +326,13 @@ def wall_crush(mass: np.ndarray, speed: np.ndarray, spring: np.ndarray, damper: 
     return by_damper + np.where(b > 0.0, by_spring / np.where(b > 0.0, b, 1.0), 0.0)
 
 
-def _off_front(values: Mapping[str, np.ndarray], groups: list[dict[str, np.ndarray]], calibrated: float) -> str:
+def _off_front(sweep: Sweep) -> str:
     """Return a caution if a vehicle's front would be crushed far from what spring and damper were fitted to.
 
     The crush grows with mass and speed, and falls with spring and damper, so the ends of axes suffice.
     """
-    listed = [group for group in groups if len(group) > 1 and set(group) & set(_FRONT)]
+    values, calibrated = sweep.values, sweep.model.calibrated_crush_m
+    listed = [group for group in sweep.groups if len(group) > 1 and set(group) & set(_FRONT)]
     front = []
     for name in _FRONT:
         index = next((k for k, group in enumerate(listed) if name in group), None)

@@ -108,10 +108,7 @@ def load(settings: str | Path | MappingABC[str, Any], overrides: Sequence[str] =
 def load_text(text: str, path: Path, overrides: Sequence[str] = ()) -> Sweep:
     """Check the text of a file of settings; `path` names it in messages. Otherwise as `load`."""
     problems = Problems()
-    root = parse(text, str(path), problems)
-    if root is None:
-        raise SettingsError(problems)
-    return _checked(root, path, overrides, problems)
+    return _checked(parse(text, str(path), problems), path, overrides, problems)
 
 
 def sweep_of(settings: Settings) -> Sweep:
@@ -123,7 +120,6 @@ def _load_mapping(settings: MappingABC[str, Any], overrides: Sequence[str]) -> S
     """Check settings that are no file."""
     problems = Problems()
     root = parse(json.dumps(settings, default=_plain, ensure_ascii=False), str(_IN_MEMORY), problems)
-    assert root is not None  # JSON is YAML
     _move(root, Position(str(_IN_MEMORY)))  # lines and columns of it would tell nothing
     return replace(_checked(root, _IN_MEMORY, overrides, problems), path=None)
 

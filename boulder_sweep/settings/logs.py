@@ -93,10 +93,9 @@ class _Hole:
         self.names[hole] = None
         if self.name not in (None, hole) or (self.name is None and len(self.names) > 1):
             return
-        kind = self.readings.setdefault(key, [])
+        kind, line = self.readings.setdefault(key, []), Position(self.label, at.line)
         if len(kind) >= MOST_READINGS:
-            raise refuse(self.label, f"has more than {MOST_READINGS:,} readings of a hole", at.line)
-        line = Position(self.label, at.line)
+            raise wrong(line, f"has more than {MOST_READINGS:,} readings of a hole")
         metres = unit * self.number(depth, "depth", line)
         self.check(metres, "depth", line)
         kind.append(LogReading(at, metres, text, ratio))
@@ -108,7 +107,7 @@ class _Hole:
         except ValueError:
             value = math.inf
         if math.isinf(value) or (math.isnan(value) and text.strip()):
-            raise refuse(self.label, f"{key}: '{shorten(text)}' is not a number", at.line, at.column)
+            raise wrong(at, f"{key}: '{shorten(text)}' is not a number")
         return value
 
     def cone(self, text: str, size: float, at: Position) -> str:
@@ -121,10 +120,8 @@ class _Hole:
 
     def check(self, value: float, key: str, at: Position) -> None:
         """Refuse a value that no reading has; NaN stands for none."""
-        if wrong_with := "" if math.isnan(value) else outside(value, READING_FIELDS["cpt"][key]):
-            raise refuse(
-                self.label, f"{key}: {wrong_with}; leave the cell empty where there is no reading", at.line, at.column
-            )
+        if reason := "" if math.isnan(value) else outside(value, READING_FIELDS["cpt"][key]):
+            raise wrong(at, f"{key}: {reason}; leave the cell empty where there is no reading")
 
 
 def read_log(node: Scalar, hole: Scalar | None, folder: Path) -> Log:

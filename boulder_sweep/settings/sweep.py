@@ -208,7 +208,7 @@ class Sweep:
         """Values by column name of each axis, or of the list of designs: those of a group vary together."""
         return [axis.columns for axis in self.axes] if self.table is None else [self.table.columns]
 
-    @property
+    @cached_property
     def values(self) -> dict[str, np.ndarray]:
         """All values by column name, of single ones an array of one."""
         values = {name: np.array([value]) for name, value in self.constants.items()}

@@ -132,7 +132,7 @@ def block_of(position: Position, texts: dict[str, str]) -> Mapping:
     return Mapping(position, {key: Entry(key, position, Scalar(position, text)) for key, text in texts.items()})
 
 
-def parse(text: str, label: str, problems: Problems) -> Mapping | None:
+def parse(text: str, label: str, problems: Problems) -> Mapping:
     """Return the tree of a YAML text whose top level is a block of keys.
 
     Parameters
@@ -144,15 +144,10 @@ def parse(text: str, label: str, problems: Problems) -> Mapping | None:
     problems : Problems
         Receives duplicate keys, tags and other mistakes after which reading can go on.
 
-    Returns
-    -------
-    Mapping or None
-        None where the file holds something other than keys; a problem says so.
-
     Raises
     ------
     SettingsError
-        The text is not YAML, nested too deep or too large: reading cannot go on.
+        The text is not YAML or something other than keys, nested too deep or too large: reading cannot go on.
     """
     root = parse_node(text, label, problems)
     if isinstance(root, Mapping):
@@ -161,7 +156,7 @@ def parse(text: str, label: str, problems: Problems) -> Mapping | None:
         problems.add(Position(label), "is empty; it needs at least the blocks boulder, site, soil and vehicle")
     else:
         problems.add(root.position, "a settings file consists of blocks such as 'boulder: {length: 1.65 m}'")
-    return None
+    raise SettingsError(problems)
 
 
 def parse_node(text: str, label: str, problems: Problems) -> Node | None:
