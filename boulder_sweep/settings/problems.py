@@ -113,7 +113,7 @@ class Problems(list[Problem]):
 
     @property
     def full(self) -> bool:
-        """Whether further problems are only counted."""
+        """Whether further problems would only be counted in a report."""
         return len(self) >= MAX_REPORTED
 
     def add(self, position: Position, message: str, key: str = "") -> None:
