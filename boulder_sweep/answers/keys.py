@@ -13,7 +13,7 @@ from boulder_sweep.answers.trials import LEAST_RATIO
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.fields import BOULDER_MASS, UnknownNameError, named
-from boulder_sweep.settings.problems import LeafError, Position
+from boulder_sweep.settings.problems import Position, SettingsError
 from boulder_sweep.settings.soil_readings import covered_depth
 from boulder_sweep.settings.tree import Scalar
 from boulder_sweep.settings.values import NumberError, outside, read_quantity, read_single, refuse_bare
@@ -113,8 +113,8 @@ def share(text: str | float, option: str) -> float:
     if isinstance(text, str):
         try:
             value = float(read_quantity(Scalar(Position(option), text), "1").value)
-        except LeafError as problem:
-            raise QuestionError(f"{option} {text}: {problem}") from None
+        except SettingsError as problem:
+            raise QuestionError(f"{option} {text}: {problem.problems[0].message}") from None
         if "%" in text:
             return value
     else:
@@ -146,8 +146,8 @@ def bound(text: str | float, field: fields.Field) -> float:
         return float(text)
     try:
         return read_single(Scalar(Position(option), text), field)
-    except LeafError as problem:
-        raise QuestionError(f"{option} {text}: {problem}") from None
+    except SettingsError as problem:
+        raise QuestionError(f"{option} {text}: {problem.problems[0].message}") from None
 
 
 def sweep_ranges(sweep: Sweep) -> dict[str, tuple[float, float]]:

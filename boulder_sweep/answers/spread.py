@@ -112,8 +112,7 @@ class Moving:
         self.name = name
         self._admitted = _admitted(name)
         spread = sweep.distributions[name]
-        columns = {column: values for axis in sweep.axes for column, values in axis.columns.items()}
-        means = columns.get(name, np.array([sweep.constants.get(name, np.nan)]))
+        means = sweep.values.get(name, np.array([np.nan]))
         if isinstance(spread, SetDistributions):
             self._each = [(one, mean) for one, mean in zip(spread.each, means, strict=True) if one is not None]
             return

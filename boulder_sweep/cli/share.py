@@ -157,7 +157,7 @@ def _column(option: str, word: str) -> str:
 def _held(name: str, text: str, sets: Mapping[str, Sequence[str]]) -> float:
     """Return the value at which an input is held, in the unit of the table; of a named soil or vehicle its number."""
     from boulder_sweep.settings.fields import BY_NAME
-    from boulder_sweep.settings.problems import LeafError, Position
+    from boulder_sweep.settings.problems import Position, SettingsError
     from boulder_sweep.settings.tree import Scalar
     from boulder_sweep.settings.values import read_quantity
 
@@ -169,8 +169,8 @@ def _held(name: str, text: str, sets: Mapping[str, Sequence[str]]) -> float:
         raise click.UsageError(f"--at {name}={text}: this result has no named sets of {name}")
     try:
         return float(read_quantity(Scalar(Position("--at"), text), BY_NAME[name].unit).value)
-    except LeafError as error:
-        raise click.UsageError(f"--at {name}={text}: {error}") from None
+    except SettingsError as error:
+        raise click.UsageError(f"--at {name}={text}: {error.problems[0].message}") from None
 
 
 REPORT_EXAMPLES = """\b

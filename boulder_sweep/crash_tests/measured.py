@@ -18,7 +18,7 @@ import numpy as np
 from boulder_sweep.errors import FitError
 from boulder_sweep.settings.problems import (
     Position,
-    ProblemList,
+    Problems,
     check_regular_file,
     did_you_mean,
     refuse,
@@ -93,7 +93,7 @@ def read_history(path: str | Path, wanted: Sequence[Signal]) -> TimeHistory:
     """
     file = Path(path)
     check_regular_file(file, MAX_BYTES, "Keep the impact, and leave out what comes before and after")
-    problems = ProblemList()
+    problems = Problems()
     with open_table(file, MOST_ROWS, [f"{signal.name} [{signal.unit}]" for signal in wanted], problems) as table:
         columns = _columns(table, wanted, problems)
         parts: dict[str, list[np.ndarray]] = {column.signal.name: [] for column in columns}
@@ -106,7 +106,7 @@ def read_history(path: str | Path, wanted: Sequence[Signal]) -> TimeHistory:
                     for row in np.flatnonzero(np.diff(values, prepend=last) <= 0.0):
                         before = values[row - 1] if row else last
                         message = f"{values[row]:.6g} s comes after {before:.6g} s; times must ascend"
-                        table.alike.add("rows", table.position(rows[row], index), name, message)
+                        table.alike.add("rows", table.position(rows[row], index), message, name)
                     last = values[-1]
                 parts[name].append(values)
     problems.raise_if_any()
@@ -124,7 +124,7 @@ class _Column(NamedTuple):
     factor: float
 
 
-def _columns(table: TextTable, wanted: Sequence[Signal], problems: ProblemList) -> list[_Column]:
+def _columns(table: TextTable, wanted: Sequence[Signal], problems: Problems) -> list[_Column]:
     """Return what the columns are; refuse unknown names and units, and a file without time or all else."""
     names = _with_units(table, wanted)
     found = [_column(name, at, wanted, problems) for name, at in zip(names, table.positions, strict=True)]
@@ -132,12 +132,12 @@ def _columns(table: TextTable, wanted: Sequence[Signal], problems: ProblemList) 
     named = [column and column.signal.name for column in found]
     for index, name in enumerate(named):
         if name is not None and name in named[:index]:
-            problems.add(table.positions[index], name, "stands in two columns")
+            problems.add(table.positions[index], "stands in two columns", name)
     if not problems and TIME.name not in named:
-        problems.add(table.positions[0], "", "has no column of time, such as 'time [ms]'")
+        problems.add(table.positions[0], "has no column of time, such as 'time [ms]'")
     if not problems and len(named) < 2:
         others = ", ".join(signal.name for signal in wanted if signal is not TIME)
-        problems.add(table.positions[0], "", f"has nothing beside time; it may hold {others}")
+        problems.add(table.positions[0], f"has nothing beside time; it may hold {others}")
     problems.raise_if_any()
     return columns
 
@@ -155,7 +155,7 @@ def _with_units(table: TextTable, wanted: Sequence[Signal]) -> list[str]:
     return table.names
 
 
-def _column(cell: str, position: Position, wanted: Sequence[Signal], problems: ProblemList) -> _Column | None:
+def _column(cell: str, position: Position, wanted: Sequence[Signal], problems: Problems) -> _Column | None:
     """Return what a cell of the header names; with a mistake it is reported and None returned."""
     name, unit = _split_header(cell.strip())
     known = {word: signal for signal in wanted for word in (signal.name, *signal.other_names)}
@@ -164,17 +164,17 @@ def _column(cell: str, position: Position, wanted: Sequence[Signal], problems: P
     if signal is None:
         names = ", ".join(signal.name for signal in wanted)
         fitting = [word for word, one in known.items() if not unit or _is_unit(unit, one.unit)]
-        problems.add(position, shorten(cell), f"is not known{did_you_mean(plain, fitting)}; a file may hold {names}")
+        problems.add(position, f"is not known{did_you_mean(plain, fitting)}; a file may hold {names}", shorten(cell))
         return None
     if not unit:
         problems.add(
-            position, shorten(cell), f"has no unit; write it in brackets, such as '{signal.name} [{signal.unit}]'"
+            position, f"has no unit; write it in brackets, such as '{signal.name} [{signal.unit}]'", shorten(cell)
         )
         return None
     try:
         return _Column(signal, float(factor(unit, signal.unit)))
     except UnitError as error:
-        problems.add(position, shorten(cell), str(error))
+        problems.add(position, str(error), shorten(cell))
         return None
 
 

@@ -147,8 +147,7 @@ def _with_quantiles(sweep: Sweep, normals: dict[str, float], taken_at: dict[str,
 
 def words_of(sweep: Sweep, units: str = "si") -> str:
     """Return the values that uncertain inputs were taken at, in words; empty where there were none."""
-    columns = sweep.constants | {name: values for axis in sweep.axes for name, values in axis.columns.items()}
-    parts = []
+    columns, parts = sweep.values, []
     for name, how in sweep.taken_at.items():
         ends, field = (np.min(columns[name]), np.max(columns[name])), BY_NAME[name]
         parts.append(f"{field.path} {quantity_text(field.unit, units, *ends)} ({how})")

@@ -72,7 +72,7 @@ def check_complete(entries: Entries) -> None:
         for name, leaf in entries.leaves.items():
             if leaf.is_axis:
                 message = "must be one value beside a table; lists and ranges are axes of a grid"
-                entries.problems.add(leaf.position, BY_NAME[name].path, message)
+                entries.problems.add(leaf.position, message, BY_NAME[name].path)
 
 
 def check_usual(entries: Entries) -> None:
@@ -95,7 +95,7 @@ def check_usual(entries: Entries) -> None:
     ]
     remedy = _allowing([*entries.allowed, *(field.path for _, _, field, _, _ in far)])
     for position, path, field, values, written in far:
-        entries.problems.add(position, path, f"{_far_words(values, field, written)}; {remedy}")
+        entries.problems.add(position, f"{_far_words(values, field, written)}; {remedy}", path)
 
 
 def _ends(spread: Distribution | SetDistributions | None) -> Iterator[tuple[Position, float]]:
@@ -128,7 +128,7 @@ def _check_embedment(entries: Entries, present: set[str], table_refused: bool) -
     if len(given) > 1:
         entries.report(given[1], f"give {keys}, not both")
     elif not given and not table_refused and not {field.path for field in ways} & entries.misspelled:
-        entries.problems.add(entries.position_of(ways[0].path), "site", f"{keys} is required and missing")
+        entries.problems.add(entries.position_of(ways[0].path), f"{keys} is required and missing", "site")
 
 
 def check_pairs(entries: Entries) -> None:
@@ -154,7 +154,7 @@ def _check_impact_height(entries: Entries, bumper: float | None) -> None:
     exposed = height - depth
     if exposed > bumper and impact > exposed * (1 + 1e-12):
         message = f"{impact:g} m is above the top of the boulder, which stands {exposed:g} m out of the ground"
-        entries.problems.add(entries.leaves["impact_height_m"].position, "site.impact_height", message)
+        entries.problems.add(entries.leaves["impact_height_m"].position, message, "site.impact_height")
 
 
 def _check_mass(entries: Entries) -> None:
@@ -238,15 +238,12 @@ def notes_on(sweep: Sweep, positions: Mapping[str, Position], written: Mapping[s
     for path, message in _remarks(sweep, written):
         if message:
             at = positions.get(path, Position(str(sweep.path)))
-            yield Problem(at.file, at.line, at.column, path, message)
+            yield Problem(at, message, path)
 
 
 def _remarks(sweep: Sweep, written: Mapping[str, str]) -> Iterator[tuple[str, str]]:
     """Yield dotted keys, and what is to be remarked of each; empty where nothing is. Arguments: see `notes_on`."""
-    values = {name: np.array([value]) for name, value in sweep.constants.items()}
-    groups = [axis.columns for axis in sweep.axes] + ([] if sweep.table is None else [sweep.table.columns])
-    for group in groups:
-        values |= group
+    values = sweep.values
     for name, of_input in values.items():
         field = BY_NAME[name]
         off = is_unusual(of_input, field) if sweep.is_held(name) else np.zeros(of_input.shape, dtype=bool)
@@ -259,13 +256,13 @@ def _remarks(sweep: Sweep, written: Mapping[str, str]) -> Iterator[tuple[str, st
         if len(set(axis.values.tolist())) < len(axis.values):
             yield BY_NAME[axis.name].path, "contains a value more than once"
     if "embedment_depth_m" in values:
-        depth, height = _pairs(values, groups, "embedment_depth_m", "boulder_height_m")
+        depth, height = _pairs(sweep, "embedment_depth_m", "boulder_height_m")
         ratio = depth / height
         off = _without_partner(_outside(ratio, BY_NAME["embedment_ratio"]))
         if off.any():
             yield "site.embedment_depth", f"depth over height: {_unusual('embedment_ratio', ratio[off])}"
     yield "boulder.mass", _on_mass(sweep)
-    yield "vehicle.spring", _off_front(values, groups, sweep.model.calibrated_crush_m)
+    yield "vehicle.spring", _off_front(sweep)
     if not sweep.model.shape.stands_flat:
         foot = "its foot is less than half as wide or long as the largest section"
         yield "boulder", f"{foot}: undecided (foot), {WAY_OUT['foot']}"
@@ -280,7 +277,7 @@ def _remarks(sweep: Sweep, written: Mapping[str, str]) -> Iterator[tuple[str, st
         ends = " to ".join(dict.fromkeys((f"{angles.min():.4g}", f"{angles.max():.4g}")))
         message = f"tan(friction angle) is divided by {sweep.partial_factor:g}: simulated and listed as {ends} deg"
         yield "partial_factor.friction_angle", message
-    angle, reaction = _pairs(values, groups, "friction_angle_deg", "subgrade_reaction_MN_m3")
+    angle, reaction = _pairs(sweep, "friction_angle_deg", "subgrade_reaction_MN_m3")
     yield "soil.subgrade_reaction", _off_families(angle, reaction) or _mixed_families(angle, reaction)
 
 
@@ -303,14 +300,12 @@ def _on_mass(sweep: Sweep) -> str:
     return "; ".join(words) if len(words) > 1 or sweep.model.rock_assumed else ""
 
 
-def _pairs(
-    values: Mapping[str, np.ndarray], groups: list[dict[str, np.ndarray]], one: str, other: str
-) -> tuple[np.ndarray, np.ndarray]:
+def _pairs(sweep: Sweep, one: str, other: str) -> tuple[np.ndarray, np.ndarray]:
     """Return the pairs of two inputs that occur, shape (n,) where they are listed together, (n, m) where crossed."""
-    for group in groups:
+    for group in sweep.groups:
         if one in group and other in group:
             return group[one], group[other]
-    ones, others = np.meshgrid(_thinned(values[one]), _thinned(values[other]))
+    ones, others = np.meshgrid(_thinned(sweep.values[one]), _thinned(sweep.values[other]))
     return ones, others
 
 
@@ -331,12 +326,13 @@ def wall_crush(mass: np.ndarray, speed: np.ndarray, spring: np.ndarray, damper: 
     return by_damper + np.where(b > 0.0, by_spring / np.where(b > 0.0, b, 1.0), 0.0)
 
 
-def _off_front(values: Mapping[str, np.ndarray], groups: list[dict[str, np.ndarray]], calibrated: float) -> str:
+def _off_front(sweep: Sweep) -> str:
     """Return a caution if a vehicle's front would be crushed far from what spring and damper were fitted to.
 
     The crush grows with mass and speed, and falls with spring and damper, so the ends of axes suffice.
     """
-    listed = [group for group in groups if len(group) > 1 and set(group) & set(_FRONT)]
+    values, calibrated = sweep.values, sweep.model.calibrated_crush_m
+    listed = [group for group in sweep.groups if len(group) > 1 and set(group) & set(_FRONT)]
     front = []
     for name in _FRONT:
         index = next((k for k, group in enumerate(listed) if name in group), None)

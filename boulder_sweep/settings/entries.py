@@ -37,7 +37,7 @@ from boulder_sweep.settings.model import (
     SetDistributions,
     Shape,
 )
-from boulder_sweep.settings.problems import Mistakes, Position, ProblemList, did_you_mean, shorten, unknown_word, wrong
+from boulder_sweep.settings.problems import Position, Problems, did_you_mean, shorten, unknown_word, wrong
 from boulder_sweep.settings.soil_readings import (
     CORRELATION,
     ENERGY,
@@ -136,7 +136,7 @@ class Entries:
         Dotted keys whose values may be far from usual, sorted.
     """
 
-    def __init__(self, root: Mapping, path: Path, problems: ProblemList) -> None:
+    def __init__(self, root: Mapping, path: Path, problems: Problems) -> None:
         self.root = root
         self.path = path
         self.problems = problems
@@ -172,19 +172,20 @@ class Entries:
             self.settings.setdefault("correlation", CORRELATION)
 
     @contextmanager
-    def reporting(self, path: str, stands_for: Iterable[str] = ()) -> Iterator[Mistakes]:
+    def reporting(self, path: str, stands_for: Iterable[str] = ()) -> Iterator[Problems]:
         """Report the mistakes of an entry at its path; what it stands for is given then, right or wrong."""
-        mistakes = Mistakes()
-        with mistakes:
-            yield mistakes
-        for mistake in mistakes:
+        problems = Problems()
+        with self.problems.under(path):
+            with problems.under():
+                yield problems
+            problems.raise_if_any()
+        if problems:
             self.given.update(stands_for)
-            self.problems.add(mistake.position, path, mistake.message)
 
     def _unfold(self) -> None:
         """Replace what stands for other entries by these."""
-        with self.reporting(f"vehicle.{APPROACH}", ["vehicle.speed"]) as mistakes:
-            approaches = unfold_approaches(self.root, mistakes)
+        with self.reporting(f"vehicle.{APPROACH}", ["vehicle.speed"]) as problems:
+            approaches = unfold_approaches(self.root, problems)
         self.derived |= {APPROACH: approaches} if approaches else {}
         boulder = self.root.get("boulder")
         if isinstance(boulder, Mapping) and "rock" in boulder.entries:
@@ -199,8 +200,8 @@ class Entries:
     def _unfold_soils(self) -> None:
         """Replace the readings of an investigation by soil constants."""
         listed = [key for key in SOIL_KEYS if fields.BY_PATH[f"soil.{key}"].name in self.listed]
-        with self.reporting("soil", [f"soil.{key}" for key in SOIL_KEYS]) as mistakes:
-            soils = unfold_soils(self.root, listed, self._deepest_foot(), mistakes, self._read_log)
+        with self.reporting("soil", [f"soil.{key}" for key in SOIL_KEYS]) as problems:
+            soils = unfold_soils(self.root, listed, self._deepest_foot(), problems, self._read_log)
         self.derived |= {"soil": soils} if soils else {}
 
     def _read_log(self, node: Scalar, hole: Scalar | None) -> Log:
@@ -266,7 +267,7 @@ class Entries:
                 message = unknown_word(
                     word, "an entry that is held to its usual range", (*fields.HELD, fields.EVERYTHING)
                 )
-                self.problems.add(item.position, fields.ALLOW_UNUSUAL, message)
+                self.problems.add(item.position, message, fields.ALLOW_UNUSUAL)
         self.allowed = tuple(sorted(allowed))
 
     def _read_list(self) -> None:
@@ -277,7 +278,7 @@ class Entries:
         from boulder_sweep.settings.tables import read_designs
 
         if not isinstance(node, Scalar) or not node.text.strip():
-            self.problems.add(node.position, "table", "must be the name of a .csv, .xlsx or .parquet file")
+            self.problems.add(node.position, "must be the name of a .csv, .xlsx or .parquet file", "table")
             return
         self.table = read_designs(node, self._folder_of(node.position), self.problems)
 
@@ -288,7 +289,7 @@ class Entries:
             return None  # not there, or every line of it is commented out
         if isinstance(node, Mapping) and node.unit is None:
             return node
-        self.problems.add(node.position, section, f"must be a block of keys: {', '.join(known)}")
+        self.problems.add(node.position, f"must be a block of keys: {', '.join(known)}", section)
         return None
 
     def _read_block(self, section: str) -> None:
@@ -314,14 +315,14 @@ class Entries:
 
     def _read_sets(self, section: str, node: Sequence, known: dict[str, Field]) -> None:
         """Read a list of named sets: ``[{name: loose, density: 1700 kg/m^3, ...}, ...]``."""
-        before = len(self.problems.problems)
+        before = len(self.problems)
         names: list[str] = []
         columns: dict[str, list[Leaf]] = {}
         items = node.items or [Scalar(node.position, "")]
         for item in items:
             if not isinstance(item, Mapping):
                 message = "must be a list of blocks, each with a name and one value per key"
-                self.problems.add(item.position, section, message)
+                self.problems.add(item.position, message, section)
                 continue
             names.append(self._read_set_name(section, item, names))
             for inner in item:
@@ -330,7 +331,7 @@ class Entries:
                     continue
                 if field is not None and field not in fields.INPUTS:
                     message = f"is not a key of {section} in a named set: it is one for all designs of a file"
-                    self.problems.add(inner.position, field.path, message)
+                    self.problems.add(inner.position, message, field.path)
                     continue
                 if field is None:
                     inputs = (key for key in known if known[key] in fields.INPUTS)
@@ -339,12 +340,12 @@ class Entries:
                 self.given.add(field.path)
                 with self.reporting(field.path):
                     columns.setdefault(field.name, []).append(_one_of_set(inner.value, field))
-            if len(self.problems.problems) == before:
+            if len(self.problems) == before:
                 for name, values in columns.items():
                     if len(values) != len(names):
                         message = "must be given in every named set, or in none"
-                        self.problems.add(item.position, fields.BY_NAME[name].path, message)
-        if len(self.problems.problems) == before:
+                        self.problems.add(item.position, message, fields.BY_NAME[name].path)
+        if len(self.problems) == before:
             self.sets[section] = tuple(names)
             self.leaves |= {name: _axis_of_sets(section, leaves, node.position) for name, leaves in columns.items()}
 
@@ -355,9 +356,9 @@ class Entries:
         if not NAME.fullmatch(name):
             position = item.position if node is None else node.position
             message = "every named set needs a name of at most 80 letters, digits, spaces and - _ . +"
-            self.problems.add(position, f"{section}.name", message)
+            self.problems.add(position, message, f"{section}.name")
         elif name in taken:
-            self.problems.add(item.position, f"{section}.name", f"'{name}' is given twice")
+            self.problems.add(item.position, f"'{name}' is given twice", f"{section}.name")
         return name
 
     def unknown(self, entry: Entry, section: str, known: tuple[str, ...]) -> None:
@@ -378,7 +379,7 @@ class Entries:
         where = section or "the file"
         name = shorten(entry.key) or "(empty)"
         path = f"{section}.{name}" if section else name
-        self.problems.add(entry.position, path, f"is not a key of {where} (keys: {', '.join(known)}){hint}")
+        self.problems.add(entry.position, f"is not a key of {where} (keys: {', '.join(known)}){hint}", path)
 
     @property
     def listed(self) -> set[str]:
@@ -426,7 +427,7 @@ class Entries:
 
     def report(self, path: str, message: str) -> None:
         """Report what is wrong with an entry, where it stands."""
-        self.problems.add(self.position_of(path), path, message)
+        self.problems.add(self.position_of(path), message, path)
 
 
 def _one_of_set(node: Node, field: Field) -> Leaf:
@@ -453,15 +454,15 @@ def _read_layers(node: Node) -> tuple[Layer, ...]:
         message = f"must be a list of 1 to {MOST_LAYERS} layers, each a block of keys: {', '.join(LAYER_FIELDS)}"
         raise wrong(node.position, message)
     layers: list[Layer] = []
-    mistakes = Mistakes()
+    problems = Problems()
     for item in node.items:
-        with mistakes:
+        with problems.under():
             layer = Layer(**read_block(item, LAYER_FIELDS, "a layer", [*LAYER_FIELDS][:-1]))
             if layers and layer.from_m <= layers[-1].from_m:
                 message = f"begins at {layer.from_m:g} m, not below the layer before it ({layers[-1].from_m:g} m)"
-                mistakes.add(item.position, message)
+                problems.add(item.position, message)
             layers.append(layer)
-    mistakes.raise_if_any()
+    problems.raise_if_any()
     return tuple(layers)
 
 
@@ -474,17 +475,17 @@ def _read_profile(node: Node) -> tuple[ProfilePoint, ...]:
         message = f"must be a list of 2 to {MOST_POINTS} points from the foot up, each a block of keys: "
         raise wrong(node.position, message + ", ".join(PROFILE_FIELDS))
     points: list[ProfilePoint] = []
-    mistakes = Mistakes()
+    problems = Problems()
     for item in node.items:
-        with mistakes:
+        with problems.under():
             point = _read_point(item)
-            if not points and not mistakes and point.height != 0.0:
-                mistakes.add(item.position, f"the first point is the foot, at 0 m, not {point.height:g} m")
+            if not points and not problems and point.height != 0.0:
+                problems.add(item.position, f"the first point is the foot, at 0 m, not {point.height:g} m")
             if points and point.height <= points[-1].height:
                 message = f"is {point.height:g} m high, not above the point before it ({points[-1].height:g} m)"
-                mistakes.add(item.position, message)
+                problems.add(item.position, message)
             points.append(point)
-    mistakes.raise_if_any()
+    problems.raise_if_any()
     if not max(point.width for point in points) * max(point.near + point.far for point in points) > 0.0:
         raise wrong(node.position, "has neither width nor length")
     if not Shape(_shares_of(tuple(points))).stands_up:
@@ -514,14 +515,14 @@ def _unfold_scan(boulder: Mapping, folder: Path) -> tuple[Scan, list[str]]:
     """
     entry = boulder.entries.pop("scan")
     words = _read_scan_words(entry.value)
-    mistakes = Mistakes()
+    problems = Problems()
     for key in _OF_SCAN:
         if key in boulder.entries:
-            mistakes.add(boulder.entries[key].position, f"{key} follows from the scan; remove one of them")
+            problems.add(boulder.entries[key].position, f"{key} follows from the scan; remove one of them")
     if len({"mass", "density"} & set(boulder.entries)) != 1:
         message = "beside a scan give the mass of the whole boulder, or its density: one of them"
-        mistakes.add(entry.position, message)
-    mistakes.raise_if_any()
+        problems.add(entry.position, message)
+    problems.raise_if_any()
     mass = boulder.entries.pop("mass", None)
     mass_kg = None if mass is None else read_single(mass.value, fields.BOULDER_MASS)
     # What reads scans is needed for them only.
@@ -560,19 +561,19 @@ def _read_scan_words(node: Node) -> dict[str, str]:
     """Return the words of a scan by key."""
     if not isinstance(node, Mapping) or node.unit is not None:
         raise wrong(node.position, f"must be a block, as in {_SCAN_FORM}; 'sweep stone' lists the ways to stand")
-    mistakes, words = Mistakes(), {}
+    problems, words = Problems(), {}
     for one in node:
         if one.key not in SCAN_KEYS:
-            mistakes.add(one.position, unknown_word(one.key, "a key of a scan", SCAN_KEYS))
+            problems.add(one.position, unknown_word(one.key, "a key of a scan", SCAN_KEYS))
         elif not isinstance(one.value, Scalar) or not one.value.text.strip():
-            mistakes.add(one.value.position, f"{one.key} must be one word")
+            problems.add(one.value.position, f"{one.key} must be one word")
         else:
             words[one.key] = one.value.text.strip()
     missing = [key for key in SCAN_KEYS if key != "unit" and key not in node.entries]
     if missing:
         message = f"the scan lacks {', '.join(missing)}, as in {_SCAN_FORM}; 'sweep stone' lists the ways to stand"
-        mistakes.add(node.position, message)
-    mistakes.raise_if_any()
+        problems.add(node.position, message)
+    problems.raise_if_any()
     return words
 
 
@@ -613,18 +614,18 @@ def _read_readings(node: Node) -> ReadingChoice:
     """Read a preset, or single switches on top of one (``corrected`` where none is named)."""
     if not isinstance(node, Mapping):
         return ReadingChoice.of_preset(_one_of(node, PRESETS, "a reading of the paper"))
-    mistakes = Mistakes()
+    problems = Problems()
     preset, switches = "corrected", {}
     for entry in node:
-        with mistakes:
+        with problems.under():
             if entry.key == "preset":
                 preset = _one_of(entry.value, PRESETS, "a reading of the paper")
             elif entry.key in SWITCHES:
                 value = _one_of(entry.value, (PRINTED, SWITCHES[entry.key], "corrected"), f"a value of {entry.key}")
                 switches[entry.key] = SWITCHES[entry.key] if value == "corrected" else value
             else:
-                mistakes.add(entry.position, unknown_word(entry.key, "a reading", ("preset", *SWITCHES)))
-    mistakes.raise_if_any()
+                problems.add(entry.position, unknown_word(entry.key, "a reading", ("preset", *SWITCHES)))
+    problems.raise_if_any()
     return replace(ReadingChoice.of_preset(preset), **switches)
 
 
@@ -659,18 +660,18 @@ def _read_second_opinion(node: Node) -> tuple[str, ...]:
     if isinstance(node, Scalar) and node.text.strip().lower() == NO_OPINION:
         return ()
     items = node.items if isinstance(node, Sequence) else [node]
-    asked, mistakes = set(), Mistakes()
+    asked, problems = set(), Problems()
     for item in items:
         if isinstance(item, Scalar) and item.text.strip().lower() == RESISTANCES[0]:
             message = (
                 f"{RESISTANCES[0]} is no second opinion: with friction and vertical motion it would pass many designs "
                 f"that fail, and no test speaks for that; choose {' or '.join(SECOND_OPINIONS)}"
             )
-            mistakes.add(item.position, message)
+            problems.add(item.position, message)
             continue
-        with mistakes:
+        with problems.under():
             asked.add(_one_of(item, SECOND_OPINIONS, fields.BY_NAME["second_opinion"].kind))
-    mistakes.raise_if_any()
+    problems.raise_if_any()
     return tuple(law for law in SECOND_OPINIONS if law in asked)
 
 

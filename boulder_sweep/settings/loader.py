@@ -24,11 +24,11 @@ from boulder_sweep.settings.model import NO_OPINION, USUAL_OPINION, Criterion, M
 from boulder_sweep.settings.problems import (
     Position,
     Problem,
-    ProblemList,
+    Problems,
     SettingsError,
     check_regular_file,
+    content_of,
     nearest,
-    reason_of,
     refuse,
     shorten,
 )
@@ -107,11 +107,8 @@ def load(settings: str | Path | MappingABC[str, Any], overrides: Sequence[str] =
 
 def load_text(text: str, path: Path, overrides: Sequence[str] = ()) -> Sweep:
     """Check the text of a file of settings; `path` names it in messages. Otherwise as `load`."""
-    problems = ProblemList()
-    root = parse(text, str(path), problems)
-    if root is None:
-        raise SettingsError(problems.in_order())
-    return _checked(root, path, overrides, problems)
+    problems = Problems()
+    return _checked(parse(text, str(path), problems), path, overrides, problems)
 
 
 def sweep_of(settings: Settings) -> Sweep:
@@ -121,9 +118,8 @@ def sweep_of(settings: Settings) -> Sweep:
 
 def _load_mapping(settings: MappingABC[str, Any], overrides: Sequence[str]) -> Sweep:
     """Check settings that are no file."""
-    problems = ProblemList()
+    problems = Problems()
     root = parse(json.dumps(settings, default=_plain, ensure_ascii=False), str(_IN_MEMORY), problems)
-    assert root is not None  # JSON is YAML
     _move(root, Position(str(_IN_MEMORY)))  # lines and columns of it would tell nothing
     return replace(_checked(root, _IN_MEMORY, overrides, problems), path=None)
 
@@ -133,7 +129,7 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)
 
 
-def _checked(root: Mapping, path: Path, overrides: Sequence[str], problems: ProblemList) -> Sweep:
+def _checked(root: Mapping, path: Path, overrides: Sequence[str], problems: Problems) -> Sweep:
     """Read and check a tree."""
     _apply_overrides(root, overrides, problems)
     units = _read_units(root, problems)
@@ -151,14 +147,7 @@ def _checked(root: Mapping, path: Path, overrides: Sequence[str], problems: Prob
 def _read_text(path: Path) -> str:
     """Return the text of a settings file."""
     check_regular_file(path, MAX_BYTES, "Put a long list of designs into a separate file: table: designs.csv")
-    try:
-        with path.open("rb") as stream:
-            data = stream.read(MAX_BYTES + 1)  # a file may grow between the check and the reading
-    except OSError as error:
-        raise refuse(str(path), f"cannot be read ({reason_of(error)})") from None
-    if len(data) > MAX_BYTES:
-        raise refuse(str(path), f"is larger than {MAX_BYTES / 1e6:g} MB")
-    return decode(data, str(path))
+    return decode(content_of(path, MAX_BYTES), str(path))
 
 
 def decode(data: bytes, label: str) -> str:
@@ -180,7 +169,7 @@ def decode(data: bytes, label: str) -> str:
         raise refuse(label, "is not UTF-8 text; save it as UTF-8", line, column) from None
 
 
-def _apply_overrides(root: Mapping, overrides: Sequence[str], problems: ProblemList) -> None:
+def _apply_overrides(root: Mapping, overrides: Sequence[str], problems: Problems) -> None:
     """Put every ``key.path=value`` into the tree, in order; mistakes go to `problems`.
 
     They are as typed behind ``--set``, the key as `boulder_sweep.settings.fields.named` takes it; the value is YAML, so
@@ -196,27 +185,27 @@ def _apply_overrides(root: Mapping, overrides: Sequence[str], problems: ProblemL
                 path = fields.named(path[0], fields.FIELDS).path.split(".")
             except fields.UnknownNameError as unknown:
                 if nearest(path[0], TOP_KEYS) is None:
-                    problems.add(position, name, unknown.what)
+                    problems.add(position, unknown.what, name)
                     continue
         if not equals or not all(path) or len(path) > 4:
-            problems.add(position, "", f"'{shorten(text)}' is not KEY=VALUE, for example vehicle.speed='50 mph'")
+            problems.add(position, f"'{shorten(text)}' is not KEY=VALUE, for example vehicle.speed='50 mph'")
             continue
         if len(text) > MAX_OVERRIDE:
-            problems.add(position, name, f"is longer than {MAX_OVERRIDE} characters; put it into the file")
+            problems.add(position, f"is longer than {MAX_OVERRIDE} characters; put it into the file", name)
             continue
         value = _read_value(value_text, name, position, problems)
         if value is not None:
             _put(root, path, value, position)
 
 
-def _read_value(text: str, name: str, position: Position, problems: ProblemList) -> Node | None:
-    inner = ProblemList()
+def _read_value(text: str, name: str, position: Position, problems: Problems) -> Node | None:
+    inner = Problems()
     try:
         value = parse_node(text, position.file, inner)
     except SettingsError:
         value = None  # its problems are in `inner`
-    for problem in inner.problems:
-        problems.add(position, name, problem.message)
+    for problem in inner:
+        problems.add(position, problem.message, name)
     if value is None:
         return None if inner else Scalar(position, "")
     _move(value, position)
@@ -271,7 +260,7 @@ def _read_name(entries: Entries) -> str:
         return default
     if isinstance(node, Scalar) and NAME.fullmatch(node.text):
         return node.text
-    entries.problems.add(node.position, "name", NAME_RULE)
+    entries.problems.add(node.position, NAME_RULE, "name")
     return default
 
 
@@ -283,22 +272,22 @@ def _read_heading(entries: Entries) -> Heading:
         if inner.key not in Heading._fields:
             entries.unknown(inner, SECTION, Heading._fields)
         elif not isinstance(value, Scalar):
-            entries.problems.add(value.position, path, "must be one line of text, not a list or a block")
+            entries.problems.add(value.position, "must be one line of text, not a list or a block", path)
         elif wrong := wrong_with(value.text):
-            entries.problems.add(value.position, path, wrong)
+            entries.problems.add(value.position, wrong, path)
         else:
             texts[inner.key] = value.text.strip()
     return Heading(**texts)
 
 
-def _read_units(root: Mapping, problems: ProblemList) -> str:
+def _read_units(root: Mapping, problems: Problems) -> str:
     """Return the units named in a file, empty where none are; with ``us`` no number may lack its unit."""
     node = root.get(UNITS)
     if node is None:
         return ""
     units = node.text.strip() if isinstance(node, Scalar) else ""
     if units not in SYSTEMS:
-        problems.add(node.position, UNITS, f"must be {' or '.join(SYSTEMS)}")
+        problems.add(node.position, f"must be {' or '.join(SYSTEMS)}", UNITS)
     if units == "us":
         _need_units(root)
     return units
@@ -348,7 +337,7 @@ def _build(name: str, heading: Heading, units: str, entries: Entries, overrides:
     positions = {field.path: entries.position_of(field.path) for field in fields.INPUTS}
     written = {name: leaf.written for name, leaf in entries.leaves.items()}
     at = entries.position_of("boulder.profile")  # which stands for a scan by now
-    cautions = [Problem(at.file, at.line, at.column, "boulder.scan", caution) for caution in entries.cautions]
+    cautions = [Problem(at, caution, "boulder.scan") for caution in entries.cautions]
     return replace(sweep, notes=(*cautions, *notes_on(sweep, positions, written)))
 
 
@@ -395,7 +384,7 @@ def _axes(entries: Entries) -> tuple[Axis, ...]:
                 count *= len(leaf.values)
     if count > MAX_DESIGNS:
         message = f"the grid has {count} designs; at most {MAX_DESIGNS} can be numbered"
-        entries.problems.add(entries.root.position, "", message)
+        entries.problems.add(entries.root.position, message)
         entries.problems.raise_if_any()
     return tuple(axes)
 

@@ -14,15 +14,12 @@ from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
-from boulder_sweep.locations import Location, LocationError, opened
+from boulder_sweep.locations import Location
 from boulder_sweep.settings.problems import (
-    LeafError,
-    Mistake,
     Position,
-    Problem,
-    ProblemList,
-    SettingsError,
+    Problems,
     check_regular_file,
+    content_of,
     refuse,
     shorten,
     unknown_word,
@@ -33,7 +30,7 @@ from boulder_sweep.settings.tables import located, open_table
 from boulder_sweep.settings.tree import Scalar
 from boulder_sweep.settings.units import UnitError, factor, suffix_unit
 from boulder_sweep.settings.values import outside
-from boulder_sweep.text import counted, why
+from boulder_sweep.text import counted
 
 MOST_BYTES = 50_000_000
 MOST_READINGS = 200_000
@@ -96,10 +93,9 @@ class _Hole:
         self.names[hole] = None
         if self.name not in (None, hole) or (self.name is None and len(self.names) > 1):
             return
-        kind = self.readings.setdefault(key, [])
+        kind, line = self.readings.setdefault(key, []), Position(self.label, at.line)
         if len(kind) >= MOST_READINGS:
-            raise refuse(self.label, f"has more than {MOST_READINGS:,} readings of a hole", at.line)
-        line = Position(self.label, at.line)
+            raise wrong(line, f"has more than {MOST_READINGS:,} readings of a hole")
         metres = unit * self.number(depth, "depth", line)
         self.check(metres, "depth", line)
         kind.append(LogReading(at, metres, text, ratio))
@@ -111,7 +107,7 @@ class _Hole:
         except ValueError:
             value = math.inf
         if math.isinf(value) or (math.isnan(value) and text.strip()):
-            raise refuse(self.label, f"{key}: '{shorten(text)}' is not a number", at.line, at.column)
+            raise wrong(at, f"{key}: '{shorten(text)}' is not a number")
         return value
 
     def cone(self, text: str, size: float, at: Position) -> str:
@@ -124,10 +120,8 @@ class _Hole:
 
     def check(self, value: float, key: str, at: Position) -> None:
         """Refuse a value that no reading has; NaN stands for none."""
-        if wrong_with := "" if math.isnan(value) else outside(value, READING_FIELDS["cpt"][key]):
-            raise refuse(
-                self.label, f"{key}: {wrong_with}; leave the cell empty where there is no reading", at.line, at.column
-            )
+        if reason := "" if math.isnan(value) else outside(value, READING_FIELDS["cpt"][key]):
+            raise wrong(at, f"{key}: {reason}; leave the cell empty where there is no reading")
 
 
 def read_log(node: Scalar, hole: Scalar | None, folder: Path) -> Log:
@@ -144,30 +138,20 @@ def read_log(node: Scalar, hole: Scalar | None, folder: Path) -> Log:
 
     Raises
     ------
-    LeafError
+    SettingsError
         With every mistake, at its line of the file.
     """
-    try:
-        path = located(node.text, folder)
+    problems = Problems()
+    with problems.under(named=node.position):
+        path = located(node, folder)
         reader = _READERS.get(path.suffix.lower())
         if reader is None:
             raise wrong(node.position, f"'{shorten(node.text)}' has an unsupported type; use {', '.join(_READERS)}")
         check_regular_file(path, MOST_BYTES, "Keep the hole that is meant")
         found = _Hole(str(path), None if hole is None else hole.text.strip())
         reader(path, found)
-    except LocationError as error:
-        raise wrong(node.position, str(error)) from None
-    except SettingsError as error:
-        raise LeafError(*(_mistake(one, node.position) for one in error.problems)) from None
+    problems.raise_if_any()
     return _log_of(found, node, node if hole is None else hole)
-
-
-def _mistake(problem: Problem, position: Position) -> Mistake:
-    """Return what is wrong in a file at its place there, or of the whole file where it is named."""
-    if problem.line is None:
-        return Mistake(position, f"{problem.file}: {problem.message}")
-    words = f"{problem.key}: {problem.message}" if problem.key else problem.message
-    return Mistake(Position(problem.file, problem.line, problem.column), words)
 
 
 def _log_of(found: _Hole, node: Scalar, hole: Scalar) -> Log:
@@ -194,7 +178,7 @@ def _log_of(found: _Hole, node: Scalar, hole: Scalar) -> Log:
 
 def _read_table(path: Location, found: _Hole) -> None:
     """Read a table of text or a spreadsheet, with the units in the names of the columns."""
-    problems = ProblemList()
+    problems = Problems()
     with open_table(path, 10 * MOST_READINGS, list(_SAMPLES.values()), problems) as table:
         columns: dict[str, int] = {}
         sizes: dict[str, float] = {}
@@ -263,13 +247,9 @@ def count_of(text: str) -> str:
 
 def _text_of(path: Location) -> str:
     """Return the text of a file in UTF-8 or an encoding of one byte: no number needs more than ASCII."""
-    try:
-        with opened(path) as file:
-            data = file.read(MOST_BYTES + 1)
-    except OSError as error:
-        raise refuse(str(path), f"cannot be read ({why(error)})") from None
-    if len(data) > MOST_BYTES or b"\x00" in data:
-        raise refuse(str(path), "is not a text file" if b"\x00" in data else "is too large")
+    data = content_of(path, MOST_BYTES)
+    if b"\x00" in data:
+        raise refuse(str(path), "is not a text file")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:

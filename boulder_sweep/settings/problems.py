@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import stat
 from collections import Counter
-from collections.abc import Collection, Iterable
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 
 from boulder_sweep.errors import BoulderSweepError
-from boulder_sweep.locations import Location, stat_of
+from boulder_sweep.locations import Location, opened, stat_of
+from boulder_sweep.text import why
 
 MAX_REPORTED = 100
 """Most problems reported at once: a longer list does not help, and a hostile file could make it endless."""
@@ -32,43 +34,58 @@ class Position:
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One mistake in a settings file, or one note on it.
+    """One mistake in a file, or one note on it.
 
     Attributes
     ----------
-    file : str
-        The file as the user named it, or the ``--set`` option.
-    line, column : int or None
-        Position counted from 1, None where there is none (a file that cannot be read, a ``--set`` option).
-    key : str
-        Dotted key it is about, for example ``boulder.height``; empty if it is about the whole file.
+    position : Position
+        The file as the user named it, or the ``--set`` option; line and column are None where there are none (a file
+        that cannot be read, an option).
     message : str
         What is wrong and what is allowed.
+    key : str
+        Dotted key it is about, for example ``boulder.height``; empty if it is about the whole file.
     """
 
-    file: str
-    line: int | None
-    column: int | None
-    key: str
+    position: Position
     message: str
+    key: str = ""
+
+    @property
+    def file(self) -> str:
+        """The file, or the option."""
+        return self.position.file
+
+    @property
+    def line(self) -> int | None:
+        """The line, counted from 1."""
+        return self.position.line
+
+    @property
+    def column(self) -> int | None:
+        """The column, counted from 1."""
+        return self.position.column
 
     def __str__(self) -> str:
         """Format as ``file:line:column: key: message``."""
-        head = str(Position(self.file, self.line, self.column))
-        return ": ".join(part for part in (head, self.key, self.message) if part)
+        return ": ".join(part for part in (str(self.position), self.key, self.message) if part)
 
 
 class SettingsError(BoulderSweepError):
-    """The settings are not valid.
+    """The settings, or a part of them, cannot be used.
 
     Attributes
     ----------
+    found : list of Problem
+        Everything that was found, in the order in which it was.
     problems : list of Problem
-        Every mistake that was found, in the order of the file.
+        Every mistake once, in the order of the file; of very many the first `MAX_REPORTED`, and how many more there
+        are.
     """
 
-    def __init__(self, problems: Iterable[Problem]) -> None:
-        self.problems = list(problems)
+    def __init__(self, found: Iterable[Problem]) -> None:
+        self.found = list(found)
+        self.problems = _in_order(self.found)
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
     def user_message(self) -> str:
@@ -77,61 +94,71 @@ class SettingsError(BoulderSweepError):
 
     def __reduce__(self) -> tuple[type[SettingsError], tuple[list[Problem]]]:
         """Pickle by the problems, so that the error can pass between processes."""
-        return type(self), (self.problems,)
+        return type(self), (self.found,)
 
 
-@dataclass(frozen=True, slots=True)
-class Mistake:
-    """One mistake within an entry."""
-
-    position: Position
-    message: str
-
-
-class LeafError(Exception):
-    """An entry that cannot be used, with every mistake in it."""
-
-    def __init__(self, *mistakes: Mistake) -> None:
-        super().__init__("; ".join(mistake.message for mistake in mistakes))
-        self.mistakes = mistakes
+def _in_order(found: list[Problem]) -> list[Problem]:
+    """Return the first problems in the order of their positions, each file and option by itself."""
+    each = list(dict.fromkeys(found))
+    kept, dropped = each[:MAX_REPORTED], len(each) - MAX_REPORTED
+    files = list(dict.fromkeys(problem.file for problem in kept))
+    ordered = sorted(kept, key=lambda one: (files.index(one.file), one.line or 0, one.column or 0))
+    if dropped > 0:
+        ordered.append(Problem(Position(ordered[-1].file), f"and {dropped} more problems"))
+    return ordered
 
 
-class Mistakes(list[Mistake]):
-    """Mistakes of an entry, collected so that all are reported at once.
+class Problems(list[Problem]):
+    """Problems of a file or of an entry, collected so that all are reported at once."""
 
-    ``with mistakes:`` takes the mistakes of a part of the entry; what follows the block is read all the same.
-    """
+    @property
+    def full(self) -> bool:
+        """Whether further problems would only be counted in a report."""
+        return len(self) >= MAX_REPORTED
 
-    def add(self, position: Position, message: str) -> None:
-        """Add one mistake to the list."""
-        self.append(Mistake(position, message))
+    def add(self, position: Position, message: str, key: str = "") -> None:
+        """Add one problem."""
+        self.append(Problem(position, message, key))
 
-    def __enter__(self) -> None:
-        pass
+    @contextmanager
+    def under(self, key: str = "", named: Position | None = None) -> Iterator[None]:
+        """Take the problems of a part; what follows the block is read all the same.
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> bool:
-        if isinstance(error, LeafError):
-            self.extend(error.mistakes)
-        return isinstance(error, LeafError)
+        Parameters
+        ----------
+        key : str
+            Key of the part, if it has one: a key within it becomes part of the message.
+        named : Position or None
+            Where the part is named, if it is a file of its own: problems of the whole of it are reported there.
+        """
+        try:
+            yield
+        except SettingsError as error:
+            for one in error.found:
+                position, message = one.position, one.message
+                if named is not None and position.line is None and position.file != named.file:
+                    position, message = named, f"{position.file}: {message}"
+                within = f"{one.key}: " if key and one.key else ""
+                self.add(position, within + message, key or one.key)
 
     def raise_if_any(self) -> None:
-        """Raise LeafError if there is a mistake."""
+        """Raise SettingsError if there is a problem."""
         if self:
-            raise LeafError(*self)
+            raise SettingsError(self)
 
     def raise_unlike(self) -> None:
-        """Raise LeafError if there is a mistake; the same one in many values is reported once, where it comes first."""
-        Mistakes({mistake.message: mistake for mistake in self[::-1]}.values()).raise_if_any()
+        """Raise SettingsError if there is a problem; the same one in many values is reported where it comes first."""
+        Problems({(one.key, one.message): one for one in self[::-1]}.values()).raise_if_any()
 
 
-def wrong(position: Position, message: str) -> LeafError:
+def wrong(position: Position, message: str) -> SettingsError:
     """Return the error for an entry with one mistake."""
-    return LeafError(Mistake(position, message))
+    return SettingsError([Problem(position, message)])
 
 
 def refuse(file: str, message: str, line: int | None = None, column: int | None = None) -> SettingsError:
     """Return the error for a file that cannot be used at all."""
-    return SettingsError([Problem(file, line, column, "", message)])
+    return wrong(Position(file, line, column), message)
 
 
 def check_regular_file(path: Location, max_bytes: int, what: str) -> None:
@@ -157,7 +184,8 @@ def check_regular_file(path: Location, max_bytes: int, what: str) -> None:
     except FileNotFoundError:
         raise refuse(label, "there is no such file") from None
     except (OSError, ValueError) as error:
-        raise refuse(label, f"cannot be opened ({reason_of(error)})") from None
+        reason = why(error) if isinstance(error, OSError) else error
+        raise refuse(label, f"cannot be opened ({reason})") from None
     if stat.S_ISDIR(status.st_mode):
         raise refuse(label, "is a directory; a file is needed")
     if not stat.S_ISREG(status.st_mode):
@@ -166,70 +194,44 @@ def check_regular_file(path: Location, max_bytes: int, what: str) -> None:
         raise refuse(label, f"has {status.st_size / 1e6:.1f} MB; at most {max_bytes / 1e6:g} MB is read. {what}")
 
 
-def reason_of(error: Exception) -> str:
-    """Return why a file cannot be opened or read, without its name."""
-    return (error.strerror if isinstance(error, OSError) else None) or str(error)
+def content_of(path: Location, max_bytes: int) -> bytes:
+    """Return the content of a file of at most `max_bytes`.
 
-
-@dataclass
-class ProblemList:
-    """Collects problems; counts those beyond `MAX_REPORTED` and keeps none of them."""
-
-    problems: list[Problem] = field(default_factory=list)
-    dropped: int = 0
-
-    @property
-    def full(self) -> bool:
-        """Whether further problems are only counted."""
-        return len(self.problems) >= MAX_REPORTED
-
-    def add(self, position: Position, key: str, message: str) -> None:
-        """Add one problem, once."""
-        if self.full:
-            self.dropped += 1
-            return
-        problem = Problem(position.file, position.line, position.column, key, message)
-        if problem not in self.problems:
-            self.problems.append(problem)
-
-    def __bool__(self) -> bool:
-        return bool(self.problems)
-
-    def in_order(self) -> list[Problem]:
-        """Return the problems in the order of their positions, each file and option by itself."""
-        files = list(dict.fromkeys(problem.file for problem in self.problems))
-        ordered = sorted(self.problems, key=lambda p: (files.index(p.file), p.line or 0, p.column or 0))
-        if self.dropped:
-            last = ordered[-1]
-            ordered.append(Problem(last.file, None, None, "", f"and {self.dropped} more problems"))
-        return ordered
-
-    def raise_if_any(self) -> None:
-        """Raise SettingsError if there is a problem."""
-        if self.problems:
-            raise SettingsError(self.in_order())
+    Raises
+    ------
+    SettingsError
+        Not readable, or too large: a file may grow after `check_regular_file`.
+    """
+    try:
+        with opened(path) as stream:
+            data = stream.read(max_bytes + 1)
+    except OSError as error:
+        raise refuse(str(path), f"cannot be read ({why(error)})") from None
+    if len(data) > max_bytes:
+        raise refuse(str(path), f"is larger than {max_bytes / 1e6:g} MB")
+    return data
 
 
 class Alike:
     """Reports problems of one kind up to a limit, then counts them."""
 
-    def __init__(self, problems: ProblemList) -> None:
+    def __init__(self, problems: Problems) -> None:
         self.problems = problems
         self.counts: Counter[tuple[str, str]] = Counter()
         self.last: dict[tuple[str, str], Position] = {}
 
-    def add(self, kind: str, position: Position, key: str, message: str, most: int = MAX_ALIKE) -> None:
+    def add(self, kind: str, position: Position, message: str, key: str = "", most: int = MAX_ALIKE) -> None:
         """Report a problem, or count it if there were enough of its kind and key."""
         self.counts[kind, key] += 1
         self.last[kind, key] = Position(position.file, position.line)
         if self.counts[kind, key] <= most:
-            self.problems.add(position, key, message)
+            self.problems.add(position, message, key)
 
     def finish(self) -> None:
         """Say how many more there are."""
         for (kind, key), count in self.counts.items():
             if kind and count > MAX_ALIKE:
-                self.problems.add(self.last[kind, key], key, f"and {count - MAX_ALIKE} more {kind} like these")
+                self.problems.add(self.last[kind, key], f"and {count - MAX_ALIKE} more {kind} like these", key)
 
 
 def shorten(text: str, limit: int = 60) -> str:

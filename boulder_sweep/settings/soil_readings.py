@@ -21,7 +21,7 @@ import numpy as np
 from boulder_sweep import investigation as sand
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import Bound, Field
-from boulder_sweep.settings.problems import LeafError, Mistakes, Position, wrong
+from boulder_sweep.settings.problems import Position, Problems, SettingsError, wrong
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence, block_of
 from boulder_sweep.settings.units import UnitError, factor, quantity_text
 from boulder_sweep.settings.values import FRACTILE_5, NumberError, quoted, read_block, read_single, split_number
@@ -109,11 +109,11 @@ def _readings_of(node: Node, method: str, density_kg_m3: float | None) -> Locate
     items = node.items if isinstance(node, Sequence) and node.unit is None else [node]
     if not items:
         raise wrong(node.position, "the list is empty; give at least one reading")
-    readings, mistakes = [], Mistakes()
+    readings, problems = [], Problems()
     for item in items:
-        with mistakes:
+        with problems.under():
             readings.append((item.position, _reading(item, method, density_kg_m3)))
-    mistakes.raise_unlike()
+    problems.raise_unlike()
     return readings
 
 
@@ -149,7 +149,7 @@ def _without_signs(node: Node) -> tuple[Node, bool]:
 
     Raises
     ------
-    LeafError
+    SettingsError
         Blows over a penetration without a unit, or over more than the last 300 mm.
     """
     if not isinstance(node, Mapping):
@@ -200,7 +200,7 @@ def _take_angles(node: Node, method: str, readings: Located, lacking: Collection
 
     Raises
     ------
-    LeafError
+    SettingsError
         Readings that are too weak for the correlations, in one mistake; or no reading counts.
     """
     counting = [(position, reading) for position, reading in readings if "left_out" not in reading]
@@ -658,7 +658,7 @@ def unfold_soils(
     root: Mapping,
     listed: Collection[str],
     foot_m: float,
-    mistakes: Mistakes,
+    problems: Problems,
     read_log: Callable[[Scalar, Scalar | None], Log],
 ) -> list[dict[str, Any]]:
     """Replace the readings of every soil by distributions of the constants that it does not give.
@@ -671,7 +671,7 @@ def unfold_soils(
         Keys of the soil that a table of designs gives.
     foot_m : float
         The deepest foot of all designs [m].
-    mistakes : Mistakes
+    problems : Problems
         Receives what is wrong with them.
     read_log : callable
         Reads a log, by the names of its file and hole.
@@ -686,7 +686,7 @@ def unfold_soils(
         given = [key for key in METHODS if key in soil.entries]
         topsoil_m, topsoil = 0.0, soil.entries.pop(TOPSOIL.key, None)
         if topsoil is not None:
-            with mistakes:
+            with problems.under():
                 topsoil_m = read_single(topsoil.value, TOPSOIL)
                 if not set(given) & {*READING_FIELDS, LOG}:
                     message = "topsoil says which readings are left out; give it with spt or cpt, or with a log"
@@ -694,13 +694,13 @@ def unfold_soils(
         beside = {key: soil.entries.pop(key) for key in (HOLE, ENERGY) if key in soil.entries}
         for key, one in beside.items():
             if LOG not in given:
-                mistakes.add(one.position, f"{key} goes with soil.log, the file of a borehole or a cone")
+                problems.add(one.position, f"{key} goes with soil.log, the file of a borehole or a cone")
         if not given:
             continue
         entry = soil.entries[given[0]]
         lacking = [key for key in SOIL_KEYS if key not in soil.entries and key not in listed]
         constants: dict[str, Any] = {}
-        with mistakes:
+        with problems.under():
             if len(given) > 1:
                 raise wrong(soil.entries[given[1]].position, f"give one of {', '.join(given)}")
             if "water_table" in soil.entries and "subgrade_reaction" in lacking:
@@ -755,7 +755,7 @@ def _plain_density(soil: Mapping) -> float | None:
     node = soil.get("density")
     try:
         return read_single(node, BY_NAME["soil_density_kg_m3"]) if isinstance(node, Scalar) else None
-    except LeafError:
+    except SettingsError:
         return None  # reported where it stands
 
 

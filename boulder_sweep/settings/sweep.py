@@ -203,17 +203,30 @@ class Sweep:
     depth_sought: bool = False
     allowed: tuple[str, ...] = HELD
 
+    @property
+    def groups(self) -> list[dict[str, np.ndarray]]:
+        """Values by column name of each axis, or of the list of designs: those of a group vary together."""
+        return [axis.columns for axis in self.axes] if self.table is None else [self.table.columns]
+
+    @cached_property
+    def values(self) -> dict[str, np.ndarray]:
+        """All values by column name, of single ones an array of one."""
+        values = {name: np.array([value]) for name, value in self.constants.items()}
+        for group in self.groups:
+            values |= group
+        return values
+
     @cached_property
     def plan(self) -> DesignPlan:
         """How the columns of the designs follow from constants, axes and table."""
         given = {name: Source(np.array([value])) for name, value in self.constants.items()}
         labels: dict[str, Label] = {}
+        for k, group in enumerate(self.groups):
+            given |= {name: Source(values, (k,)) for name, values in group.items()}
         for k, axis in enumerate(self.axes):
-            given |= {name: Source(values, (k,)) for name, values in axis.columns.items()}
             if axis.labels:
                 labels[axis.name] = Label(np.arange(len(axis), dtype=np.int32), axis.labels, k)
         if self.table is not None:
-            given |= {name: Source(values, (0,)) for name, values in self.table.columns.items()}
             labels = self.table.labels
             rows = np.zeros(len(self.table), dtype=bool)
             for name, values in self.table.columns.items():
@@ -351,14 +364,11 @@ class Sweep:
     @cached_property
     def solidity(self) -> tuple[float, float]:
         """Least and largest share of the box of its sides that a boulder fills by its mass; 1 where none is given."""
-        groups = [axis.columns for axis in self.axes] + ([] if self.table is None else [self.table.columns])
-        values = {name: np.array([value]) for name, value in self.constants.items()}
-        for group in groups:
-            values |= group
+        values = self.values
         if BOULDER_MASS not in values:
             return 1.0, 1.0
         names = (BOULDER_MASS, "boulder_density_kg_m3", *SIDES)
-        listed = next((group for group in groups if len(group) > 1 and BOULDER_MASS in group), {})
+        listed = next((group for group in self.groups if len(group) > 1 and BOULDER_MASS in group), {})
         if all(name in listed or len(values[name]) == 1 for name in names):
             mass, rock, *sides = (values[name] for name in names)
             fills = mass / (rock * np.prod(np.broadcast_arrays(*sides), axis=0))
@@ -374,16 +384,10 @@ class Sweep:
 
     def _inputs(self) -> dict[str, Any]:
         """Return the values of the inputs by column name, lists where they vary."""
-        varying = {name: values for axis in self.axes for name, values in axis.columns.items()}
-        if self.table is not None:
-            varying |= self.table.columns
-        single = self.constants | ({EMBEDMENT[1]: TO_BE_FOUND} if self.depth_sought else {})
-        named = (entry.name for entry in INPUTS)
-        return {
-            name: _listed(varying[name]) if name in varying else single[name]
-            for name in named
-            if name in varying or name in single
-        }
+        varying = {name: _listed(values) for group in self.groups for name, values in group.items()}
+        sought = {EMBEDMENT[1]: TO_BE_FOUND} if self.depth_sought else {}
+        given = self.constants | sought | varying
+        return {entry.name: given[entry.name] for entry in INPUTS if entry.name in given}
 
 
 def units_in(settings: dict[str, Any]) -> str:

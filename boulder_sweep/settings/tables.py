@@ -33,12 +33,13 @@ from boulder_sweep.settings.fields import INPUTS, Field
 from boulder_sweep.settings.problems import (
     Alike,
     Position,
-    ProblemList,
+    Problems,
     SettingsError,
     check_regular_file,
     nearest,
     refuse,
     shorten,
+    wrong,
 )
 from boulder_sweep.settings.sweep import DesignList
 from boulder_sweep.settings.tree import Scalar
@@ -100,7 +101,7 @@ class TextTable:
     """
 
     def __init__(
-        self, label: str, rows: Iterator[Row], delimiter: str, known: Sequence[str], problems: ProblemList
+        self, label: str, rows: Iterator[Row], delimiter: str, known: Sequence[str], problems: Problems
     ) -> None:
         self.label, self.delimiter, self.problems = label, delimiter, problems
         self.alike = Alike(problems)
@@ -149,9 +150,7 @@ class TextTable:
                 yield chunk
                 chunk, size = [], 0
                 if self.alike.counts.total() > MOST_MISTAKES:
-                    self.problems.add(
-                        Position(self.label, row[1]), "", "is not read beyond this line: too many mistakes"
-                    )
+                    self.problems.add(Position(self.label, row[1]), "is not read beyond this line: too many mistakes")
                     break
         if chunk:
             yield chunk
@@ -203,7 +202,7 @@ class TextTable:
                     raise NumberError(f"'{shorten(cell)}' has a unit; units belong in the column's name")
                 values[at] = float(number)
             except (NumberError, OverflowError) as error:
-                self.alike.add("cells", self.position(rows[at], index), key, str(error))
+                self.alike.add("cells", self.position(rows[at], index), str(error), key)
         return values
 
     def _note_signs(self, text: str, rows: list[Row], index: int) -> None:
@@ -224,11 +223,11 @@ class TextTable:
             place, other = self._seen["."]
             message = f"'{shorten(cell)}' has a comma, and '{shorten(other)}' in line {place.line} a point"
             remedy = "write all numbers with decimal points, or all with decimal commas, and thousands unseparated"
-            self.problems.add(position, "", f"{message}; {remedy}")
+            self.problems.add(position, f"{message}; {remedy}")
         elif "certain" not in self._seen:
             whole, _, decimals = (shorten(part) for part in cell.partition(","))
             message = f"'{shorten(cell)}' may be {whole}{decimals} or {whole}.{decimals}, and no other number tells"
-            self.problems.add(position, "", f"{message}; write the numbers of this file without commas")
+            self.problems.add(position, f"{message}; write the numbers of this file without commas")
 
     def _even(self, rows: Iterator[Row], unnamed: Position) -> Iterator[Row]:
         """Yield rows with a cell for every name; report others, and an index that is none."""
@@ -240,14 +239,14 @@ class TextTable:
                 if len(cells) < width or _is_filled(cells[width:]):
                     message = f"has {len(cells)} cell{'' if len(cells) == 1 else 's'}; the first line has {width}"
                     message += hint if len(cells) > width and self.delimiter == "," else ""
-                    self.alike.add("lines", self.position(row, -self._first), "", message)
+                    self.alike.add("lines", self.position(row, -self._first), message)
                     continue
                 del cells[width:]
             if self._first:
                 number = int(cells[0]) if cells[0].isascii() and cells[0].isdecimal() and len(cells[0]) < 18 else -1
                 if number <= last:
                     message = "has no name, and does not count the rows; give it a name, or remove it"
-                    self.alike.add("", unnamed, "the first column", message, most=1)
+                    self.alike.add("", unnamed, message, "the first column", most=1)
                 last = number
             yield row
 
@@ -280,7 +279,7 @@ class _Lines:
 
 
 @contextmanager
-def open_table(path: Location, most_lines: int, known: Sequence[str], problems: ProblemList) -> Iterator[TextTable]:
+def open_table(path: Location, most_lines: int, known: Sequence[str], problems: Problems) -> Iterator[TextTable]:
     """Open a text file, or the first sheet of a spreadsheet (.xlsx), as a table.
 
     Parameters
@@ -319,7 +318,7 @@ def open_table(path: Location, most_lines: int, known: Sequence[str], problems: 
         raise refuse(label, f"cannot be read ({error.strerror})") from None
 
 
-def _table_of(lines: _Lines, known: Sequence[str], problems: ProblemList) -> TextTable:
+def _table_of(lines: _Lines, known: Sequence[str], problems: Problems) -> TextTable:
     """Return the lines of a text as a table; what stands most often between names separates cells."""
     texts = iter(lines)
     header = next((text for text in texts if text.strip(" \t\r\n,;")), "")
@@ -363,7 +362,7 @@ _MAX_PIECE = 10 * MAX_CELL
 """Longest stretch between two tags of a spreadsheet: a cell with every character written as ``&#x10FFFF;`` [bytes]."""
 
 
-def read_designs(node: Scalar, folder: Path, problems: ProblemList) -> DesignList | None:
+def read_designs(node: Scalar, folder: Path, problems: Problems) -> DesignList | None:
     """Return the designs of a table; mistakes go to `problems`.
 
     Parameters
@@ -372,7 +371,7 @@ def read_designs(node: Scalar, folder: Path, problems: ProblemList) -> DesignLis
         The file's name as written in the settings, or its URL.
     folder : Path
         Where relative names begin.
-    problems : ProblemList
+    problems : Problems
         Receives what is wrong with the table, by line and column of the table itself.
 
     Returns
@@ -380,52 +379,43 @@ def read_designs(node: Scalar, folder: Path, problems: ProblemList) -> DesignLis
     DesignList or None
         None where the table cannot be used; the problems say why.
     """
-    try:
-        path = located(node.text, folder)
-    except LocationError as refused:
-        problems.add(node.position, "table", str(refused))
-        return None
-    before = len(problems.problems)
-    suffix = path.suffix.lower()
-    reader = _READERS.get(suffix)
-    if reader is None:
-        kinds = ", ".join(_READERS)
-        problems.add(node.position, "table", f"'{shorten(node.text)}' has an unsupported type; use one of {kinds}")
-        return None
-    try:
+    before = len(problems)
+    with problems.under("table", node.position):
+        path = located(node, folder)
+        reader = _READERS.get(path.suffix.lower())
+        if reader is None:
+            kinds = ", ".join(_READERS)
+            raise wrong(node.position, f"'{shorten(node.text)}' has an unsupported type; use one of {kinds}")
         check_regular_file(path, MAX_BYTES, "Split it into several sweeps")
         designs = reader(path, problems)
-    except SettingsError as error:
-        for problem in error.problems:
-            inside = problem.line is not None
-            position = Position(problem.file, problem.line, problem.column) if inside else node.position
-            problems.add(position, "table", problem.message if inside else f"{problem.file}: {problem.message}")
-        return None
-    if len(problems.problems) == before and not designs.columns:
-        problems.add(node.position, "table", f"{path} has no column that is an input")
-    return None if len(problems.problems) > before else designs
+        if len(problems) == before and not designs.columns:
+            raise wrong(node.position, f"{path} has no column that is an input")
+    return None if len(problems) > before else designs
 
 
-def located(name: str, folder: Path) -> Location:
+def located(node: Scalar, folder: Path) -> Location:
     """Return where a file lies by its name or URL; relative names begin in `folder`.
 
     Raises
     ------
-    LocationError
+    SettingsError
         It is the URL of nothing that can be opened.
     """
-    name = name.strip()
-    return location_of(name) if is_url(name) else folder / Path(name)
+    name = node.text.strip()
+    try:
+        return location_of(name) if is_url(name) else folder / Path(name)
+    except LocationError as error:
+        raise wrong(node.position, str(error)) from None
 
 
-def _read_rows(path: Location, problems: ProblemList) -> DesignList:
+def _read_rows(path: Location, problems: Problems) -> DesignList:
     with open_table(path, MOST_ROWS, _NAMES, problems) as table:
         return _designs_of(table, path, problems)
 
 
-def _designs_of(table: TextTable, path: Location, problems: ProblemList) -> DesignList:
+def _designs_of(table: TextTable, path: Location, problems: Problems) -> DesignList:
     """Return the designs of a table; with mistakes in the header or the cells they are not usable."""
-    before = len(problems.problems)
+    before = len(problems)
     columns = read_header(table.names, table.positions, problems)
     numbers: dict[str, list[np.ndarray]] = {column.field.name: [] for column in columns if column and column.field}
     words: dict[str, _Words] = {column.name: _Words() for column in columns if column and not column.field}
@@ -445,9 +435,9 @@ def _designs_of(table: TextTable, path: Location, problems: ProblemList) -> Desi
             values = table.numbers(rows, index, column.name, column.field.unit) * float(column.factor)
             for row, message in check_values(values, column.field):
                 if not np.isnan(values[row]):  # those have been reported as they were read
-                    table.alike.add("cells", table.position(rows[row], index), column.name, message)
+                    table.alike.add("cells", table.position(rows[row], index), message, column.name)
             numbers[column.field.name].append(values)
-    if count == 0 and len(problems.problems) == before:
+    if count == 0 and len(problems) == before:
         raise refuse(table.label, "has no rows below the column names")
     for column, position in zip(columns, table.positions, strict=True):
         if column is not None and column.field is None and _are_numbers(words[column.name].codes):
@@ -560,7 +550,7 @@ def _check_pieces(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, label: str) 
                 length = len(others[-1])
 
 
-def _read_columns(path: Location, problems: ProblemList) -> DesignList:
+def _read_columns(path: Location, problems: Problems) -> DesignList:
     label = str(path)
     try:
         with opened(path) as source:
@@ -571,7 +561,7 @@ def _read_columns(path: Location, problems: ProblemList) -> DesignList:
         raise refuse(label, f"cannot be read ({error.strerror})") from None
 
 
-def _checked_columns(file: TableFile, path: Location, problems: ProblemList) -> DesignList:
+def _checked_columns(file: TableFile, path: Location, problems: Problems) -> DesignList:
     """Return the designs of an opened file, read column by column."""
     import pyarrow as pa  # takes a third of a second to import: only for tables in this format
 
@@ -599,14 +589,14 @@ def _checked_columns(file: TableFile, path: Location, problems: ProblemList) -> 
             continue
         if not numeric:
             held = "text" if pa.types.is_dictionary(cells.type) else cells.type
-            problems.add(position, name, f"holds {held}, not numbers")
+            problems.add(position, f"holds {held}, not numbers", name)
             continue
         if cells.null_count:
-            problems.add(position, name, f"has {cells.null_count} empty cells; every design needs a value")
+            problems.add(position, f"has {cells.null_count} empty cells; every design needs a value", name)
             continue
         values = cells.cast(pa.float64(), safe=False).to_numpy() * float(column.factor)
         for row, message in check_values(values, column.field):
-            alike.add("rows", position, name, f"row {row + 1}: {message}")
+            alike.add("rows", position, f"row {row + 1}: {message}", name)
         designs.columns[column.field.name] = np.ascontiguousarray(values)
     alike.finish()
     return designs
@@ -628,7 +618,7 @@ def _label(name: str, cells: pa.ChunkedArray, label: str) -> Label:
     return Label(found.codes[array.indices.fill_null(-1).to_numpy(zero_copy_only=False) + 1], found.words)
 
 
-_READERS: dict[str, Callable[[Location, ProblemList], DesignList]] = {
+_READERS: dict[str, Callable[[Location, Problems], DesignList]] = {
     ".csv": _read_rows,
     ".xlsx": _read_rows,
     ".parquet": _read_columns,
@@ -666,7 +656,7 @@ _STEMS: dict[str, Field] = {field.name.removesuffix(name_suffix(field.unit)): fi
 """Inputs by the name of the column without its unit."""
 
 
-def read_header(names: list[str], positions: list[Position], problems: ProblemList) -> list[TableColumn | None]:
+def read_header(names: list[str], positions: list[Position], problems: Problems) -> list[TableColumn | None]:
     """Return what every column is, None for those that cannot be used; mistakes go to `problems`."""
     columns: list[TableColumn | None] = []
     for name, position in zip(names, positions, strict=True):
@@ -676,7 +666,7 @@ def read_header(names: list[str], positions: list[Position], problems: ProblemLi
             if same:
                 column = f"gives the same as column {same[0].name}" if same[0].name != name else "appears twice"
         if isinstance(column, str):
-            problems.add(position, shorten(name) or "(empty)", column)
+            problems.add(position, column, shorten(name) or "(empty)")
         columns.append(column if isinstance(column, TableColumn) else None)
     return columns
 
@@ -721,13 +711,13 @@ def _input_column(name: str) -> TableColumn | None:
     return None
 
 
-def check_numbers(column: TableColumn, position: Position, problems: ProblemList) -> bool:
+def check_numbers(column: TableColumn, position: Position, problems: Problems) -> bool:
     """Report an unknown column that holds nothing but numbers; return whether it may be carried along."""
     if _ID.fullmatch(column.name):
         return True
     message = f"is not an input (inputs: {', '.join(_STEMS)}, each with its unit at the end)"
     message += "; a column of numbers that is to be carried along needs a name that ends in _id or _name"
-    problems.add(position, shorten(column.name), message)
+    problems.add(position, message, shorten(column.name))
     return False
 
 

@@ -24,7 +24,7 @@ from ruamel.yaml.events import (
 from ruamel.yaml.scanner import Scanner
 from ruamel.yaml.tokens import FlowMappingEndToken, FlowSequenceEndToken
 
-from boulder_sweep.settings.problems import Position, ProblemList, SettingsError, shorten
+from boulder_sweep.settings.problems import Position, Problems, SettingsError, shorten
 
 MAX_DEPTH = 20
 """Deepest nesting of lists and blocks; the format itself needs four levels."""
@@ -132,7 +132,7 @@ def block_of(position: Position, texts: dict[str, str]) -> Mapping:
     return Mapping(position, {key: Entry(key, position, Scalar(position, text)) for key, text in texts.items()})
 
 
-def parse(text: str, label: str, problems: ProblemList) -> Mapping | None:
+def parse(text: str, label: str, problems: Problems) -> Mapping:
     """Return the tree of a YAML text whose top level is a block of keys.
 
     Parameters
@@ -141,38 +141,33 @@ def parse(text: str, label: str, problems: ProblemList) -> Mapping | None:
         The whole file.
     label : str
         Name of the file in messages.
-    problems : ProblemList
+    problems : Problems
         Receives duplicate keys, tags and other mistakes after which reading can go on.
-
-    Returns
-    -------
-    Mapping or None
-        None where the file holds something other than keys; a problem says so.
 
     Raises
     ------
     SettingsError
-        The text is not YAML, nested too deep or too large: reading cannot go on.
+        The text is not YAML or something other than keys, nested too deep or too large: reading cannot go on.
     """
     root = parse_node(text, label, problems)
     if isinstance(root, Mapping):
         return root
     if root is None:
-        problems.add(Position(label), "", "is empty; it needs at least the blocks boulder, site, soil and vehicle")
+        problems.add(Position(label), "is empty; it needs at least the blocks boulder, site, soil and vehicle")
     else:
-        problems.add(root.position, "", "a settings file consists of blocks such as 'boulder: {length: 1.65 m}'")
-    return None
+        problems.add(root.position, "a settings file consists of blocks such as 'boulder: {length: 1.65 m}'")
+    raise SettingsError(problems)
 
 
-def parse_node(text: str, label: str, problems: ProblemList) -> Node | None:
+def parse_node(text: str, label: str, problems: Problems) -> Node | None:
     """Return the tree of any YAML text, None if it is empty; otherwise as `parse`."""
     try:
         return _TreeReader(text, label, problems).read_document()
     except YAMLError as error:
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         position = Position(label) if mark is None else Position(label, mark.line + 1, mark.column + 1)
-        problems.add(position, "", str(error.problem) if isinstance(error, _TooDeepError) else _explained(error))
-        raise SettingsError(problems.in_order()) from None
+        problems.add(position, str(error.problem) if isinstance(error, _TooDeepError) else _explained(error))
+        raise SettingsError(problems) from None
 
 
 def _events(yaml: YAML, text: str) -> Iterator[Any]:
@@ -190,7 +185,7 @@ def _events(yaml: YAML, text: str) -> Iterator[Any]:
 class _TreeReader:
     """Puts the events of one text together. It recurses, no deeper than `MAX_DEPTH`."""
 
-    def __init__(self, text: str, label: str, problems: ProblemList) -> None:
+    def __init__(self, text: str, label: str, problems: Problems) -> None:
         self.label = label
         self.problems = problems
         self.anchors: dict[str, tuple[Node, int] | None] = {}  # None: not read to its end yet
@@ -265,7 +260,7 @@ class _TreeReader:
             size = _bounded(size + values)
             word = key.text if isinstance(key, Scalar) else None
             if word is None:
-                self.problems.add(key.position, "", "a key must be one word")
+                self.problems.add(key.position, "a key must be one word")
             value, values = self.read_node(next(self.events), (*path, word or ""))
             size = _bounded(size + values)
             if word is None or _joined(mapping, key, value):
@@ -273,7 +268,7 @@ class _TreeReader:
             first = mapping.entries.get(word)
             if first is not None:
                 name = ".".join(shorten(part) for part in (*path, word))
-                self.problems.add(key.position, name, f"is given twice (first on line {first.position.line})")
+                self.problems.add(key.position, f"is given twice (first on line {first.position.line})", name)
                 continue
             if isinstance(value, Scalar) and not value.text and not value.quoted:
                 value = Scalar(key.position, "")  # YAML places an empty value where the next token begins
@@ -294,7 +289,7 @@ class _TreeReader:
         return Position(self.label, event.start_mark.line + 1, event.start_mark.column + 1)
 
     def report(self, event: Any, message: str) -> None:
-        self.problems.add(self.position(event), "", message)
+        self.problems.add(self.position(event), message)
 
 
 def _joined(mapping: Mapping, key: Node, value: Node) -> bool:

@@ -18,9 +18,8 @@ import numpy as np
 from boulder_sweep.settings.fields import FAR, Field
 from boulder_sweep.settings.model import KINDS, Distribution, SetDistributions
 from boulder_sweep.settings.problems import (
-    LeafError,
-    Mistakes,
     Position,
+    Problems,
     did_you_mean,
     nearest,
     shorten,
@@ -127,7 +126,7 @@ def read_leaf(node: Node, field: Field) -> Leaf:
 
     Raises
     ------
-    LeafError
+    SettingsError
         With every mistake of this entry.
     """
     node = _unfold_text_list(node)
@@ -153,7 +152,7 @@ def read_single(node: Node, field: Field) -> float:
 
     Raises
     ------
-    LeafError
+    SettingsError
         Not one number, wrong unit, or outside the admitted range.
     """
     if not isinstance(node, Scalar):
@@ -178,28 +177,25 @@ def read_block(node: Node, known: dict[str, Field], what: str, required: Collect
 
     Raises
     ------
-    LeafError
+    SettingsError
         With every mistake in it.
     """
     if not isinstance(node, Mapping) or node.unit is not None:
         raise wrong(node.position, f"{what} must be a block of keys: {', '.join(known)}")
     values: dict[str, float] = {}
-    mistakes = Mistakes()
+    problems = Problems()
     for entry in node:
         field = known.get(entry.key)
         if field is None:
             message = f"'{shorten(entry.key)}' is not a key of {what} ({', '.join(known)}){meant_by(entry, known)[1]}"
-            mistakes.add(entry.position, message)
+            problems.add(entry.position, message)
             continue
-        try:
+        with problems.under(entry.key):
             values[field.name] = read_single(entry.value, field)
-        except LeafError as error:
-            for mistake in error.mistakes:
-                mistakes.add(mistake.position, f"{entry.key}: {mistake.message}")
     missing = [key for key in required if key not in node.entries]
-    if missing and not mistakes:
-        mistakes.add(node.position, f"the {what.partition(' ')[2]} lacks {', '.join(missing)}")
-    mistakes.raise_if_any()
+    if missing and not problems:
+        problems.add(node.position, f"the {what.partition(' ')[2]} lacks {', '.join(missing)}")
+    problems.raise_if_any()
     return values
 
 
@@ -281,27 +277,27 @@ def _unfold_text_list(node: Node) -> Node:
 def _read_all(items: list[Node], field: Field, unit: Scalar | None) -> list[Quantity]:
     """Read every number of an entry; all of them with a unit or none."""
     quantities: list[Quantity] = []
-    mistakes = Mistakes()
+    problems = Problems()
     for item in items:
-        with mistakes:
+        with problems.under():
             quantities.append(read_quantity(item, field.unit, unit, sample_of(field)))
-    if not mistakes and len({bool(quantity.written) for quantity in quantities}) > 1:
+    if not problems and len({bool(quantity.written) for quantity in quantities}) > 1:
         bare = next(item for item, quantity in zip(items, quantities, strict=True) if not quantity.written)
         message = f"{quoted(bare)} has no unit while the others have one; give all of them a unit, or none"
-        mistakes.add(bare.position, message)
-    mistakes.raise_unlike()
+        problems.add(bare.position, message)
+    problems.raise_unlike()
     return quantities
 
 
 def _check_values(quantities: list[Quantity], nodes: list[Node], field: Field) -> list[float]:
     """Return the values; every one of them must be admitted."""
     values = [_to_float(quantity.value) for quantity in quantities]
-    mistakes = Mistakes()
+    problems = Problems()
     for node, value, quantity in zip(nodes, values, quantities, strict=True):
         problem = outside(value, field, quantity.written)
         if problem:
-            mistakes.add(node.position, problem)
-    mistakes.raise_if_any()
+            problems.add(node.position, problem)
+    problems.raise_if_any()
     return values
 
 
@@ -327,13 +323,13 @@ def _read_range(node: Mapping, field: Field) -> tuple[list[float], str]:
 
 
 def _check_range_keys(node: Mapping) -> None:
-    mistakes = Mistakes()
+    problems = Problems()
     for entry in node:
         if entry.key not in RANGE_KEYS:
             hint = did_you_mean(entry.key, RANGE_KEYS)
             message = f"'{shorten(entry.key)}' is not a key of a range (from, to, count or step){hint}"
-            mistakes.add(entry.position, message)
-    mistakes.raise_if_any()
+            problems.add(entry.position, message)
+    problems.raise_if_any()
     missing = [key for key in ("from", "to") if key not in node.entries]
     if missing:
         raise wrong(node.position, f"the range lacks {' and '.join(missing)}")
@@ -401,7 +397,7 @@ def read_quantity(node: Node, unit: str, outer_unit: Scalar | None = None, sampl
 
     Raises
     ------
-    LeafError
+    SettingsError
         Not a finite decimal number, or an unknown or unfit unit.
     """
     if not isinstance(node, Scalar):
@@ -560,7 +556,7 @@ def read_count(node: Node, what: str, largest: int) -> int:
 
     Raises
     ------
-    LeafError
+    SettingsError
         Not a whole number, or outside that range.
     """
     if isinstance(node, Scalar) and re.fullmatch(r"[1-9]\d{0,17}", node.text.strip(), re.ASCII):
@@ -595,7 +591,7 @@ def read_input(node: Node, field: Field) -> Leaf:
 
     Raises
     ------
-    LeafError
+    SettingsError
         With every mistake of this entry.
     """
     if isinstance(node, Mapping) and not set(RANGE_KEYS) & set(node.entries) and _WORDS & set(node.entries):
@@ -611,12 +607,12 @@ def _read_distribution(node: Mapping, field: Field) -> Leaf:
     """
     kind = _kind(node)
     _check_keys(node, kind)
-    mistakes = Mistakes()
+    problems = Problems()
 
     def read(key: str | None, reader: Callable[[Node], T]) -> T | None:
         value = None if key is None else node.get(key)
         if value is not None:
-            with mistakes:
+            with problems.under():
                 return reader(value)
         return None
 
@@ -625,7 +621,7 @@ def _read_distribution(node: Mapping, field: Field) -> Leaf:
     cov = read("cov", lambda value: _positive(value, "1"))
     centre = next((key for key in _CENTRES if key in node.entries), None)
     given = read(centre, lambda value: read_leaf(value, field))
-    mistakes.raise_if_any()
+    problems.raise_if_any()
     bound = field.admitted
     assert bound is not None
     distribution = Distribution(
@@ -667,22 +663,22 @@ def _kind(node: Mapping) -> str:
 def _check_keys(node: Mapping, kind: str) -> None:
     """Report keys that are unknown, do not belong to this kind, are missing or exclude each other."""
     taken = {"distribution", "low", "high", *(key for group in NEEDED[kind] for key in group)}
-    mistakes = Mistakes()
+    problems = Problems()
     for entry in node:
         if entry.key not in taken:
             hint = "" if entry.key in _KEYS else did_you_mean(entry.key, _KEYS)
             known = ", ".join(key for key in _KEYS if key in taken)
             message = f"'{shorten(entry.key)}' is not a key of a {kind} distribution ({known}){hint}"
-            mistakes.add(entry.position, message)
+            problems.add(entry.position, message)
     for group in NEEDED[kind]:
         given = [key for key in group if key in node.entries]
         if len(given) > 1:
-            mistakes.add(node.entries[given[1]].position, f"give {' or '.join(group)}, not both")
-        elif not given and not mistakes:
-            mistakes.add(node.position, f"a {kind} distribution needs {' or '.join(group)}")
+            problems.add(node.entries[given[1]].position, f"give {' or '.join(group)}, not both")
+        elif not given and not problems:
+            problems.add(node.position, f"a {kind} distribution needs {' or '.join(group)}")
     if node.unit is not None:
-        mistakes.add(node.unit.position, "write the unit behind each number of a distribution")
-    mistakes.raise_if_any()
+        problems.add(node.unit.position, "write the unit behind each number of a distribution")
+    problems.raise_if_any()
 
 
 def _positive(node: Node, unit: str) -> float:

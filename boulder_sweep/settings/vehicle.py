@@ -16,7 +16,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from boulder_sweep.settings.model import Bound, entries_of, setting
-from boulder_sweep.settings.problems import Mistakes, wrong
+from boulder_sweep.settings.problems import Problems, wrong
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar
 from boulder_sweep.settings.units import quantity_text
 from boulder_sweep.settings.values import read_block
@@ -139,16 +139,16 @@ def _read_approach(node: Node) -> Approach:
     """Read ``{length: 80 m, from: 0 mph, acceleration: 1.5 m/s^2, curve_radius: 25 m, friction: 0.8, grade: -4 %}``."""
     values = read_block(node, APPROACH_FIELDS, "an approach")
     given = node.entries if isinstance(node, Mapping) else {}
-    mistakes = Mistakes()
+    problems = Problems()
     if "length" not in given:
-        mistakes.add(node.position, "lacks length, the length of the run-up to the boulder")
+        problems.add(node.position, "lacks length, the length of the run-up to the boulder")
     if "acceleration" not in given:
-        mistakes.add(node.position, NEEDS_ACCELERATION)
+        problems.add(node.position, NEEDS_ACCELERATION)
     if not {"from", "curve_radius"} & set(given):
-        mistakes.add(node.position, "lacks from (0 mph for a start from rest) or curve_radius")
+        problems.add(node.position, "lacks from (0 mph for a start from rest) or curve_radius")
     if "friction" in given and "curve_radius" not in given:
-        mistakes.add(given["friction"].position, "friction limits the speed in a curve: give curve_radius")
-    mistakes.raise_if_any()
+        problems.add(given["friction"].position, "friction limits the speed in a curve: give curve_radius")
+    problems.raise_if_any()
     approach = Approach(**values)
     try:
         speed = approach.impact_speed_m_s
@@ -190,14 +190,14 @@ def _speed_text(speed: float, units: str) -> str:
     return f"{speed:.4g} m/s ({mph})" if units == "si" else mph
 
 
-def unfold_approaches(root: Mapping, mistakes: Mistakes) -> list[dict[str, Any]]:
+def unfold_approaches(root: Mapping, problems: Problems) -> list[dict[str, Any]]:
     """Replace the approach of every vehicle by its speed.
 
     Parameters
     ----------
     root : Mapping
         The tree of the file, changed in place.
-    mistakes : Mistakes
+    problems : Problems
         Receives what is wrong with them.
 
     Returns
@@ -211,10 +211,10 @@ def unfold_approaches(root: Mapping, mistakes: Mistakes) -> list[dict[str, Any]]
         if entry is None:
             continue
         new: list[Entry] = []
-        with mistakes:
+        with problems.under():
             approach = _read_approach(entry.value)
             if SPEED in vehicle.entries:
-                mistakes.add(entry.position, f"give {SPEED} or {APPROACH}, not both")
+                problems.add(entry.position, f"give {SPEED} or {APPROACH}, not both")
             data.append(vehicle.label | _kept_of(approach))
             speed = Scalar(entry.value.position, f"{approach.impact_speed_m_s!r} m/s")
             new = [Entry(SPEED, entry.position, speed)]

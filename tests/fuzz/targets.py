@@ -35,7 +35,7 @@ from boulder_sweep.report.export import export
 from boulder_sweep.report.rows import read_rows
 from boulder_sweep.settings import Sweep, load_text
 from boulder_sweep.settings.loader import decode
-from boulder_sweep.settings.problems import MAX_REPORTED, Position, ProblemList
+from boulder_sweep.settings.problems import MAX_REPORTED, Position, Problems
 from boulder_sweep.settings.sweep import derived_words
 from boulder_sweep.settings.tables import read_designs
 from boulder_sweep.settings.tree import Scalar
@@ -144,7 +144,7 @@ def designs(data: bytes) -> bool:
 
 def check_designs(name: str) -> None:
     """Read a list of designs; every design has a number in every column, and a word under every label."""
-    problems = ProblemList()
+    problems = Problems()
     found = read_designs(Scalar(Position("sweep.yaml", 1, 8), name), HERE, problems)
     problems.raise_if_any()
     assert found is not None

@@ -3,6 +3,7 @@
 import itertools
 import pickle
 import tracemalloc
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ from hypothesis import strategies as st
 
 from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.designs import MAX_DICTIONARY, DesignPlan, Source, impact_height_of_face
+from boulder_sweep.settings import load_text
+from tests.settings.conftest import MINIMAL
 
 KEYS = {
     "boulder_length_m": "boulder.length",
@@ -81,43 +84,17 @@ def grids(draw):
         low, high = within.get(name, (0.2, 3.0))
         numbers = st.floats(low, high).map(lambda value: round(value, 2))
         values = draw(st.lists(numbers, min_size=1, max_size=4))
-        overrides.append((KEYS[name], values))
+        overrides.append(f"{KEYS[name]}={values}")
     return overrides
 
 
 @settings(max_examples=150, deadline=None)
 @given(grid=grids(), data=st.data())
-def test_any_block_of_any_grid_equals_the_product(load_of_axes, grid, data):
-    sweep = load_of_axes(grid)
+def test_any_block_of_any_grid_equals_the_product(grid, data):
+    sweep = load_text(MINIMAL, Path("grid.yaml"), [*grid, "allow_unusual=all"])
     start = data.draw(st.integers(0, sweep.n_designs))
     stop = data.draw(st.integers(start, min(sweep.n_designs, start + 200)))
     _check(sweep, start, stop)
-
-
-@pytest.fixture(scope="module")
-def load_of_axes():
-    from pathlib import Path
-
-    from boulder_sweep.settings import load_text
-
-    def load_of_axes(overrides):
-        blocks: dict[str, dict[str, str]] = {
-            "boulder": {"length": "1.65", "width": "1.68", "height": "3.44", "density": "2596"},
-            "site": {},
-            "soil": {"density": "1860", "friction_angle": "43", "subgrade_reaction": "95"},
-            "vehicle": {"mass": "6722", "speed": "14.5", "spring": "3103300", "damper": "138910"},
-        }
-        for key, values in overrides:
-            section, name = key.split(".")
-            blocks[section][name] = str(values)
-        # Axes that can never be valid as single values stay lists, so that the rows tell of them.
-        text = "\n".join(
-            f"{section}: {{{', '.join(f'{key}: {value}' for key, value in keys.items())}}}"
-            for section, keys in blocks.items()
-        )
-        return load_text(f"{text}\nallow_unusual: all", Path("grid.yaml"))  # axes reach beyond what is usual
-
-    return load_of_axes
 
 
 def test_the_whole_example(load_it, example):

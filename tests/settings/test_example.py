@@ -4,13 +4,10 @@ import json
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-import boulder_sweep
 from boulder_sweep.columns import BY_NAME, COLUMNS, INPUT_COLUMNS, OPTIONAL_INPUTS, OUTCOME_COLUMNS, TO_BUILD
-from boulder_sweep.settings import load, load_text
-from boulder_sweep.settings.problems import SettingsError
+from boulder_sweep.settings import load
 from boulder_sweep.store.provenance import settings_sha256
 from tests.report.conftest import SITE
 
@@ -164,13 +161,6 @@ def test_register_of_columns():
             assert spec.name.endswith(endings[spec.unit])
 
 
-def test_block_has_every_input_column_in_order(load_it, example):
-    block = load_it(example).block(5, 15)
-    assert tuple(block.columns) == INPUT_COLUMNS
-    assert all(len(column) == 10 for column in block.columns.values())
-    assert all(column.to_numpy().dtype == np.float64 for column in block.columns.values())
-
-
 CONFIGS = Path(__file__).parents[2] / "configs"
 
 # Tables 1 to 3 of the paper.
@@ -240,22 +230,17 @@ def test_every_file_is_valid_without_remarks(path):
     assert load(path).notes == ()
 
 
-def loaded(block, tmp_path):
-    return load_text(f"{SITE}{block}\n", tmp_path / "site.yaml")
-
-
-def test_it_is_in_the_resolved_settings_and_in_no_hash(tmp_path):
-    plain, headed = loaded("", tmp_path), loaded("report: {client: City, date: 2026-11-25}", tmp_path)
+def test_it_is_in_the_resolved_settings_and_in_no_hash(load_it):
+    plain, headed = load_it(SITE), load_it(f"{SITE}report: {{client: City, date: 2026-11-25}}\n")
     assert "report" not in plain.resolved()
     assert headed.resolved()["report"] == {"client": "City", "date": "2026-11-25"}
     assert settings_sha256(plain.resolved()) == settings_sha256(headed.resolved())
     assert [axis.name for axis in headed.axes] == [axis.name for axis in plain.axes]
-    assert loaded("report:", tmp_path).resolved() == plain.resolved()
+    assert load_it(f"{SITE}report:\n").resolved() == plain.resolved()
 
 
-def test_an_override_replaces_an_entry(tmp_path):
-    (tmp_path / "site.yaml").write_text(f"{SITE}report: {{client: City}}\n")
-    sweep = boulder_sweep.load(tmp_path / "site.yaml", ["report.client=County", "report.author=C. Day"])
+def test_an_override_replaces_an_entry(load_it):
+    sweep = load_it(f"{SITE}report: {{client: City}}\n", "report.client=County", "report.author=C. Day")
     assert sweep.heading.given() == {"client": "County", "author": "C. Day"}
 
 
@@ -273,8 +258,6 @@ def test_an_override_replaces_an_entry(tmp_path):
         (f"report: {{client: {'x' * 201}}}", 18, "report.client: has 201 characters; at most 200 fit into a heading"),
     ],
 )
-def test_a_wrong_entry_is_refused_where_it_stands(block, column, words, tmp_path):
-    with pytest.raises(SettingsError) as refused:
-        loaded(block, tmp_path)
-    place = f"{tmp_path / 'site.yaml'}:{len(SITE.splitlines()) + 1}:{column}"
-    assert str(refused.value.problems[0]).startswith(f"{place}: {words}")
+def test_a_wrong_entry_is_refused_where_it_stands(problems_of, block, column, words):
+    problem, *_ = problems_of(f"{SITE}{block}\n")
+    assert str(problem).startswith(f"grid.yaml:{len(SITE.splitlines()) + 1}:{column}: {words}")

@@ -5,7 +5,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from boulder_sweep.settings.problems import ProblemList
+from boulder_sweep.settings.problems import Problems
 from boulder_sweep.settings.tree import Mapping, Node, Scalar, parse
 from docs.studies.json_schema import FILE, schema, text
 
@@ -33,7 +33,7 @@ def _plain(node: Node, unit: str = "") -> object:
 
 
 def _errors(content: str) -> list[str]:
-    root = parse(content, "grid.yaml", ProblemList())
+    root = parse(content, "grid.yaml", Problems())
     return [error.json_path for error in VALIDATOR.iter_errors(_plain(root))]
 
 

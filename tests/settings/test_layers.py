@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from boulder_sweep.cli.console import grid_lines
-from boulder_sweep.settings import SettingsError, load
 from boulder_sweep.settings.model import Ground, Layer
 
 FILE = """\
@@ -20,14 +19,12 @@ vehicle: {mass: 6800 kg, speed: 50 km/h, spring: 3103 kN/m, damper: 138.9 kN*s/m
 DEEPER = "{from: 0.5 m, density: 2 t/m^3, friction_angle: 36 deg, subgrade_reaction: 40000 kN/m^3, cohesion: 2 kPa}"
 
 
-def loaded(tmp_path, *lines: str):
-    path = tmp_path / "ground.yaml"
-    path.write_text(FILE.replace("WHAT", "\n".join(f"  {line}" for line in lines)))
-    return load(path)
+def ground_of(*lines: str) -> str:
+    return FILE.replace("WHAT", "\n".join(f"  {line}" for line in lines))
 
 
-def test_what_is_read(tmp_path) -> None:
-    sweep = loaded(tmp_path, f"layers: [{DEEPER}]", "cohesion: 4000 Pa", "water_table: 80 cm", "slope: 0.1 rad")
+def test_what_is_read(load_it) -> None:
+    sweep = load_it(ground_of(f"layers: [{DEEPER}]", "cohesion: 4000 Pa", "water_table: 80 cm", "slope: 0.1 rad"))
     ground = sweep.model.ground
     assert ground.layers == (Layer(0.5, 2000.0, 36.0, 40.0, 2.0),)
     assert (ground.cohesion_kPa, ground.water_table_m) == (4.0, 0.8)
@@ -57,45 +54,28 @@ def test_what_is_read(tmp_path) -> None:
         ("slope: 38 deg", "7:3", "must be less than every friction angle (the least is 38 deg)"),
     ],
 )
-def test_what_is_refused(tmp_path, line: str, where: str, message: str) -> None:
-    with pytest.raises(SettingsError) as refused:
-        loaded(tmp_path, line)
-    (problem,) = refused.value.problems
+def test_what_is_refused(problems_of, line: str, where: str, message: str) -> None:
+    (problem,) = problems_of(ground_of(line))
     assert message in problem.message
     assert f"{problem.line}:{problem.column}" == where
 
 
-def test_the_slope_is_held_against_design_values_and_layers(tmp_path) -> None:
+def test_the_slope_is_held_against_design_values_and_layers(load_it, problems_of) -> None:
     """36 deg in the layer; a factor of 1.25 leaves 30.2 deg."""
-    path = tmp_path / "ground.yaml"
-    path.write_text(FILE.replace("WHAT", f"  layers: [{DEEPER}]\n  slope: 33 deg"))
-    assert load(path).model.slope_deg == 33.0
-    with pytest.raises(SettingsError, match=r"the least is 30\.17 deg"):
-        load(path, ("partial_factor.friction_angle=1.25",))
+    text = ground_of(f"layers: [{DEEPER}]", "slope: 33 deg")
+    assert load_it(text).model.slope_deg == 33.0
+    (problem,) = problems_of(text, "partial_factor.friction_angle=1.25")
+    assert "the least is 30.17 deg" in problem.message
 
 
-@pytest.mark.parametrize(("water", "floats"), [("0.2 m", True), ("0.6 m", False)])
-def test_soil_that_floats(tmp_path, water: str, floats: bool) -> None:
+def test_soil_that_floats(load_it, problems_of) -> None:
     """Only soil below the water table must be heavier than water."""
-    path = tmp_path / "ground.yaml"
-    path.write_text(FILE.replace("1860", "960").replace("WHAT", f"  layers: [{DEEPER}]\n  water_table: {water}"))
-    if floats:
-        with pytest.raises(SettingsError, match=r"soil of 960 kg/m\^3 would float"):
-            load(path)
-    else:
-        assert load(path).model.water_table_m == 0.6
-
-
-def test_named_soils_have_none_of_their_own(tmp_path) -> None:
-    path = tmp_path / "ground.yaml"
-    soils = "soil: [{name: a, density: 1860, friction_angle: 38, subgrade_reaction: 60, slope: 5 deg}]"
-    path.write_text(
-        "\n".join(
-            line if not line.startswith("soil") else soils for line in FILE.splitlines()[:3] + FILE.splitlines()[-1:]
-        )
+    wet, dry = (
+        ground_of(f"layers: [{DEEPER}]", f"water_table: {at}").replace("1860", "960") for at in ("0.2 m", "0.6 m")
     )
-    with pytest.raises(SettingsError, match="is not a key of soil in a named set: it is one for all designs of a file"):
-        load(path)
+    (problem,) = problems_of(wet)
+    assert "soil of 960 kg/m^3 would float" in problem.message
+    assert load_it(dry).model.water_table_m == 0.6
 
 
 SETS = """\
@@ -177,7 +157,8 @@ def test_a_partial_factor_reaches_named_sets(load_it, soils):
         ("32 deg", "{mean: [30, 32], sd: 3}", "soil.friction_angle", "must have one mean"),
         ("density: 1700", "densty: 1700", "soil.densty", "did you mean density?"),
         ("density: 1700, ", "", "soil.density", "in every named set, or in none"),
-        ("name: loose", "name: loose, correlation: 0.5", "soil.correlation", "is not a key of soil"),
+        ("name: loose", "name: loose, correlation: 0.5", "soil.correlation", "is not a key of soil in a named set"),
+        ("name: loose", "name: loose, slope: 5 deg", "soil.slope", "it is one for all designs of a file"),
         (
             "  - {name: loose, density: 1700, friction_angle: 32 deg, subgrade_reaction: 10}",
             "  - loose",

@@ -114,6 +114,12 @@ def test_mistakes_point_at_the_option(problems_of, minimal, override, words):
     assert all(problem.file == "--set" and problem.line is None for problem in problems if words in problem.message)
 
 
+def test_a_file_that_an_option_names_wrongly_is_a_mistake_of_the_option(problems_of, minimal):
+    (problem,) = problems_of(minimal, "table=designs.doc")
+    kinds = ".csv, .xlsx, .parquet"
+    assert str(problem) == f"--set: table: 'designs.doc' has an unsupported type; use one of {kinds}"
+
+
 def test_mistakes_of_file_and_options_come_together(problems_of, minimal):
     problems = problems_of(minimal.replace("1.65", "x"), "vehicle.speed=x", "vehicle.mass=y")
     assert [(problem.file, problem.key) for problem in problems] == [

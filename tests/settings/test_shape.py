@@ -140,10 +140,8 @@ FOOT, TOP = (f"{{height: {height}, width: 1, length: 1}}" for height in (0, 2))
         ),
     ],
 )
-def test_mistakes_in_a_profile(minimal, points, where, words):
-    with pytest.raises(SettingsError) as caught:
-        load_text(with_profile(minimal, points), Path("grid.yaml"))
-    (problem,) = caught.value.problems
+def test_mistakes_in_a_profile(problems_of, minimal, points, where, words):
+    (problem,) = problems_of(with_profile(minimal, points))
     assert problem.key == "boulder.profile"
     assert words in problem.message
     assert f"{problem.line}:{problem.column}" == where
