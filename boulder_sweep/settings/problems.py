@@ -117,7 +117,7 @@ class Problems(list[Problem]):
         return len(self) >= MAX_REPORTED
 
     def add(self, position: Position, message: str, key: str = "") -> None:
-        """Add one problem."""
+        """Add one problem to what was found."""
         self.append(Problem(position, message, key))
 
     @contextmanager

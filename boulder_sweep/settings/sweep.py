@@ -205,7 +205,7 @@ class Sweep:
 
     @property
     def groups(self) -> list[dict[str, np.ndarray]]:
-        """Values by column name of each axis, or of the list of designs: those of a group vary together."""
+        """Values by column name of each axis, or of the list of designs; the values of a group vary together."""
         return [axis.columns for axis in self.axes] if self.table is None else [self.table.columns]
 
     @cached_property
