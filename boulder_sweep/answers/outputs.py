@@ -133,7 +133,8 @@ class AnswerFile:
 
     def _check(self, names: set[str]) -> None:
         """Refuse a question that no command asks, more answers than designs, and inputs or words that none has."""
-        designs = self.identity["settings"]["n_designs"]
+        settings = self.identity["settings"]
+        designs, order, labels = settings["n_designs"], settings["order"], settings.get("labels", {})
         if self.kind and len(self.table) > designs:
             what = f"it has {len(self.table):,} rows for {counted(designs, 'design')}"
             raise self._refusal(f"{self.path} is damaged: {what}")
@@ -144,6 +145,8 @@ class AnswerFile:
                 check_entries(self.question, _QUESTIONS[self.kind], "question")
             if self.kind == NEED and self.question["asked"] not in names:
                 raise ValueError("question.asked is no answer of the file")
+            if self.kind and order != "table" and (lost := {*order} & {*labels} - names):
+                raise ValueError(f"column {min(lost)} is missing")
         except ValueError as problem:
             raise self._refusal(f"{self.path} is damaged ({problem}); write it again") from None
 
