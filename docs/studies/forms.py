@@ -189,5 +189,5 @@ def random_words(grid: Path, count: int = RANDOM) -> str:
     of_laws = ", ".join(f"{won[law].mean():.1%} under `{law}`" for law in reversed(RESISTANCES))
     return (
         f"Of {len(rotation)} passes among {count} designs {standing.mean():.0%} are robust. "
-        f"Of {len(won[PAPER])} designs that fail, friction and vertical motion let pass {of_laws}."
+        f"Of {len(won[PAPER])} designs that fail, these pass with friction and vertical motion: {of_laws}."
     )

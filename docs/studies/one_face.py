@@ -116,6 +116,6 @@ def one_face_words(grid: Path) -> str:
     apart = np.degrees(np.abs(both - known).max())
     return (
         f"Of {len(known)} passes of a sample of `configs/{grid.name}`, {np.count_nonzero(alone >= limit)} overturn "
-        f"with soil behind the boulder alone. (With soil on both faces the same integrator is at most {apart:.1g}° "
-        "from the kernels.)"
+        f"with soil behind the boulder alone. (With soil on both faces, this study's integrator differs from the "
+        f"model by at most {apart:.1g}°.)"
     )

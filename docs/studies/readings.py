@@ -155,10 +155,9 @@ def _preset_words(printed: ReadingRow, corrected: ReadingRow, designs: int) -> s
     unsafe = int((printed.stands & ~corrected.stands).sum())
     lost = int((corrected.stands & ~printed.stands).sum())
     return (
-        f"About as many designs stand by both presets, {printed.stands.mean():.1%} as printed and "
-        f"{corrected.stands.mean():.1%} corrected, because the misprints partly cancel; but they are not the same "
-        f"designs. {unsafe / designs:.1%} of all stand as printed and not corrected, {lost / designs:.1%} corrected "
-        "and not as printed."
+        f"About as many designs stand as printed, {printed.stands.mean():.1%}, as corrected, "
+        f"{corrected.stands.mean():.1%}, because the misprints partly cancel. They are not the same designs: "
+        f"{unsafe / designs:.1%} of all stand only as printed, {lost / designs:.1%} only as corrected."
     )
 
 
