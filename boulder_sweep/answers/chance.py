@@ -38,7 +38,7 @@ MANY = 4096
 
 Event = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Maps row numbers, shape (m,), and standard normals, shape (m, d), to whether the event occurs, shape (m,): 1 or True,
-0 or False, or where that is not known less the number of the cause."""
+0 or False, or minus the number of the cause where that is not known."""
 MOST_CAUSES = 16
 """Numbers of causes are less than this."""
 

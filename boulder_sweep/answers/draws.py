@@ -67,7 +67,7 @@ class Draws:
         distance : ndarray, shape (m,)
             See `distance`.
         known : ndarray of int64, shape (m,)
-            1 where the design passes, 0 where it does not, and less the code of its reason where it is undecided.
+            1 where the design passes, 0 where it does not, and minus the code of its reason where it is undecided.
         """
         parts = [slice(at, at + AT_ONCE) for at in range(0, len(index), AT_ONCE)]
         calls = (call(self._piece, index[part], z[part], rows_at(inputs, part)) for part in parts)

@@ -38,9 +38,9 @@ STEPS = {
 }
 """Spacing of the values tried, by unit."""
 MILDEST = {"impact_speed_m_s": 0.0, "vehicle_mass_kg": 100.0}
-"""A barrier must hold every smaller value of these inputs; a search for the largest begins at these (table units)."""
+"""Where a search for the largest value begins [table units]: a boulder must withstand all smaller values, too."""
 STRONGEST = ("friction_angle_deg", "embedment_depth_m", "embedment_ratio")
-"""A barrier must pass at every greater value of these inputs. What passes between two that fail is no answer."""
+"""Inputs of which a boulder must pass at every greater value: a pass between two fails is no answer."""
 
 
 @dataclass(frozen=True)

@@ -63,7 +63,7 @@ ROUNDS = 8
 CELLS = 8
 """Pieces that the range of the height is cut into by the scan."""
 NEAREST, FARTHEST = 1e-3, 0.1
-"""How far they are from it in each side [m], in scale and in depth (as a share): log-uniform between these."""
+"""Bounds of the reach of random neighbours, log-uniform: of each side [m], of scale and of depth (as a share)."""
 UNLUCKY = 3
 """Draws in a row without a lighter boulder after which none is looked for any more."""
 WORTH = 1e-4

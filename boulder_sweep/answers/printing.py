@@ -123,7 +123,7 @@ def volume_columns(units: str) -> list[Column]:
 
 
 def volume_lines(heads: str) -> list[str]:
-    """Return what the columns of volumes are, where the heads of a table show that they fitted in."""
+    """Return the legend of the columns of volumes if the heads of a table show them, else nothing."""
     return ["dig, fill: soil to excavate and to put back (docs/model.md)"] if "  dig  " in heads else []
 
 
@@ -152,7 +152,7 @@ def foot_lines(model: Model, reasons: Iterable[str | None] = (), units: str = "s
 
 
 def caution_lines(model: Model, reasons: Iterable[str | None] = (), units: str = "si") -> list[str]:
-    """Return of what rock boulders are if that is assumed, and what to do about reasons."""
+    """Return a line on the density of the rock if it is assumed, and one for each reason that has a remedy."""
     words = []
     if model.rock_assumed:
         words.append(f"rock: {quantity_text('kg/m^3', units, ROCK_KG_M3)} assumed (boulder.density); no pass is robust")

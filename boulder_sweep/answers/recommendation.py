@@ -38,7 +38,7 @@ RANKS = {"robust": 0, None: 1, "open": 1, "sensitive": 2}
 ANSWER = ("fails_at", "passes_at", "found", "passes_within")
 """Columns of an answer, beside its value, which a design does not have."""
 LESS = 0.05
-"""Steps of the margin in which the nearest design is asked what it has."""
+"""Steps in which the margin is lowered until the nearest boulder has a depth that passes."""
 CHANGES = ("impact_speed_m_s", "friction_angle_deg", HEIGHT)
 """Inputs by which the nearest design might qualify."""
 Rows = list[dict[str, Any]]
@@ -119,9 +119,9 @@ class Nearest:
         It at the depth at which it has the most of what was asked for; None where it does not pass even without a
         margin.
     margin : float
-        The margin that it has there, in steps of 5 %,
+        The margin that it has there, in steps of 5 %.
     robust : bool
-        and whether it has that under every second opinion, too.
+        Whether it has this margin under the second opinion that decides, too.
     changes : dict of str to Design
         It as it would qualify with another value of one input, by column: the largest speed, the least friction angle,
         the least height.

@@ -117,7 +117,7 @@ class Judges:
     robust: bool = False
 
     def of_any_pass(self) -> Judges:
-        """Return the same, to count any pass."""
+        """Return these judges, but counting every pass, robust or not."""
         return dataclasses.replace(self, robust=False)
 
     def holds(
@@ -203,7 +203,7 @@ class Remembered:
         return joined([self._judged[0].rows(np.array(indices, dtype=np.int64))])
 
     def holds(self, judged: Judged, block: DesignBlock, tolerance_m: float | None = None) -> np.ndarray:
-        """Return what `Judges.holds` does; second opinions without a tolerance, too, are asked only once."""
+        """Return which designs pass, as `Judges.holds`; a second opinion of full accuracy runs once a design."""
         final = self._judges.final
         stand = self._stands if tolerance_m is None else partial(final.stand, tolerance_m=tolerance_m)
         return self._judges.holds(judged, block, stand)

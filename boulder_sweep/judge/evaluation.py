@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 SLOWER_AT_ONCE = 150
 """Designs that are simulated at once with all their slower trucks: an interruption waits for the current call."""
 BY_SLOWER = np.array([plain(rule_by_slower)(rule) for rule in range(len(RULES))])
-"""The worst rule that may decide a row, by that which decides a slower truck."""
+"""The worst rule that a slower truck can impose on a row, by the rule that decides the slower truck."""
 Simulate = Callable[..., OutcomeTable]
 """Function that simulates a table of designs, with the arguments of `by_kernels`, which it always is outside tests."""
 
@@ -224,7 +224,7 @@ class Evaluation:
             rule[some] = np.minimum(rule[some], worst)
 
     def asked(self) -> Evaluation:
-        """Return the same with the second opinion that decides, where it can be asked."""
+        """Return this evaluation with the second opinion that decides, if that can simulate its designs."""
         return replace(self, second_opinion=(DECISIVE,)) if self.askable else self
 
     def graded(self, judged: Judged, block: DesignBlock) -> Judged:

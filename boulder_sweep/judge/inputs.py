@@ -59,7 +59,7 @@ class Designs(NamedTuple):
     rocks: np.ndarray | None = None
     """Density of the rock where the file gives masses, so that what is simulated has another [kg/m^3]."""
     factors: np.ndarray | None = None
-    """Strain rate factor as given, where the one of `table` also holds what law, slope and water make of it."""
+    """Strain rate factor as given, where `table` has it scaled for soil model, slope and water; else None."""
     shape: int = -1
     """Which of `SHAPES` stands for boulders as taped and weighed; -1 where none does."""
 

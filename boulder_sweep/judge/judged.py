@@ -181,7 +181,7 @@ def worst_case(cases: list[Judged]) -> np.ndarray:
 def reserves(judged: Judged) -> np.ndarray:
     """Return what n rows have left before a limit, shape (n,).
 
-    It is the margin; below -1 where a boulder overturns, the less the earlier; and 0 where there is neither.
+    It is the margin of a row that has one. A boulder that overturns has less than -1, the less the earlier; others 0.
     """
     margin, time = judged["margin"], judged["time_to_limit_s"]
     overturned = np.where(np.isnan(time), 0.0, -1.0 - 1.0 / np.maximum(time, 1e-3))

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from boulder_sweep.settings.model import Distribution
 
 MEAN, UNFAVOURABLE = "mean", "p5"
-"""What ``--at`` may be beside other percentages, and its default."""
+"""The word that ``--at`` takes besides quantiles, and its default quantile."""
 LOW, HIGH = "low", "high"
 WEAK = {
     "boulder_length_m": LOW,

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 ROBUST, SENSITIVE, OPEN = range(len(GRADES))
 DECISIVE = "width_capped"
-"""The law that decides: it resists least, but for slender boulders in dense soil, which are asked of others, too."""
+"""The soil model that decides: it resists least, except for slender boulders in dense soil (`resists_less`)."""
 IN_WORDS = (
     "stands with friction and vertical motion under the weakest of three soil models; not modelled: soil on one side "
     "only, rounded boulders"
@@ -83,7 +83,7 @@ FREE_EMBEDMENT = (0.5, 0.75)
 FREE_LIMIT_DEG = 20.0
 """The limit of rotation that the study asks about; a higher one is no easier to stay below for a second opinion."""
 ROUNDING = 1e-9
-"""Ends of ranges are met by values that were rounded."""
+"""Share by which rounding may put a value outside the end of a range."""
 QUICK_M = 5e-4
 """Error of a step of a second opinion [m]: of 6,800 random designs that turn about as far as the limit, none turned by
 0.6 deg too little. Shallow ones may err more, by shorter steps, too; `benchmarks.grades` holds their grades."""
@@ -100,9 +100,9 @@ AT_ONCE = 400
 
 
 def can_be_asked(sweep: Sweep) -> bool:
-    """Return whether the designs of a sweep are such as second opinions know.
+    """Return whether second opinions can simulate the designs of a sweep.
 
-    They know boxes and corrected readings, and are not asked of assumed rock.
+    They simulate only boxes of rock of given density, with corrected readings.
     """
     model = sweep.model
     known = model.shape.is_box and not model.rock_assumed and not any(case.is_taped for case in (sweep, *sweep.cases))
@@ -112,7 +112,7 @@ def can_be_asked(sweep: Sweep) -> bool:
 def meaning_of(row: Mapping[str, Any]) -> str | None:
     """Return what the grade of a row of the table means; None where it has none.
 
-    A boulder that the ground cannot carry (Eq 133) is sensitive under whatever law: no second opinion begins from rest.
+    A boulder that the ground cannot carry (Eq 133) is sensitive: it would sink, and a second opinion starts from rest.
     """
     if row["robustness"] == "sensitive":
         angle = math.radians(row["friction_angle_deg"])
@@ -142,7 +142,7 @@ def grades_without_asking(facts: Any) -> np.ndarray:
 
 
 def least_free_rotation() -> float:
-    """Return the least limit of rotation by which a pass is robust without asking [rad]."""
+    """Return the least limit of rotation with which a pass can be robust without a second opinion [rad]."""
     return math.radians(FREE_LIMIT_DEG) * (1.0 - ROUNDING)
 
 
@@ -156,7 +156,7 @@ def is_free(table: DesignTable) -> np.ndarray:
 
 
 def base_under(ground: Ground) -> Base:
-    """Return what second opinions ask of the soil as it lies beside its resistance."""
+    """Return the ground under the foot for a second opinion: its water table [m] and slope [rad]."""
     water = math.inf if ground.water_table_m is None else ground.water_table_m
     return USUAL_BASE._replace(water=water, slope=math.radians(ground.slope_deg))
 
@@ -224,7 +224,7 @@ def stands_under_the_weakest(
 
 
 def standing(judged: Judged) -> np.ndarray:
-    """Return which judged rows are robust, or would be inside the ranges of the study, bool, shape (n,)."""
+    """Return which judged rows stand under the soil model that decides, robust or open, bool, shape (n,)."""
     grade, under, bit = judged["robustness"], judged["stands_under"], 1 << SECOND_OPINIONS.index(DECISIVE)
     return (grade == ROBUST) | ((grade == OPEN) & (under >= 0) & ((under & bit) > 0))
 
