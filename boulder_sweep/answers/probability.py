@@ -122,7 +122,7 @@ class ProbabilityQuestion(Question):
         """Return the object that tries values in some rows, roughly by few points."""
         return ProbabilityTrial(self, rows, self.sampling.few if roughly else self.sampling.points)
 
-    def graded(self, judged: Judged, block: DesignBlock) -> Judged:
+    def graded(self, judged: Judged, block: DesignBlock, found: np.ndarray) -> Judged:
         """Return the outcomes at the means, without a grade."""
         return ungraded(judged)
 

@@ -29,6 +29,7 @@ from boulder_sweep.answers.search import (
 )
 from boulder_sweep.answers.trials import (
     SHARE,
+    UNASKED_M,
     USUALLY,
     InputRows,
     Judges,
@@ -138,7 +139,7 @@ class ValueSearch:
         every = np.arange(len(low))
         first, last = self.lattice(low, high)
         trial = self.trial(rows)
-        result = trial.settled(search(trial.rough, first, last, self.cells, trial.closer), first, last)
+        result = trial.settled(search(trial.rough, first, last, self.cells, trial.closer, trial.plain), first, last)
         result = self._again(result, every[trial.slides], trial, first, last, quick=True)
         wrong = trial.contradicted(result)
         block, judged = trial.judged(every, result.shown)
@@ -260,13 +261,13 @@ class Question(ValueSearch):
         return replace(
             answers,
             simulated=answers.simulated + tried,
-            judged=self.graded(answers.judged, answers.block),
+            judged=self.graded(answers.judged, answers.block, ~np.isnan(answers.passes)),
             block=replace(answers.block, labels=self.open.labels(start, stop)),
         )
 
-    def graded(self, judged: Judged, block: DesignBlock) -> Judged:
-        """Return the outcomes at the answers with their grades."""
-        return self.judges.final.graded(judged, block)
+    def graded(self, judged: Judged, block: DesignBlock, found: np.ndarray) -> Judged:
+        """Return the outcomes at the answers with their grades; what is found, (n,), may be known to be robust."""
+        return self.judges.final.graded(judged, block, stand=found & self.judges.robust)
 
     def _best_depths(self, rows: InputRows, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, int]:
         """Return the depths, as `SHARE`, at which the answers of n designs are the best, and how many were simulated.
@@ -319,6 +320,10 @@ class Trial:
     def closer(self, index: np.ndarray, positions: np.ndarray) -> np.ndarray:
         """Predicate of the search between `rough` and `coarse`."""
         return self._codes(index, positions, quick=True, tolerance_m=LOCATED_M)
+
+    def plain(self, index: np.ndarray, positions: np.ndarray) -> np.ndarray:
+        """Predicate of the search like `coarse`, but without second opinions."""
+        return self._codes(index, positions, quick=True, tolerance_m=UNASKED_M)
 
     def coarse(self, index: np.ndarray, positions: np.ndarray) -> np.ndarray:
         """Predicate of the search, without an error estimate."""

@@ -63,7 +63,12 @@ PER_ROW = ("kind", "fails", "holds", "has_fails", "has_holds", "shown", "holds_l
 
 
 def search(
-    predicate: Predicate, first: np.ndarray, last: np.ndarray, cells: int = CELLS, closer: Predicate | None = None
+    predicate: Predicate,
+    first: np.ndarray,
+    last: np.ndarray,
+    cells: int = CELLS,
+    closer: Predicate | None = None,
+    between: Predicate | None = None,
 ) -> Search:
     """Search n rows.
 
@@ -78,6 +83,9 @@ def search(
         positions that are far from holding and at most `STRIDE` cells apart.
     closer
         Predicate by which changes are located, nearly the same; the same by default.
+    between
+        Predicate that is asked between two positions of the scan that hold, which may only hold more often; the same
+        by default.
 
     Returns
     -------
@@ -88,7 +96,7 @@ def search(
     share = np.arange(cells + 1) / cells
     positions = first[:, None] + np.rint((last - first)[:, None] * share).astype(np.int64)
     rows = np.arange(n)
-    codes = _scan_positions(predicate, positions)
+    codes = _scan_positions(predicate, between or predicate, positions)
     _try_last_before_beyond(predicate, positions, codes)
 
     holds, beyond = codes == HOLDS, codes == BEYOND
@@ -158,7 +166,7 @@ def shorter(one: Search, other: Search, last: np.ndarray) -> Search:
 def settled(predicate: Predicate, result: Search, first: np.ndarray, last: np.ndarray) -> Search:
     """Return a search by a predicate that is nearly the one it was made by: changes found once are moved a little.
 
-    From where it was found to hold, the predicate is tried at twice the distance each time, forward until it holds or
+    From where it was found to hold, the predicate is tried 1, 2, 4, 8 and so on further, forward until it holds or
     backward until it fails. A row in which that leads to an end of its range is left as it is.
 
     Parameters
@@ -175,7 +183,7 @@ def settled(predicate: Predicate, result: Search, first: np.ndarray, last: np.nd
     held = predicate(rows, high) == HOLDS
     low = np.where(held, low, high)
     at, direction = high.copy(), np.where(held, -onward, onward)
-    inside, open_, reach = np.ones(len(rows), dtype=bool), np.ones(len(rows), dtype=bool), 1
+    inside, open_, moved, reach = np.ones(len(rows), dtype=bool), np.ones(len(rows), dtype=bool), 0, 1
     while open_.any():
         at[open_] += (direction * reach)[open_]
         inside &= (at >= ends[0]) & (at <= ends[1])
@@ -185,7 +193,8 @@ def settled(predicate: Predicate, result: Search, first: np.ndarray, last: np.nd
         high = np.where(open_ & holds, at, high)
         low = np.where(open_ & ~holds, at, low)
         open_ &= holds == held
-        reach *= 2
+        moved += reach
+        reach = moved
     rows, low, high = rows[inside], low[inside], high[inside]
     low, high = _bisect_changes(predicate, rows, low, high, np.ones(len(rows), dtype=bool))
     fails, held_at, shown = result.fails.copy(), result.holds.copy(), result.shown.copy()
@@ -259,7 +268,7 @@ def last_before(
     return low, high, has_fails
 
 
-def _scan_positions(predicate: Predicate, positions: np.ndarray) -> np.ndarray:
+def _scan_positions(predicate: Predicate, between: Predicate, positions: np.ndarray) -> np.ndarray:
     """Return `FAILS`, `HOLDS` or `BEYOND` for some positions of n rows, shape (n, cells + 1)."""
     n, cells = positions.shape[0], positions.shape[1] - 1
     stride = math.gcd(cells, STRIDE)
@@ -268,8 +277,10 @@ def _scan_positions(predicate: Predicate, positions: np.ndarray) -> np.ndarray:
     codes[:, first] = predicate(np.repeat(np.arange(n), len(first)), positions[:, first].ravel()).reshape(n, len(first))
     while stride > 1:
         rows, pieces = np.nonzero((codes[:, :-1:stride] != FAR) | (codes[:, stride::stride] != FAR))
-        between = pieces * stride + stride // 2
-        codes[rows, between] = predicate(rows, positions[rows, between])
+        middle = pieces * stride + stride // 2
+        hold = (codes[rows, pieces * stride] == HOLDS) & (codes[rows, (pieces + 1) * stride] == HOLDS)
+        for asked, some in ((predicate, ~hold), (between, hold)):
+            codes[rows[some], middle[some]] = asked(rows[some], positions[rows[some], middle[some]])
         stride //= 2
     return _plain(codes)
 

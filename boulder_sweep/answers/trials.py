@@ -41,6 +41,8 @@ USUALLY = (LEAST_RATIO, 0.75)
 same."""
 SEARCHED = ("verdict", "reason", "margin", "time_to_limit_s", "max_displacement_m")
 """Outcomes that searches look at; others are not worked out for the many designs that are only tried."""
+UNASKED_M = math.inf
+"""Error of a step of second opinions that are not asked: what passes counts as standing."""
 GRADED = ("robustness", "stands_under")
 
 InputRows = dict[str, np.ndarray]
@@ -204,6 +206,8 @@ class Remembered:
 
     def holds(self, judged: Judged, block: DesignBlock, tolerance_m: float | None = None) -> np.ndarray:
         """Return which designs pass, as `Judges.holds`; a second opinion of full accuracy runs once a design."""
+        if tolerance_m == UNASKED_M:
+            return self._judges.of_any_pass().holds(judged, block)
         final = self._judges.final
         stand = self._stands if tolerance_m is None else partial(final.stand, tolerance_m=tolerance_m)
         return self._judges.holds(judged, block, stand)

@@ -227,15 +227,21 @@ class Evaluation:
         """Return this evaluation with the second opinion that decides, if that can simulate its designs."""
         return replace(self, second_opinion=(DECISIVE,)) if self.askable else self
 
-    def graded(self, judged: Judged, block: DesignBlock) -> Judged:
-        """Return the judged rows of a block with the second opinion that decides, without a margin."""
+    def graded(self, judged: Judged, block: DesignBlock, stand: np.ndarray | None = None) -> Judged:
+        """Return the judged rows of a block with the second opinion that decides, without a margin.
+
+        Rows that are known to `stand`, with a margin or without, shape (n,), are not simulated.
+        """
         passing = judged.verdict == PASS
         if not self.askable or not passing.any():
             return judged
-        return self._graded(judged, self.designs(block, passing), (DECISIVE,))
+        known = None if stand is None else stand[passing]
+        return self._graded(judged, self.designs(block, passing), (DECISIVE,), known)
 
-    def _graded(self, judged: Judged, passes: Designs, laws: tuple[str, ...]) -> Judged:
-        return with_second_opinions(judged, passes, laws, self.model, self.limits, self.longest_s)
+    def _graded(
+        self, judged: Judged, passes: Designs, laws: tuple[str, ...], stand: np.ndarray | None = None
+    ) -> Judged:
+        return with_second_opinions(judged, passes, laws, self.model, self.limits, self.longest_s, stand)
 
     def stand(self, block: DesignBlock, tolerance_m: float | None = None) -> np.ndarray:
         """Return which designs pass, in all cases, with the margin under the laws that decide, bool, shape (n,).

@@ -236,6 +236,7 @@ def with_second_opinions(
     model: Model,
     limits: Any,
     longest_s: float,
+    stand: np.ndarray | None = None,
 ) -> Judged:
     """Return judged rows with passes simulated again.
 
@@ -251,19 +252,23 @@ def with_second_opinions(
         Designs of those that pass.
     laws, model, limits, longest_s
         See `stands`.
+    stand
+        Which passes are known to stand under all laws that decide, bool; none by default.
     """
     passing = np.flatnonzero(judged.verdict == PASS)
     grade, under = judged["robustness"].copy(), judged["stands_under"].copy()
+    known = np.zeros(len(passing), dtype=bool) if stand is None else stand
     if laws == (DECISIVE,):
         # Those that are robust without asking are so by the whole limit.
         asked = np.flatnonzero((grade[passing] != ROBUST) | (limits.rotation < least_free_rotation()))
-        passing, passes = passing[asked], passes.rows(asked)
+        passing, passes, known = passing[asked], passes.rows(asked), known[asked]
     under[passing] = 0
     turned = np.zeros(len(passing), dtype=bool)
 
     def ask(law: str, rows: np.ndarray) -> None:
         """Note which of some passes stand under a law."""
-        there = stands(passes.rows(rows), law, model, limits, longest_s)
+        there = known[rows]
+        there[~there] = stands(passes.rows(rows[~there]), law, model, limits, longest_s)
         under[passing[rows[there]]] += 1 << SECOND_OPINIONS.index(law)
         turned[rows[~there]] = True
 

@@ -307,16 +307,19 @@ def _ask_for_wide_vectors() -> None:
 _ask_for_wide_vectors()
 
 
-@functools.cache
-def _array_of(record: np.dtype) -> Any:
-    """Return the type of an array of records, which takes Numba as long to work out as a thousand designs."""
-    return numba.typeof(np.zeros(1, record))
+_ARRAYS: dict[tuple[Any, ...], Any] = {}
+"""Types of arrays, each of which takes Numba as long to work out as it takes to simulate ten designs."""
 
 
 def _type_of(value: Any) -> Any:
     """Return the Numba type of an argument."""
-    is_of_records = isinstance(value, np.ndarray) and value.dtype.names
-    return _array_of(value.dtype) if is_of_records else numba.typeof(value)
+    if not isinstance(value, np.ndarray):
+        return numba.typeof(value)
+    flags = value.flags
+    key = (type(value), value.dtype, value.ndim, flags.c_contiguous, flags.f_contiguous, flags.writeable)
+    if key not in _ARRAYS:
+        _ARRAYS[key] = numba.typeof(value)
+    return _ARRAYS[key]
 
 
 class Kernel:

@@ -495,6 +495,8 @@ class FaceForces(NamedTuple):
     """Vertical force: what its energy loses per rise of the face [N]."""
     energy: float
     """Energy in its springs [J]."""
+    stiffness: float
+    """What the force of its springs grows by, per displacement [N/m]."""
 
 
 @inlined
@@ -510,6 +512,7 @@ def pressed(u: float, drag: float, z: float, part: Part, f: HeaveConstants) -> F
         part.stiffness * depth * (all_of_it.widening - yielded.widening),
         f.heave * energy if z > 0.0 else 0.0,
         energy * depth,
+        part.stiffness * depth * (all_of_it.share - yielded.share),
     )
 
 
@@ -530,6 +533,8 @@ class Element(NamedTuple):
     """Energy in its springs [J]."""
     roughness: float
     """Coefficient of its friction over the foot's [-]."""
+    stiffness: float
+    """What the force of its springs grows by, per displacement [N/m]."""
 
 
 @inlined
@@ -550,7 +555,8 @@ def soil_element(
     lift = far.lift + near.lift
     turning = lift * d_n * sin - (far.lift * c.l_n + near.lift * l_near) * (1.0 - versin)
     turning -= (F_far + F_near) * (k.lever_d * ratio + k.q) + (far.widening + near.widening) * part.slope_w
-    return Element(near.spring - far.spring, F_far, F_near, turning, lift, far.energy + near.energy, part.roughness)
+    spring, energy, stiffness = near.spring - far.spring, far.energy + near.energy, far.stiffness + near.stiffness
+    return Element(spring, F_far, F_near, turning, lift, energy, part.roughness, stiffness)
 
 
 class Strip(NamedTuple):

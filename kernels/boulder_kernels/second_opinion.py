@@ -24,12 +24,13 @@ from .dormand_prince import displacement_at, slope_at, time_of_limit, turning_po
 from .dynamics import empty_soil
 from .heave import (
     ALONG_X,
+    FAR,
     FINEST,
     LIFTING,
+    NEAR,
     STRIP,
     TURNING,
     Base,
-    Forces,
     HeaveConstants,
     HeaveOptions,
     bed_of,
@@ -44,7 +45,7 @@ from .heave import (
     strip_depth,
     summed,
 )
-from .numerics import ITERATIONS, Bracket, field, narrowed, next_guess, put, sine_versine
+from .numerics import ITERATIONS, field, put, sine_versine
 from .outcomes import Status
 from .pieces import ManyPieces, constants_in_soil, fill_pieces
 from .runge_kutta import (
@@ -64,7 +65,7 @@ from .runge_kutta import (
     step,
     track_of,
 )
-from .soil import soil_kinematics
+from .soil import TINY, soil_kinematics
 
 READINGS = corrected()
 """The only readings that there are second opinions of."""
@@ -79,6 +80,8 @@ TURNS = 3
 """How often the least energy is looked for along x_b and along y_b in turn."""
 PLACED = 1e-4
 """How precisely, as a share of the energy that lifts the boulder by its length."""
+ROUGHLY = 1e-2
+"""The same before the last turn."""
 
 
 class HeaveControl(NamedTuple):
@@ -145,9 +148,22 @@ def kinetic_energy(v_b: float, theta_b: float, omega_b: float, w_b: float, f: He
     return 0.5 * f.c.m_eff * v_b * v_b + 0.5 * f.m_b * rise * rise + turning
 
 
+class Potential(NamedTuple):
+    """Potential energy of soil, base and weight (Eq 136), and how it changes along x_b and along y_b."""
+
+    u: float
+    """The energy [J]."""
+    Q_x: float
+    Q_y: float
+    """Minus its slopes [N]."""
+    K_x: float
+    K_y: float
+    """Slopes of the forces of springs, which are most of its curvatures [N/m]."""
+
+
 @kernel
-def potential_energy(x_b: float, theta_b: float, y_b: float, work: np.ndarray, f: HeaveConstants) -> Forces:
-    """Potential energy of soil, base and weight, and its slopes (Eq 136).
+def potential_energy(x_b: float, theta_b: float, y_b: float, work: np.ndarray, f: HeaveConstants) -> Potential:
+    """Return the potential energy of soil, base and weight at a position (Eq 136).
 
     Parameters
     ----------
@@ -157,11 +173,6 @@ def potential_energy(x_b: float, theta_b: float, y_b: float, work: np.ndarray, f
         The workspace; where a strip is pressed beyond what it can bear, the work to press it there is counted.
     f
         Constants of the design.
-
-    Returns
-    -------
-    Forces
-        Minus the slopes by x_b and y_b as ``Q_x`` and ``Q_y``, zero as ``Q_theta``, and the energy [J] as ``u``.
     """
     sin, versin = sine_versine(theta_b)
     k = soil_kinematics(x_b, 0.0, 0.0, sin, versin, f.c)
@@ -174,8 +185,10 @@ def potential_energy(x_b: float, theta_b: float, y_b: float, work: np.ndarray, f
         put(work, TURNING, n, e.energy + share * elastic * (depth - elastic * (0.5 / f.k_foot)))
         put(work, ALONG_X, n, e.spring)
         put(work, LIFTING, n, e.lift + share * elastic)
+        put(work, FAR, n, e.stiffness)
+        put(work, NEAR, n, share * f.k_foot if 0.0 < depth * f.k_foot < f.q_foot else 0.0)
     V, Q_x = summed(work, TURNING, f.pieces), summed(work, ALONG_X, f.pieces)
-    Q_y = summed(work, LIFTING, f.pieces)
+    Q_y, K_x, K_y = summed(work, LIFTING, f.pieces), summed(work, FAR, f.pieces), summed(work, NEAR, f.pieces)
     weight = f.m_b * G
     if f.heave > 0.0:
         V += weight * (y_b - f.a_b * sin - f.b_b * versin)
@@ -183,7 +196,7 @@ def potential_energy(x_b: float, theta_b: float, y_b: float, work: np.ndarray, f
         seated = seated_sine(f)
         over = max(abs(sin) - seated, 0.0)
         V += weight * (0.5 * f.L * ((abs(sin) - over) ** 2 / (2.0 * seated) + over) - (f.b_b + f.c.c_y) * versin)
-    return Forces(Q_x, Q_y - f.heave * weight, 0.0, V)
+    return Potential(V, Q_x, Q_y - f.heave * weight, K_x, K_y)
 
 
 @kernel
@@ -214,17 +227,22 @@ def least_energy(theta: float, work: np.ndarray, f: HeaveConstants) -> float:
     sin, versin = sine_versine(theta)
     upper = f.c.l_n * versin - f.c.z_0 * sin
     left, right = min(upper, upper + f.c.d * sin), max(upper, upper + f.c.d * sin)
-    bottom, top = 0.0, f.L + 3.0 * f.c.d + f.s_0
+    bottom, touch, top = 0.0, -np.inf, f.L + 3.0 * f.c.d + f.s_0
+    most = f.q_foot / f.k_foot
     for n in range(f.pieces):
-        bottom = min(bottom, strip_depth(work, n, 0.0, sin, versin, f) - f.q_foot / f.k_foot)
+        depth = strip_depth(work, n, 0.0, sin, versin, f)
+        bottom, touch = min(bottom, depth - most), max(touch, depth)
+    # Begin where the end of the foot, pressed in along a wedge, carries the weight.
+    y = touch - min(most, math.sqrt(2.0 * f.m_b * G * f.L * abs(sin) / f.k_foot))
     least = np.inf
     for x in (left, right):
-        position = Equilibrium(x, 0.0, np.inf)
-        for _ in range(TURNS):
+        position = Equilibrium(x, f.heave * y, np.inf)
+        for turn in range(TURNS):
+            precision = PLACED if turn == TURNS - 1 else ROUGHLY
             if f.heave > 0.0:
-                position = move_to_least_energy(position, False, bottom, top, theta, work, f)
-            position = move_to_least_energy(position, True, left, right, theta, work, f)
-        least = min(least, position.energy)
+                position = move_to_least_energy(position, False, bottom, top, precision, theta, work, f)
+            position = move_to_least_energy(position, True, left, right, precision, theta, work, f)
+        y, least = position.y, min(least, position.energy)
     return least
 
 
@@ -248,21 +266,30 @@ class Equilibrium(NamedTuple):
 
 @kernel
 def move_to_least_energy(
-    position: Equilibrium, sideways: bool, low: float, high: float, theta: float, work: np.ndarray, f: HeaveConstants
+    position: Equilibrium,
+    sideways: bool,
+    low: float,
+    high: float,
+    precision: float,
+    theta: float,
+    work: np.ndarray,
+    f: HeaveConstants,
 ) -> Equilibrium:
-    """Move along x_b, or else along y_b, between two ends that push inwards, to where the energy is least."""
+    """Move along x_b, or else along y_b, between two ends that push inwards, to where the energy is least.
+
+    Newton's steps, halved brackets where they lead out of the bracket; the precision is a share, see `PLACED`.
+    """
     x, y, energy = position
-    weight = f.m_b * G
-    # What pushes at the ends is not known; its size only matters to the first chords.
-    b = Bracket(low, weight, high, -weight, 0.0)
     for _ in range(ITERATIONS):
         p = potential_energy(x, theta, y, work, f)
-        push, at, energy = (p.Q_x, x, p.u) if sideways else (p.Q_y, y, p.u)
+        push, stiffness, at = (p.Q_x, p.K_x, x) if sideways else (p.Q_y, p.K_y, y)
+        energy = p.u
         # No position between the ends costs less by more than this, as the energy is convex.
-        if abs(push) * (b.high - b.low) <= PLACED * weight * f.L:
+        if abs(push) * (high - low) <= precision * f.m_b * G * f.L:
             break
-        b = narrowed(b, at, push)
-        at = next_guess(b)
+        low, high = (at, high) if push > 0.0 else (low, at)
+        at += push / max(stiffness, TINY)
+        at = at if low < at < high else 0.5 * (low + high)
         x, y = (at, y) if sideways else (x, at)
     return Equilibrium(x, y, energy)
 

@@ -382,7 +382,7 @@ def test_eased_is_where_a_step_either_way_costs_more() -> None:
             across = sorted((at_top, at_top + design.d * np.sin(theta)))
             for sideways, (low, high) in ((True, across), (False, (-1.0, 2.0))):
                 start = Equilibrium(rng.uniform(*across), rng.uniform(-0.5, 0.5), np.inf)
-                least = move_to_least_energy(start, sideways, low, high, theta, work, f)
+                least = move_to_least_energy(start, sideways, low, high, PLACED, theta, work, f)
                 assert (least.y == start.y) if sideways else (least.x == start.x)
                 ends = np.linspace(low, high, 2001)
                 tried = [(s, least.y) if sideways else (least.x, s) for s in ends]
