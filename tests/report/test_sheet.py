@@ -108,7 +108,7 @@ def test_the_limits_are_those_of_the_case_with_the_least_margin(needs: dict[str,
     worst = min(best.design.rows, key=lambda row: row["margin"])
     lines = {name: (computed, allowed, used) for name, computed, allowed, used in found.checks}
     assert lines["rotation"][:2] == (Measure(worst["max_rotation_deg"], "deg"), Measure(20.0, "deg"))
-    used = [int(line[2].split()[0]) for line in (lines["rotation"], lines["penetration of cargo bed, P1"])]
+    used = [int(line[2].split()[0]) for line in (lines["rotation"], lines["cargo bed penetration, P1"])]
     assert 100 - max(used) == round(100 * worst["margin"])
     assert f"friction angle φ′ {worst['friction_angle_deg']:g}°" in found.words["si"].governs
     assert len(found.cases["si"].rows) == len(best.design.rows) == 2
