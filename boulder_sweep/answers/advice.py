@@ -258,14 +258,14 @@ class _Words:
         return f"Which of {found.boulders:,} boulders, buried how deep, stops {stops}?"
 
     def truck(self) -> str:
-        """Return the vehicles and their speeds."""
-        given = self.need.sweep.plan.given
-        ends = {}
-        for name in ("vehicle_mass_kg", "impact_speed_m_s"):
-            values, digits = given[name].values, ",.0f" if name == "vehicle_mass_kg" else ".4g"
-            text = quantity_text(BY_NAME[name].unit, self.units, values.min(), values.max(), digits=digits)
-            ends[name] = text.replace(" ", NO_BREAK_SPACE)
-        return f"a truck of {ends['vehicle_mass_kg']} at {ends['impact_speed_m_s']}"
+        """Return the vehicles and their speeds, without what is asked for."""
+        given, words = self.need.sweep.plan.given, "a truck"
+        for name, before, digits in (("vehicle_mass_kg", "of", ",.0f"), ("impact_speed_m_s", "at", ".4g")):
+            if name != self.need.key.name:
+                values = given[name].values
+                text = quantity_text(BY_NAME[name].unit, self.units, values.min(), values.max(), digits=digits)
+                words += f" {before} {text.replace(' ', NO_BREAK_SPACE)}"
+        return words
 
     def terms(self) -> str:
         """Return what is asked for beside passing."""

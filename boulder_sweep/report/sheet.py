@@ -174,8 +174,8 @@ def _checks(
         lines.append((words, computed, none if allowed is None else Measure(allowed, unit), used))
     if "p_pass" not in row and (design.stands or design.grade == "sensitive"):
         # A second opinion tells whether the boulder stays below a limit, not how far it turns.
-        recommended = need.recommendation is not None and need.recommendation.design is design
-        limit, share = criterion["max_rotation_deg"], 1.0 - need.least_margin * (recommended and need.robust)
+        found, limit = need.recommendation, criterion["max_rotation_deg"]
+        share = 1.0 - need.least_margin * (need.robust and (found is None or found.design is design))
         sign = "≤" if design.stands else ">"
         weakest = f"{sign} {share * limit:.4g}°", Measure(limit, "deg"), f"{sign} {100.0 * share:.0f} %"
         lines.insert(1, ("rotation, weakest model", *weakest))

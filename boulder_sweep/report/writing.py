@@ -136,7 +136,7 @@ def write_report(
         readings=readings,
         start=chosen[0]["inputs"],
         sheet=sheet_of(rows, answer, units),
-        sentences=answer.sentences,
+        sentences=answer.sentences[answer.need.recommendation is None :],  # the first is then the headline
         answers=screens(rows),
         rows=rows,
         chosen=chosen,
