@@ -85,7 +85,7 @@ def test_answers_without_a_recommendation_have_none_in_their_file(tmp_path: Path
     assert b"boulder_sweep.recommendation" not in pq.read_schema(tmp_path / "speed.parquet").metadata
     words = sheet(tmp_path / "speed.parquet").words["si"]
     assert words.question.startswith(
-        "What is the largest vehicle speed at which the boulder stops a truck of 6,804\u00a0kg in"
+        "What is the largest vehicle speed at which the boulder stops a truck of 6,804\u00a0kg, with"
     )
     assert "largest vehicle speed" in words.recommendation[0]
     assert {name: rest for name, *rest in sheet(tmp_path / "speed.parquet").checks}["rotation, weakest model"][
