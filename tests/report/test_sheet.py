@@ -42,6 +42,7 @@ def needs() -> dict[str, Need]:
         "nearest": boulder_sweep.need(site(height="3.0 m")),
         "soils": boulder_sweep.need(site(height="3.4 m", friction="{from: 34, to: 40, count: 9}")),
         "taken": boulder_sweep.need(site(height="3.4 m", **UNCERTAIN_FRICTION)),
+        "stands": boulder_sweep.need(site(height="3.6 m", friction="40 deg"), margin=0.4, robust=False),
         "bare": bare_need(site(height="3.6 m")),
         "never": boulder_sweep.need(site(height="2.0 m", friction="36 deg")),
     }
@@ -133,6 +134,7 @@ def test_the_limits_are_those_of_the_case_with_the_least_margin(needs: dict[str,
     ("name", "line"),
     [
         ("depth", ("≤ 15°", Measure(20.0, "deg"), "≤ 75 %")),
+        ("stands", ("≤ 20°", Measure(20.0, "deg"), "≤ 100 %")),
         ("bare", ("> 20°", Measure(20.0, "deg"), "> 100 %")),
         ("chance", None),
         ("never", None),
