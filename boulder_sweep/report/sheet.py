@@ -176,9 +176,8 @@ def _checks(
         # A second opinion tells whether the boulder stays below a limit, not how far it turns.
         found, limit = need.recommendation, criterion["max_rotation_deg"]
         share = 1.0 - need.least_margin * (need.robust and (found is None or found.design is design))
-        sign = "≤" if design.stands else ">"
-        weakest = f"{sign} {share * limit:.4g}°", Measure(limit, "deg"), f"{sign} {100.0 * share:.0f} %"
-        lines.insert(1, ("rotation, weakest model", *weakest))
+        computed, used = (f"≤ {share * limit:.4g}°", f"≤ {100.0 * share:.0f} %") if design.stands else ("fails", "–")
+        lines.insert(1, ("rotation, weakest model", computed, Measure(limit, "deg"), used))
     if "p_pass" in row:
         least = "–" if need.probability is None else f"≥ {100.0 * need.probability:.4g} %"
         chances = [("probability of passing", f"{row['p_pass']:.1%}", "–" if need.robust else least, "–")]
