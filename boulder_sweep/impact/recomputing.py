@@ -15,7 +15,7 @@ from boulder_kernels import Control, Readings
 from boulder_sweep.columns import BY_NAME, INPUT_COLUMNS, OPTIONAL_COLUMNS, OUTCOMES, OutcomeColumn
 from boulder_sweep.designs import embedment_of_ratio
 from boulder_sweep.impact.simulation import history_of
-from boulder_sweep.judge.accuracy import OUTLINES_IN_LANES, reported_step_s
+from boulder_sweep.judge.accuracy import goes_in_lanes, reported_step_s
 from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.judged import worst_of
 from boulder_sweep.judge.robustness import can_be_asked
@@ -119,8 +119,8 @@ def recompute(out: str | Location, design_id: int) -> Recomputation:
     limits = limits_of(sweep)._replace(rotation=control.theta_limit)
     block = sweep.block(0, 1)
     laws = sweep.model.second_opinion if can_be_asked(sweep) else ()
-    many = there["settings"]["n_designs"] >= OUTLINES_IN_LANES
-    evaluation = Evaluation(readings, control, limits, model=sweep.model, second_opinion=laws, outlines_in_lanes=many)
+    many = goes_in_lanes(2, there["settings"]["n_designs"])
+    evaluation = Evaluation(readings, control, limits, model=sweep.model, second_opinion=laws, barrels_in_lanes=many)
     cases = evaluation.by_case(block)
     again = part_table(block, worst_of(cases), {}).to_pylist()[0]
     return Recomputation(

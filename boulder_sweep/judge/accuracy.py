@@ -46,9 +46,9 @@ LADDER = (
 """Steps a pilot run chooses from, cheapest first. Still longer steps save little because events dominate the cost."""
 ELEMENTS_AS_FAST = 16
 """Number of soil elements that cost about as much as the closed form."""
-OUTLINES_IN_LANES = 100_000
-"""Below so many designs boulders of several pieces are simulated one after another: lanes are twice as fast, but take a
-minute and a half longer to compile for eight pieces, and are mostly idle where few rows are late."""
+DESIGNS_A_PIECE = 10_000
+"""With fewer designs for each of their pieces, boulders of several are simulated one after another: lanes are several
+times as fast, but take 10 s longer to compile for each piece, once, and are mostly idle where few rows are late."""
 FACTOR = 0.25
 """The step of open rows is shortened by `FIRST_FACTOR` `AGREEING` times, which confirms nearly all late rows, then by
 this factor. With this one alone late rows take twice as long, and no verdict of 90,000 shallow boulders changes."""
@@ -144,8 +144,13 @@ def control_of(sweep: Sweep, accuracy: Accuracy) -> Control:
         locate_yield=accuracy.steps.locate_yield,
         longest_horizon=LONGEST_HORIZON * horizon if goes_on else 0.0,
         paired=accuracy.paired,
-        side_by_side=shape.is_box or len(shape.points) == 2 or sweep.n_designs >= OUTLINES_IN_LANES,
+        side_by_side=shape.is_box or goes_in_lanes(len(shape.points) - 1, sweep.n_designs),
     )
+
+
+def goes_in_lanes(pieces: int, designs: int) -> bool:
+    """Return whether so many boulders whose outline has so many pieces are simulated side by side."""
+    return pieces == 1 or designs >= DESIGNS_A_PIECE * pieces
 
 
 def finer_controls(control: Control) -> Iterator[Control]:

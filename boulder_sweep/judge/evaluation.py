@@ -26,10 +26,10 @@ from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_sweep.columns import SHAPES
 from boulder_sweep.judge.accuracy import (
     LONGEST_HORIZON,
-    OUTLINES_IN_LANES,
     Accuracy,
     control_of,
     finer_controls,
+    goes_in_lanes,
     readings_of,
 )
 from boulder_sweep.judge.inputs import Designs, designs_of
@@ -93,8 +93,8 @@ class Evaluation:
         Whether second opinions know such designs.
     against_slower
         Whether shallow boulders that slide are judged against slower trucks, too; not where the caller does so.
-    outlines_in_lanes
-        Whether there are so many designs that outlines of more than one piece are simulated several at a time.
+    barrels_in_lanes
+        Whether there are so many designs that barrels, of two pieces, are simulated several at a time.
     """
 
     readings: Readings
@@ -107,7 +107,7 @@ class Evaluation:
     second_opinion: tuple[str, ...] = ()
     askable: bool = False
     against_slower: bool = True
-    outlines_in_lanes: bool = False
+    barrels_in_lanes: bool = False
 
     def __call__(self, block: DesignBlock) -> Judged:
         """Simulate and judge a block.
@@ -196,7 +196,7 @@ class Evaluation:
         """Return how boulders of one of `SHAPES` are simulated: the barrel has two pieces, the others have one."""
         if shape != "barrel":
             return self.control
-        return self.control._replace(side_by_side=self.outlines_in_lanes)
+        return self.control._replace(side_by_side=self.barrels_in_lanes)
 
     def _decided(self, designs: Designs) -> Rows:
         """Simulate designs until each is decided at its own speed."""
@@ -330,5 +330,5 @@ def evaluation_of(sweep: Sweep, accuracy: Accuracy, simulate: Simulate = by_kern
         model=sweep.model,
         second_opinion=sweep.model.second_opinion if askable else (),
         askable=askable,
-        outlines_in_lanes=sweep.n_designs >= OUTLINES_IN_LANES,
+        barrels_in_lanes=goes_in_lanes(2, sweep.n_designs),
     )

@@ -15,7 +15,7 @@ from boulder_sweep.designs import block_of
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.impact.recomputing import recompute
 from boulder_sweep.impact.simulation import simulate
-from boulder_sweep.judge.accuracy import OUTLINES_IN_LANES, accuracy_of, control_of
+from boulder_sweep.judge.accuracy import DESIGNS_A_PIECE, accuracy_of, control_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.settings import Sweep, load, load_text
@@ -174,8 +174,8 @@ def test_a_box_by_another_name_has_the_bits_of_a_box(tmp_path, entry):
     ("entry", "angles", "side_by_side"),
     [
         ("taper: 0.8", 2, True),
-        (f"profile: {LEANING}", OUTLINES_IN_LANES - 1, False),
-        (f"profile: {LEANING}", OUTLINES_IN_LANES, True),
+        (f"profile: {LEANING}", 2 * DESIGNS_A_PIECE - 1, False),
+        (f"profile: {LEANING}", 2 * DESIGNS_A_PIECE, True),
     ],
 )
 def test_lanes_are_for_many_designs_of_several_pieces(tmp_path, entry, angles, side_by_side):
