@@ -95,7 +95,7 @@ FINENESS, TOLERANCE_M = 2, 1e-6
 """Fineness and error of a step of the fine solution (`boulder_kernels.second_opinion.HeaveControl`)."""
 ERROR_DEG, ERROR_M = 0.05, 1e-3
 """Bound on the largest error of the fine solution [deg, m]; it is taken off the limits."""
-AT_ONCE = 400
+AT_ONCE = 2000
 """Designs simulated per call: an interruption waits for the current call."""
 
 

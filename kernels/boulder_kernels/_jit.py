@@ -307,19 +307,24 @@ def _ask_for_wide_vectors() -> None:
 _ask_for_wide_vectors()
 
 
-_ARRAYS: dict[tuple[Any, ...], Any] = {}
-"""Types of arrays, each of which takes Numba as long to work out as it takes to simulate ten designs."""
+_TYPES: dict[Any, Any] = {}
+"""Numba types of arguments: it takes Numba as long to work out one of an array as to simulate ten designs."""
+
+
+def _key_of(value: Any) -> Any:
+    """Return what the Numba type of an argument depends on: a number, None, an array, or a named tuple of these."""
+    if isinstance(value, np.ndarray):
+        flags = value.flags
+        return type(value), value.dtype, value.ndim, flags.c_contiguous, flags.f_contiguous, flags.writeable
+    return (type(value), *map(_key_of, value)) if isinstance(value, tuple) else type(value)
 
 
 def _type_of(value: Any) -> Any:
     """Return the Numba type of an argument."""
-    if not isinstance(value, np.ndarray):
-        return numba.typeof(value)
-    flags = value.flags
-    key = (type(value), value.dtype, value.ndim, flags.c_contiguous, flags.f_contiguous, flags.writeable)
-    if key not in _ARRAYS:
-        _ARRAYS[key] = numba.typeof(value)
-    return _ARRAYS[key]
+    key = _key_of(value)
+    if key not in _TYPES:
+        _TYPES[key] = numba.typeof(value)
+    return _TYPES[key]
 
 
 class Kernel:
