@@ -173,6 +173,22 @@ def test_a_change_is_moved_to_where_a_predicate_changes_that_is_nearly_the_same(
     assert np.mean(again.holds[near] == exact.holds[near]) > 0.9
 
 
+def test_between_two_places_that_hold_only_the_other_predicate_is_asked() -> None:
+    asked: list[int] = []
+
+    def holds_from_500(index: np.ndarray, places: np.ndarray) -> np.ndarray:
+        asked.extend(places.tolist())
+        return np.where(places >= 500, HOLDS, FAILS)
+
+    gap = stretches([(0, 690, HOLDS), (700, 1000, HOLDS)])
+    ends = np.array([0]), np.array([1000])
+    found = search(holds_from_500, *ends, between=gap)
+    assert (found.kind[0], found.fails[0], found.holds[0]) == (FOUND, 499, 500)
+    assert not [place for place in asked if place > 500 and place % 250]
+    found = search(holds_from_500, *ends, between=stretches([(0, 686, HOLDS), (690, 1000, HOLDS)]))
+    assert found.kind[0] == NOT_MONOTONE, "at 688 it fails"
+
+
 def test_before_a_gap_that_is_stepped_over_the_last_is_of_the_next_one() -> None:
     """From 100 backwards by 1, 2, 4, ... the places 99, 97, 93, 85, 69 are tried."""
     narrow = stretches([(69, 86, HOLDS), (89, 100, HOLDS)], [(0, 60, HOLDS), (90, 100, HOLDS)])

@@ -13,8 +13,11 @@ import numba
 import numpy as np
 import pytest
 
+import boulder_kernels as bk
 from boulder_kernels import _jit
+from boulder_kernels.heave import Base
 from boulder_kernels.numerics import sine_versine
+from boulder_kernels.second_opinion import HeaveRecord
 
 pytestmark = pytest.mark.compiled
 
@@ -198,3 +201,15 @@ def test_code_that_two_processes_have_compiled_runs_in_one(tmp_path: Path) -> No
     assert dry != wet
     assert rotations(DRY, WET) == dry + wet
     assert rotations(WET, DRY) == wet + dry
+
+
+def test_the_types_that_are_kept_are_those_that_numba_gives() -> None:
+    square = np.zeros((3, 3))
+    locked = square.copy()
+    locked.flags.writeable = False
+    records = np.zeros(2, np.dtype([("x", "f8", (8,))]))
+    arrays = [square, np.asfortranarray(square), square[:, 1:], square[0], square.astype(np.int8), locked, records]
+    values = [*arrays, records.view(np.recarray), 1, 1.0, True, np.float64(1.0), None, bk.corrected()]
+    values += [bk.design.SoilMass(1.0, 2.0, 3.0), HeaveRecord(square[0], square, square[0]), Base()]
+    for value in (*values, *values):
+        assert _jit._type_of(value) == numba.typeof(value), type(value)
