@@ -234,7 +234,7 @@ class Reach(NamedTuple):
 
 @inlined
 def reach_of(design: Design, outline: np.ndarray) -> Reach:
-    """Return the reach of a boulder with an outline, shape (P, 4), or of the box of the design where it has no points."""
+    """Return the reach of a boulder with an outline, shape (P, 4), or of the box of the design."""
     if len(outline) == 0:
         return Reach(design.L, 0.0, design.W)
     near = far = steepest = 0.0
@@ -681,7 +681,7 @@ class Levers(NamedTuple):
 
 @by_types
 def put_levers(n: Any, a: Any, far: Any, near: Any, work: Any, f: Any) -> Callable[..., None]:
-    """Return what notes what presses on the faces of a part of the soil, times their levers, where they have several."""
+    """Return what notes what presses on the faces of a part times their levers, where these differ."""
     if type_of(f[0]) is SoilConstants:
         return lambda n, a, far, near, work, f: put_turnings(n, a, far, near, work)
     return lambda n, a, far, near, work, f: None

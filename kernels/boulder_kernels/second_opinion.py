@@ -399,11 +399,8 @@ def prepare_in_layers(
 
     The pieces are filled anew.
     """
-    lumped, body, reach = (
-        fill_pieces(design, layers, outline, soil),
-        body_with(design, outline),
-        reach_of(design, outline),
-    )
+    lumped, body = fill_pieces(design, layers, outline, soil), body_with(design, outline)
+    reach = reach_of(design, outline)
     c = constants_in_soil(design, READINGS, body, lumped, None)
     bed = bed_of(design, reach.L, lumped.mass, layers, form, base)
     f = constants_on(bed, body, reach, c, form, base, fineness)
