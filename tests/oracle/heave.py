@@ -22,7 +22,7 @@ from scipy.optimize import brentq
 from .constants import Constants, constants, impact_lever, shear_wedge_angle
 from .ground import ultimate_pressure, vertical_stress
 from .inputs import CORRECTED, GRAVITY, Ground, Inputs, Layer, layer_at
-from .soil import lateral_coefficient, spring_constants, spring_energies, spring_forces, ultimate_forces
+from .soil import lateral_coefficient, spring_energies, spring_forces
 from .vehicle import crush_force, jerk
 
 Array = NDArray[np.float64]
@@ -310,15 +310,9 @@ def edges_of(inputs: Inputs, outline: Array, pieces: int) -> Array:
 def parts_of(inputs: Inputs, outline: Array, edges: Array, length: float) -> Array:
     """Stiffness and ultimate force per metre of depth, drag, and friction of the parts, (4, n), Eq 149."""
     height, middles = np.diff(edges), (edges[1:] + edges[:-1]) / 2
-    unit = np.ones(len(height))
-    if inputs.ground is None:
-        widths = at(outline, inputs.d - edges)[0]
-        wide = (widths[1:] + widths[:-1]) / 2
-        springs, limits = (each(inputs, unit, height * wide / inputs.W) for each in (spring_constants, ultimate_forces))
-        limits *= law_factors(inputs, wide)
-        return np.stack((springs, limits, inputs.rho_s * wide * height, unit * tan(inputs.phi * 2 / 3)))
     parts = zip(middles, height, strict=True)
-    return np.stack([_part_in(inputs, inputs.ground, outline, z, high, length) for z, high in parts], axis=1)
+    ground, length = ground_of(inputs), 0.0 if inputs.ground is None else length
+    return np.stack([_part_in(inputs, ground, outline, z, high, length) for z, high in parts], axis=1)
 
 
 def soil_at(inputs: Inputs, ground: Ground, z: float) -> Array:
