@@ -196,7 +196,7 @@ def test_a_row_is_what_one_impact_gives(tmp_path, entry, more):
     assert row.verdict == one["verdict"] == "pass"
     assert row.solidity == pytest.approx(sweep.model.shape.filled)
     assert row.max_rotation_deg == pytest.approx(one["max_rotation_deg"], abs=row.rotation_error_deg + 1e-9)
-    assert row.robustness == "open"
+    assert row.robustness in ("robust", "sensitive")
     assert recompute(tmp_path / "table", 0).unequal == ()
 
 
@@ -258,8 +258,7 @@ def test_answers_take_profiles_and_give_their_mass(tmp_path):
     assert answer.boulder_mass_kg == pytest.approx(2596 * 1.65 * 1.68 * 3.44 * tapered(0.8).filled)
     box = bare_need(load(RWG)).frame.iloc[0]
     assert answer.least_embedment_depth_m > box.least_embedment_depth_m
-    with pytest.raises(QuestionError, match="second opinions know boxes"):
-        bare_need(sweep, robust=True)
+    assert bare_need(sweep, robust=True).frame.iloc[0].least_embedment_depth_m > answer.least_embedment_depth_m
 
 
 KNOWN = Path(__file__).parent / "known"
