@@ -101,7 +101,7 @@ class Designs(NamedTuple):
         return self._replace(table=table, factors=self.given_factors, shape=shape)
 
     def under(self, law: str, model: Model) -> Any:
-        """Return the designs as the kernels take them, by another soil model than that of a model; none is `taped`."""
+        """Return the designs as the kernels take them, by another soil model than they have; none is `taped`."""
         if not self.has_outlines:
             return with_law(self.table, law, model.resistance)
         model = replace(model, resistance=law)

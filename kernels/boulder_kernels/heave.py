@@ -227,7 +227,7 @@ class Reach(NamedTuple):
     L: float
     """Length where it is longest [m]."""
     steepest: float
-    """See `HeaveConstants`."""
+    """Horizontal over vertical of the face that widens upwards most; 0 of a box [-]."""
     foot_width: float
     """Width of its foot [m]."""
 
