@@ -18,7 +18,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -202,7 +202,8 @@ def falls_as_it_lies(one: Designs, evaluation: Evaluation) -> bool:
     water = math.inf if ground.water_table_m is None else ground.water_table_m
     lies = known.Ground((top, *deeper), water, math.radians(ground.slope_deg))
     inputs, limit = known.Inputs(**given, ground=lies, resistance=DECISIVE), evaluation.limits.rotation
-    outline = one.table.outlines[0] if one.has_outlines else None
+    table: Any = one.table
+    outline = table.outlines[0] if one.has_outlines else None
     impact = oracle.simulate_heave(
         inputs,
         as_it_lies=True,
