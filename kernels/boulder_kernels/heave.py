@@ -125,7 +125,7 @@ class HeaveConstants(NamedTuple):
     L: float
     """Length of the boulder, where it is longest [m]."""
     steepest: float
-    """Horizontal over vertical of the face that widens upwards most; 0 of a box [-]."""
+    """Horizontal over vertical of the face that is inclined most; 0 of a box [-]."""
     foot: float
     """Length of its foot [m]."""
     foot_a: float
@@ -148,6 +148,8 @@ class HeaveConstants(NamedTuple):
     """Friction of both sides per mean depth of their points [N/m]."""
     v_s: float
     """Speed of slip at which friction has 0.71 of its full value [m/s]."""
+    sunk: float
+    """How far a far face that narrows upwards counts as sunk where the least energy is looked for; 0 in motion [m]."""
 
 
 class Forces(NamedTuple):
@@ -227,7 +229,7 @@ class Reach(NamedTuple):
     L: float
     """Length where it is longest [m]."""
     steepest: float
-    """Horizontal over vertical of the face that widens upwards most; 0 of a box [-]."""
+    """Horizontal over vertical of the face that is inclined most; 0 of a box [-]."""
     foot_width: float
     """Width of its foot [m]."""
 
@@ -241,7 +243,9 @@ def reach_of(design: Design, outline: np.ndarray) -> Reach:
     for i in range(len(outline)):
         near, far = max(near, outline[i, REACH_NEAR]), max(far, outline[i, REACH_FAR])
         if i > 0:
-            steepest = max(steepest, max(slope_of(outline, i - 1, REACH_NEAR), slope_of(outline, i - 1, REACH_FAR)))
+            steepest = max(
+                steepest, max(slope_of(outline, i - 1, REACH_NEAR), abs(slope_of(outline, i - 1, REACH_FAR)))
+            )
     return Reach(near + far, steepest, outline[0, WIDTH])
 
 
@@ -278,6 +282,7 @@ def constants_on(
         friction_of(bed.phi, form),
         bed.side,
         base.slip_speed,
+        0.0,
     )
 
 
@@ -353,7 +358,7 @@ class Faces(NamedTuple):
     """Far and near face right of the common centre of mass [m]."""
     far_slope: float
     near_slope: float
-    """What these grow by per height where the face widens upwards, and 0 elsewhere [-] (Eq 150)."""
+    """What these grow by per height, but 0 where the near face narrows upwards [-] (Eq 150)."""
 
 
 @inlined
@@ -367,7 +372,7 @@ def faces_between(low: float, high: float, outline: np.ndarray, f: HeaveConstant
     return Faces(
         middle + 0.5 * (far + far_to),
         middle - 0.5 * (near + near_to),
-        max(far_to - far, 0.0) * inverse,
+        (far_to - far) * inverse,
         min(near - near_to, 0.0) * inverse,
     )
 
@@ -648,8 +653,8 @@ def soil_element(
 ) -> Element:
     """Forces and energy of part n of the soil (Eqs 132, 150).
 
-    Its depth follows the rise of the faces that press on it. A face that widens upwards leaves the soil as it rises:
-    what it is pressed in with lifts it.
+    Its depth follows the rise of the faces that press on it. A face that widens upwards leaves the soil as it rises,
+    and what it is pressed in with lifts it. A far face that narrows upwards leaves it as it sinks, and is held down.
     """
     c, part = f.c, part_of_soil(n, work, p, f)
     ratio, a = part.ratio, part.faces
@@ -659,12 +664,14 @@ def soil_element(
     z = alpha - f.heave * (y_b + d_n * versin)
     z_far, z_near = z + f.heave * a.far * sin, z + f.heave * a.near * sin
     rising = f.heave * (w_b + omega_b * d_n * sin)
+    sunk = (a.far_slope < 0.0) & (f.sunk > 0.0)
+    far_rise, far_slope = -f.sunk if sunk else alpha - z_far, 0.0 if sunk else a.far_slope
     v_far = v - times(a.far_slope, rising - f.heave * omega_b * a.far * cos)
     v_near = v - times(a.near_slope, rising - f.heave * omega_b * a.near * cos)
-    far = pressed(u - times(a.far_slope, alpha - z_far), -part.drag * v_far * abs(v_far), z_far, part, f)
+    far = pressed(u - times(a.far_slope, far_rise), -part.drag * v_far * abs(v_far), z_far, part, f)
     near = pressed(times(a.near_slope, alpha - z_near) - u, -part.drag * v_near * abs(v_near), z_near, part, f)
     F_far, F_near = far.drag - far.spring, near.drag + near.spring
-    lift_far = far.lift - times(f.heave * a.far_slope, F_far)
+    lift_far = far.lift - times(f.heave * far_slope, F_far)
     lift_near = near.lift - times(f.heave * a.near_slope, F_near)
     lift = lift_far + lift_near
     turning = lift * d_n * sin - (lift_far * a.far + lift_near * a.near) * cos

@@ -208,16 +208,17 @@ def least_energy(theta: float, work: np.ndarray, f: HeaveConstants) -> float:
     Notes
     -----
     Along x_b alone, and along y_b alone, the energy is convex: its least is where its slope is zero, in either in turn.
-    (With a face that widens upwards, depth and pressure of the soil both fall as it rises, and so their product is
-    convex; with one that narrows, whose inclination is left out, the pressure would rise.) Along x_b the least is
-    between the positions where the uppermost and the lowest soil are as they were, and further by what an inclined face
-    moves the soil; along y_b between those where all strips carry what they can, which is more than the weight, and
-    where the boulder is out of the soil. There may be several, of large rotations: the search starts from both ends
-    along x_b.
+    (As a face that widens upwards rises, depth and pressure of the soil both fall, and so their product is convex. As
+    one that narrows rises, the pressure grows: it counts as sunk by as much as it can be, which is no more than the
+    energy.) Along x_b the least is between the positions where the uppermost and the lowest soil are as they were, and
+    further by what an inclined face moves the soil; along y_b between those where all strips carry what they can, which
+    is more than the weight, and where the boulder is out of the soil. There may be several, of large rotations: the
+    search starts from both ends along x_b.
     """
     sin, versin = sine_versine(theta)
     upper = f.c.l_n * versin - f.c.z_0 * sin
     left, right = min(upper, upper + f.c.d * sin), max(upper, upper + f.c.d * sin)
+    f = HeaveConstants(*f[:-1], f.L * abs(sin) + f.q_foot / f.k_foot)
     bottom, top, inclined = 0.0, f.L + 3.0 * f.c.d + f.s_0, f.steepest * (f.L + f.c.d)
     for n in range(f.pieces):
         bottom = min(bottom, strip_depth(work, n, 0.0, sin, versin, f) - f.q_foot / f.k_foot)

@@ -62,7 +62,7 @@ class Body:
     """Whether faces press on the soil at their present depth, as it lies there; by Eq 149 if not."""
     outline: Array | None = None
     both_ways: bool = False
-    """Whether the inclination of a face counts where it holds the boulder down, too."""
+    """Whether the inclination of the near face counts where it holds the boulder down, too."""
     constants: Constants = field(init=False)
     own: Array = field(init=False)
     """The boulder's own centre."""
@@ -95,7 +95,7 @@ class Body:
     faces: Array = field(init=False)
     """Middles of the parts on the far and the near face, shape (2, n, 2)."""
     slopes: Array = field(init=False)
-    """By how much faces move to the right per height [-], shape (2, n); 0 where that would hold the boulder down."""
+    """By how much faces move to the right per height [-], shape (2, n); 0 where the near one would be held down."""
     foot_area: float = field(init=False)
     own_inertia: float = field(init=False)
     """Moment of inertia of the boulder about its own centre [kg m^2]."""
@@ -132,7 +132,7 @@ class Body:
         mean, slope = (ends[:, 1:] + ends[:, :-1]) / 2, -np.diff(ends) / np.diff(levels)
         slopes = np.stack((slope[2], -slope[1]))
         if not self.both_ways:
-            slopes = np.stack((np.maximum(slopes[0], 0.0), np.minimum(slopes[1], 0.0)))
+            slopes = np.stack((slopes[0], np.minimum(slopes[1], 0.0)))
         widens = at(outline, inputs.d - depth + 1e-6)[0] - at(outline, inputs.d - depth - 1e-6)[0] > 1e-12
         lever = {"far": middle + mean[2], "near": middle - mean[1]}
         if self.outline is None:
