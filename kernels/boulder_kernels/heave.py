@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import by_types, inlined, kernel, type_of
+from ._jit import by_types, inlined, is_none, kernel, type_of
 from .design import FAR as REACH_FAR
 from .design import NEAR as REACH_NEAR
 from .design import (
@@ -105,7 +105,8 @@ class HeaveConstants(NamedTuple):
 
     c: Any
     """Constants of the planar motion, with corrected readings and the soil in closed form: `Constants` in uniform soil
-    beside a box, `SoilConstants` where the workspace holds the parts of the soil and the faces beside them."""
+    beside a box, `SoilConstants` where the workspace holds the parts of the soil, with a ``soil`` that is not None
+    where it holds the faces beside them, too."""
     heave: float
     """1 where the boulder may rise, else 0."""
     m_b: float
@@ -362,10 +363,16 @@ class Faces(NamedTuple):
 
 
 @inlined
+def faces_of_box(f: HeaveConstants) -> Faces:
+    """Return the faces of a box."""
+    return Faces(f.c.l_n, f.c.l_n - f.L, 0.0, 0.0)
+
+
+@inlined
 def faces_between(low: float, high: float, outline: np.ndarray, f: HeaveConstants) -> Faces:
     """Return the faces of a boulder with an outline, shape (P, 4), between two heights over its foot [m]."""
     if len(outline) == 0:
-        return Faces(f.c.l_n, f.c.l_n - f.L, 0.0, 0.0)
+        return faces_of_box(f)
     middle, inverse = f.foot_a + outline[0, REACH_NEAR], 1.0 / (high - low)
     far, far_to = at_height(outline, REACH_FAR, low), at_height(outline, REACH_FAR, high)
     near, near_to = at_height(outline, REACH_NEAR, low), at_height(outline, REACH_NEAR, high)
@@ -527,21 +534,35 @@ class Part(NamedTuple):
 @by_types
 def part_of_soil(n: Any, work: Any, p: Any, f: Any) -> Callable[..., Part]:
     """Return what gives part n of the soil: from the workspace, but beside a box in uniform soil, all are alike."""
+    if has_outline(f):
+        return lambda n, work, p, f: laid_part(n, work, p, laid_faces(n, work))
     if type_of(f[0]) is SoilConstants:
-        return lambda n, work, p, f: laid_part(n, work, p)
+        return lambda n, work, p, f: laid_part(n, work, p, faces_of_box(f))
     return lambda n, work, p, f: uniform_part(n, p, f)
+
+
+def has_outline(f: Any) -> bool:
+    """Return whether faces lie in the workspace, by the type of the constants."""
+    return type_of(f[0]) is SoilConstants and not is_none(f[0][-1])
 
 
 @inlined
 def uniform_part(n: int, p: Parts, f: HeaveConstants) -> Part:
     """Return part n of a uniform soil."""
     ratio = (n + 0.5) * p.share
-    faces = Faces(f.c.l_n, f.c.l_n - f.L, 0.0, 0.0)
+    faces = faces_of_box(f)
     return Part(ratio, p.w, p.inverse_w, p.slope_w, p.stiffness, f.c.x_yield, p.drag, p.inverse_cover, 1.0, faces)
 
 
 @inlined
-def laid_part(n: int, work: np.ndarray, p: Parts) -> Part:
+def laid_faces(n: int, work: np.ndarray) -> Faces:
+    """Return the faces beside part n of the soil that `lay_soil` has written."""
+    a = FACES + ROW
+    return Faces(field(work, FACES, n), field(work, a, n), field(work, a + ROW, n), field(work, a + 2 * ROW, n))
+
+
+@inlined
+def laid_part(n: int, work: np.ndarray, p: Parts, faces: Faces) -> Part:
     """Return part n of the soil that `lay_soil` has written."""
     height, inverse = field(work, HEIGHT, n), field(work, INVERSE_HEIGHT, n)
     return Part(
@@ -554,12 +575,7 @@ def laid_part(n: int, work: np.ndarray, p: Parts) -> Part:
         field(work, DRAG, n),
         p.inverse_cover * inverse,
         field(work, ROUGHNESS, n),
-        Faces(
-            field(work, FACES, n),
-            field(work, FACES + ROW, n),
-            field(work, FACES + 2 * ROW, n),
-            field(work, FACES + 3 * ROW, n),
-        ),
+        faces,
     )
 
 
@@ -689,7 +705,7 @@ class Levers(NamedTuple):
 @by_types
 def put_levers(n: Any, a: Any, far: Any, near: Any, work: Any, f: Any) -> Callable[..., None]:
     """Return what notes what presses on the faces of a part times their levers, where these differ."""
-    if type_of(f[0]) is SoilConstants:
+    if has_outline(f):
         return lambda n, a, far, near, work, f: put_turnings(n, a, far, near, work)
     return lambda n, a, far, near, work, f: None
 
@@ -704,7 +720,7 @@ def put_turnings(n: int, a: Faces, far: float, near: float, work: np.ndarray) ->
 @by_types
 def levers_of(far: Any, near: Any, work: Any, f: Any) -> Callable[..., Levers]:
     """Return what gives the levers of the faces by what presses on them as a whole."""
-    if type_of(f[0]) is SoilConstants:
+    if has_outline(f):
         return lambda far, near, work, f: Levers(
             summed(work, TURNING_FAR, f.pieces) / max(far, TINY), summed(work, TURNING_NEAR, f.pieces) / max(near, TINY)
         )

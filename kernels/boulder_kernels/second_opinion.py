@@ -21,7 +21,7 @@ import numpy as np
 from ._jit import by_types, inlined, is_none, kernel
 from .design import Constants, Design, DesignTable, G, body_with, constants_of, corrected, design_in, is_computable
 from .dormand_prince import displacement_at, slope_at, time_of_limit, turning_point
-from .dynamics import empty_soil
+from .dynamics import BOX, empty_soil
 from .heave import (
     ALONG_X,
     FINEST,
@@ -390,6 +390,7 @@ def prepare_in_layers(
     design: Design,
     layers: np.ndarray,
     outline: np.ndarray,
+    inclined: float | None,
     soil: ManyPieces,
     form: HeaveOptions,
     base: Base,
@@ -398,11 +399,11 @@ def prepare_in_layers(
 ) -> HeaveConstants:
     """Fill the workspace for a design in layers, shape (M, 6), with an outline, shape (P, 4); return its constants.
 
-    The pieces are filled anew.
+    The pieces are filled anew. None tells, by its type, that the boulder is a box, whose faces are upright.
     """
     lumped, body = fill_pieces(design, layers, outline, soil), body_with(design, outline)
     reach = reach_of(design, outline)
-    c = constants_in_soil(design, READINGS, body, lumped, None)
+    c = constants_in_soil(design, READINGS, body, lumped, inclined)
     bed = bed_of(design, reach.L, lumped.mass, layers, form, base)
     f = constants_on(bed, body, reach, c, form, base, fineness)
     prepare(work, f)
@@ -429,8 +430,12 @@ def prepare_design(
         return lambda design, row, layers, outlines, soil, form, base, fineness, work: prepare_in_uniform_soil(
             design, form, base, fineness, work
         )
+    if is_none(outlines):
+        return lambda design, row, layers, outlines, soil, form, base, fineness, work: prepare_in_layers(
+            design, layers[row], np.empty((0, 4)), None, soil, form, base, fineness, work
+        )
     return lambda design, row, layers, outlines, soil, form, base, fineness, work: prepare_in_layers(
-        design, layers[row], outlines[row], soil, form, base, fineness, work
+        design, layers[row], outlines[row], 1.0, soil, form, base, fineness, work
     )
 
 
@@ -449,8 +454,8 @@ def run_second_opinions(
 ) -> None:
     """Simulate designs one by one; see `second_opinions`.
 
-    Layers, shape (n, M, 6), outlines, shape (n, P, 4), and the pieces that every design fills anew are None of boxes in
-    uniform soils.
+    Layers, shape (n, M, 6), and the pieces that every design fills anew are None of boxes in uniform soils; outlines,
+    shape (n, P, 4), of all boxes.
     """
     for row in range(designs.shape[1]):
         design = design_in(designs, row)
@@ -494,10 +499,11 @@ def second_opinions(
     if not 1 <= control.fineness <= FINEST:
         raise ValueError(f"the fineness is 1 to {FINEST}, not {control.fineness}")
     layers: np.ndarray | None = getattr(table, "layers", None)
-    outlines: np.ndarray | None = getattr(table, "outlines", None)
-    soil = None if layers is None or outlines is None else empty_soil(layers.shape[1], outlines.shape[1], 0)
+    outlines: np.ndarray = getattr(table, "outlines", BOX[None])
+    points = outlines.shape[1]
+    soil = None if layers is None else empty_soil(layers.shape[1], points, 0)
     designs = np.stack(table[: len(DesignTable._fields)])
     out = np.full((len(HeaveOutcome._fields), designs.shape[1]), np.nan)
     work, kept = np.empty(WORKSPACE), record or no_heave_record()
-    run_second_opinions(designs, layers, outlines, soil, form, base, control, work, kept, out)
+    run_second_opinions(designs, layers, outlines if points else None, soil, form, base, control, work, kept, out)
     return HeaveOutcome(out[0].astype(np.int8), *out[1:])

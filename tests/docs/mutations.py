@@ -103,8 +103,8 @@ MUTATIONS = (
     Mutation(
         (132,),
         _HEAVE,
-        "Faces(f.c.l_n, f.c.l_n - f.L, 0.0, 0.0)\n    return Part",
-        "Faces(f.c.l_n, f.c.l_n, 0.0, 0.0)\n    return Part",
+        "return Faces(f.c.l_n, f.c.l_n - f.L",
+        "return Faces(f.c.l_n, f.c.l_n",
     ),
     Mutation((132,), _HEAVE, "f.heave * (y_b + d_n * versin)", "f.heave * (y_b - d_n * versin)"),
     Mutation((132,), _HEAVE, "f.heave * energy if z > 0.0 else 0.0", "0.0"),
