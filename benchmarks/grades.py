@@ -1,11 +1,12 @@
 """Grades of passes against a fine solution of each: ``python -m benchmarks.grades``.
 
-Passes of the M30 grid at 30 and at 40 mph, of random designs, of shallow boulders, of soil of 30 degrees, and on sites
-with layers, water, cohesion or slope are graded as `sweep run --second-opinion` grades them. Each is then simulated
-under every law of a second opinion with 256 parts of the soil, strips of the foot and points of the sides, and errors
-of a step of 1e-8 m. On each site the pass that stands nearest to the limit is simulated by an independent program, too,
-in which a face presses on the soil as it lies at its present depth. Exit code 1 if a pass that stands overturns in one
-of these.
+Passes of the M30 grid at 30 and at 40 mph, of random designs, of shallow boulders, of soil of 30 degrees, on sites with
+layers, water, cohesion or slope, and of boulders that are no boxes are graded as `sweep run --second-opinion` grades
+them. Each is then simulated under every law of a second opinion with 256 parts of the soil, strips of the foot and
+points of the sides, and errors of a step of 1e-8 m. On each site, and of each shape, the pass that stands nearest to
+the limit is simulated by an independent program, too, in which a face presses on the soil as it lies at its present
+depth, and in which the inclination of a face counts where it holds the boulder down, too. Exit code 1 if a pass that
+stands overturns in one of these.
 """
 
 from __future__ import annotations
@@ -17,13 +18,14 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from boulder_kernels import Design, Status
 from boulder_kernels.heave import FINEST
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
+from boulder_sweep.columns import SHAPES
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.designs import impact_height_of_face
 from boulder_sweep.investigation import api_curve
@@ -31,8 +33,8 @@ from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import PASS
 from boulder_sweep.judge.robustness import DECISIVE, base_under, standing, with_second_opinions
-from boulder_sweep.settings.model import SECOND_OPINIONS, Ground, Layer, Model
-from boulder_sweep.soils import with_law, with_soil
+from boulder_sweep.settings.model import SECOND_OPINIONS, Ground, Layer, Model, ProfilePoint, Shape
+from boulder_sweep.soils import with_soil
 from docs.studies.forms import BUMPER_M, HOOD_M, SPEEDS, drawn_of_grid, grid_evaluation, random_designs
 from tests.oracle import heave as oracle
 from tests.oracle import inputs as known
@@ -57,6 +59,12 @@ FAR_DEG = 9.0
 WATCHED_S = 0.6
 """How long the soil as it lies is simulated [s]."""
 SEED = 55
+NARROWEST, LEANS = 0.55, 0.06
+"""Least share of the whole sides that a shape has, and how far a profile leans, as a share of its length."""
+FILLS = (0.45, 0.94)
+"""Solidity of taped boulders."""
+TAPED_SHARE = 3
+"""One shape in so many is that of taped boulders."""
 
 
 class GradeCounts(NamedTuple):
@@ -119,16 +127,67 @@ def sites(evaluation: Evaluation, count: int) -> Iterator[tuple[Evaluation, Desi
         yield here, designs.rows(np.flatnonzero(far)[: count // n])
 
 
+def random_profile(rng: np.random.Generator) -> tuple[ProfilePoint, ...]:
+    """Draw a taper either way, a barrel, or a profile of five points that leans, on a foot that is wide enough."""
+    while True:
+        end = rng.uniform(NARROWEST, 0.97)
+        five = rng.uniform(NARROWEST, 1.0, 5)
+        sides = [[1.0, end], [end, 1.0], [end, 1.0, end], five / five.max()][rng.integers(4)]
+        leans = rng.uniform(-LEANS, LEANS, len(sides)) * (len(sides) == 5)
+        heights = np.linspace(0.0, 1.0, len(sides))
+        points = [
+            ProfilePoint(float(z), float(side), float(0.5 * side - lean), float(0.5 * side + lean))
+            for z, side, lean in zip(heights, sides, leans, strict=True)
+        ]
+        if Shape(tuple(points)).stands_flat:
+            return tuple(points)
+
+
+def shapes(evaluation: Evaluation, count: int, seed: int = SEED) -> Iterator[tuple[Evaluation, Designs]]:
+    """Yield how designs of random shapes are judged, every other in the soil of a site, and passes that turn far."""
+    rng = np.random.default_rng(seed)
+    n = max(count // OF_A_SITE, LEAST_SITES)
+    for number in range(n):
+        ground = random_ground(rng).fields() if number % 2 else {}
+        drawn, taped = random_designs(DRAWN * OF_A_SITE, 2 * seed + number), number % TAPED_SHARE == 0
+        model = Model(**ground) if taped else Model(**ground, profile=random_profile(rng))
+        given, rocks, fills = drawn.table, drawn.table.rho_b, rng.uniform(*FILLS, drawn.size)
+        if taped:
+            given = given._replace(rho_b=rocks * fills)
+        table = with_soil(given, model.resistance, model.ground, shape=model.shape)
+        designs = Designs(table, drawn.bed_offset, fills, rocks if taped else None, given.K_epsilon)
+        here = replace(evaluation, model=model, control=evaluation.control._replace(side_by_side=False))
+        judged = here.judged(designs)
+        far = (judged.verdict == PASS) & (judged["max_rotation_deg"] >= FAR_DEG)
+        yield here, designs.rows(np.flatnonzero(far)[: count // n])
+
+
+def in_shapes(passes: Designs, model: Model) -> list[Designs]:
+    """Return designs in each of the shapes that may stand for them."""
+    taped = passes.size > 0 and bool(passes.taped.all())
+    return [passes.in_shape(shape, model) for shape in range(len(SHAPES))] if taped else [passes]
+
+
 def overturned_as_it_lies(passes: Designs, stand: np.ndarray, evaluation: Evaluation) -> np.ndarray:
     """Return which passes the soil as it lies overturns, bool, (n,); asks of those that stand the one nearest to it."""
-    found, table = np.zeros(passes.size, dtype=bool), with_law(passes.table, DECISIVE)
-    if not (stand.any() and hasattr(table, "layers")):
+    found, model = np.zeros(passes.size, dtype=bool), evaluation.model
+    if not (stand.any() and (hasattr(passes.table, "layers") or passes.taped.all())):
         return found
-    ground, control = evaluation.model.ground, HeaveControl(evaluation.limits.rotation, WATCHED_S, stop=False)
-    turned = second_opinions(table, control, base=base_under(ground)).theta_max
-    row = int(np.argmax(np.where(stand, turned, 0.0)))
-    given = Design(*(float(column[row]) for column in passes.table[: len(Design._fields)]))._asdict()
+    control = HeaveControl(evaluation.limits.rotation, WATCHED_S, stop=False)
+    shaped = in_shapes(passes, model)
+    tables = [each.under(DECISIVE, model) for each in shaped]
+    turned = [second_opinions(table, control, base=base_under(model.ground)).theta_max for table in tables]
+    worst, row = np.unravel_index(np.argmax(np.where(stand, turned, 0.0)), (len(shaped), passes.size))
+    found[row] = falls_as_it_lies(shaped[worst].rows(slice(row, row + 1)), evaluation)
+    return found
+
+
+def falls_as_it_lies(one: Designs, evaluation: Evaluation) -> bool:
+    """Return whether the independent program overturns a design in the soil as it lies."""
+    ground = evaluation.model.ground
+    given = Design(*(float(column[0]) for column in one.table[: len(Design._fields)]))._asdict()
     del given["e_bumper"]
+    given["K_epsilon"] = float(one.given_factors[0])
     top = known.Layer(0.0, given["rho_s"], given["phi"], given["beta"], 1e3 * ground.cohesion_kPa)
     deeper = [
         known.Layer(
@@ -143,19 +202,30 @@ def overturned_as_it_lies(passes: Designs, stand: np.ndarray, evaluation: Evalua
     water = math.inf if ground.water_table_m is None else ground.water_table_m
     lies = known.Ground((top, *deeper), water, math.radians(ground.slope_deg))
     inputs, limit = known.Inputs(**given, ground=lies, resistance=DECISIVE), evaluation.limits.rotation
-    impact = oracle.simulate_heave(inputs, as_it_lies=True, fineness=2, horizon=WATCHED_S, limit=limit, rtol=1e-6)
-    found[row] = math.isfinite(impact.t_limit)
-    return found
+    table: Any = one.table
+    outline = table.outlines[0] if one.has_outlines else None
+    impact = oracle.simulate_heave(
+        inputs,
+        as_it_lies=True,
+        fineness=2,
+        outline=outline,
+        both_ways=True,
+        horizon=WATCHED_S,
+        limit=limit,
+        rtol=1e-6,
+    )
+    return math.isfinite(impact.t_limit)
 
 
 def overturned(passes: Designs, evaluation: Evaluation) -> np.ndarray:
     """Return which passes a fine solution under one of the laws overturns, bool, shape (n,)."""
     control = HeaveControl(evaluation.limits.rotation, evaluation.longest_s, TOLERANCE_M, FINEST)
-    found = np.zeros(passes.size, dtype=bool)
+    found, model = np.zeros(passes.size, dtype=bool), evaluation.model
     for law in SECOND_OPINIONS:
-        outcome = second_opinions(with_law(passes.table, law), control, base=base_under(evaluation.model.ground))
-        penetration = outcome.x_v_max - passes.bed_offset - passes.table.L
-        found |= (outcome.status == Status.LIMIT.value) | ~(penetration <= evaluation.limits.penetration)
+        for each in in_shapes(passes, model):
+            outcome = second_opinions(each.under(law, model), control, base=base_under(model.ground))
+            penetration = outcome.x_v_max - passes.bed_offset - each.length
+            found |= (outcome.status == Status.LIMIT.value) | ~(penetration <= evaluation.limits.penetration)
     return found
 
 
@@ -176,8 +246,10 @@ def held(evaluation: Evaluation, passes: Designs) -> GradeCounts:
 def grades(grid: Path = GRID, count: int = PASSES) -> dict[str, GradeCounts]:
     """Hold the grades of all sets to fine solutions."""
     found = {name: held(evaluation, passes) for name, evaluation, passes in sets(grid, count)}
-    each = [held(evaluation, passes) for evaluation, passes in sites(grid_evaluation(grid), count)]
-    return found | {"sites": GradeCounts(*map(sum, zip(*each, strict=True)))}
+    for name, draw in {"sites": sites, "shapes": shapes}.items():
+        each = [held(evaluation, passes) for evaluation, passes in draw(grid_evaluation(grid), count)]
+        found[name] = GradeCounts(*map(sum, zip(*each, strict=True)))
+    return found
 
 
 def grades_table(found: dict[str, GradeCounts], *, cpu: bool = False) -> Table:

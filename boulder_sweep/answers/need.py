@@ -229,7 +229,7 @@ def need(
         margin = MARGIN if chance is None else 0.0
     least_margin = margin_asked(margin)
     if robust and not can_be_asked(sweep):
-        raise QuestionError("--robust: second opinions know boxes of rock of given density and corrected readings only")
+        raise QuestionError("--robust: second opinions know rock of given density and corrected readings only")
     if robust and not sweep.model.second_opinion:
         raise QuestionError(
             "--robust needs second opinions: leave out --no-second-opinion, or second_opinion: none in the file"

@@ -167,7 +167,11 @@ class Evaluation:
         """
         taped = designs.taped
         if taped.any():
-            return merged(taped, self._worst_shapes(designs.rows(taped)), self.judged(designs.rows(~taped)))
+            judged = self._worst_shapes(designs.rows(taped))
+            if self.second_opinion and (not self.only or "robustness" in self.only):
+                passing = np.flatnonzero(taped)[judged.verdict == PASS]
+                judged = self._graded(judged, designs.rows(passing), self.second_opinion)
+            return merged(taped, judged, self.judged(designs.rows(~taped)))
         rows = self._decided(designs)
         if self.against_slower:
             self._hold_slower(rows, designs)
@@ -180,7 +184,7 @@ class Evaluation:
 
     def _worst_shapes(self, designs: Designs) -> Judged:
         """Judge boulders as taped and weighed by the worst of their shapes; by the first in which one fails."""
-        alone = replace(self, second_opinion=())  # which know boxes only
+        alone = replace(self, second_opinion=())  # which ask all shapes of what passes
         worst, left = alone.judged(designs.in_shape(0, self.model)), np.arange(designs.size)
         for shape in range(1, len(SHAPES)):
             left = left[worst.verdict[left] != FAIL]

@@ -6,17 +6,19 @@ They are in the units of the kernels, with what only the verdict asks for beside
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from boulder_kernels import DesignTable
-from boulder_kernels.design import FAR, HEIGHT, NEAR
+from boulder_kernels.design import FAR, HEIGHT, NEAR, WIDTH
 from boulder_sweep.columns import BOULDER_MASS, SHAPES
 from boulder_sweep.designs import LEAST_SOLIDITY, LEAST_TAPED, solidity_of
 from boulder_sweep.settings.model import Model
-from boulder_sweep.soils import plain, with_shape, with_soil
+from boulder_sweep.soils import plain, with_law, with_shape, with_soil
+from boulder_sweep.stones.taped import taped_profiles
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
@@ -97,6 +99,28 @@ class Designs(NamedTuple):
         given = plain(self.table)._replace(rho_b=self.rocks, K_epsilon=self.given_factors)
         table = with_shape(given, model.resistance, model.ground, SHAPES[shape], self.solidity)
         return self._replace(table=table, factors=self.given_factors, shape=shape)
+
+    def under(self, law: str, model: Model) -> Any:
+        """Return the designs as the kernels take them, by another soil model than they have; none is `taped`."""
+        if not self.has_outlines:
+            return with_law(self.table, law, model.resistance)
+        model = replace(model, resistance=law)
+        if self.shape >= 0:
+            return self.in_shape(self.shape, model).table
+        given = plain(self.table)._replace(K_epsilon=self.given_factors)
+        return with_soil(given, law, model.ground, shape=model.shape)
+
+    @property
+    def narrowest(self) -> np.ndarray:
+        """Least width of each boulder, whatever shape stands for it [m], shape (n,)."""
+        table: Any = self.table
+        if self.has_outlines:
+            return np.asarray(table.outlines[:, :, WIDTH].min(axis=1))
+        taped = self.taped
+        if not taped.any():
+            return np.asarray(table.W)
+        shares = taped_profiles(SHAPES[0], self.solidity)[:, :, WIDTH].min(axis=1)
+        return np.where(taped, shares * table.W, table.W)
 
     @property
     def length(self) -> np.ndarray:

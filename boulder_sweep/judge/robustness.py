@@ -26,12 +26,12 @@ from boulder_kernels._jit import plain
 from boulder_kernels.heave import Base, bearing_capacity_factor
 from boulder_kernels.second_opinion import USUAL_BASE, HeaveControl, second_opinions
 from boulder_kernels.table import some_rows
-from boulder_sweep.columns import GRADES
+from boulder_sweep.columns import GRADES, SHAPES
 from boulder_sweep.investigation import family_bounds
 from boulder_sweep.judge.judged import PASS, Judged
 from boulder_sweep.judge.validity import VEHICLE, are_studied
 from boulder_sweep.settings.model import RESISTANCES, SECOND_OPINIONS
-from boulder_sweep.soils import layer_coefficients, with_law
+from boulder_sweep.soils import layer_coefficients
 
 if TYPE_CHECKING:
     from boulder_kernels import DesignTable
@@ -54,7 +54,7 @@ SENSITIVE_IN_WORDS = (
 MEANINGS = {
     "robust": IN_WORDS,
     "sensitive": SENSITIVE_IN_WORDS,
-    "open": "second opinions know boxes of rock of given density and corrected readings only",
+    "open": "second opinions know rock of given density and corrected readings only",
 }
 """What a grade means of a pass of which second opinions were asked, if they could be."""
 UNSTUDIED_IN_WORDS = "stands under the second opinions that were asked, but outside the ranges of their study"
@@ -102,11 +102,9 @@ AT_ONCE = 2000
 def can_be_asked(sweep: Sweep) -> bool:
     """Return whether second opinions can simulate the designs of a sweep.
 
-    They simulate only boxes of rock of given density, with corrected readings.
+    They simulate only rock of given density, with corrected readings.
     """
-    model = sweep.model
-    known = model.shape.is_box and not model.rock_assumed and not any(case.is_taped for case in (sweep, *sweep.cases))
-    return known and model.preset == "corrected"
+    return sweep.model.preset == "corrected" and not sweep.model.rock_assumed
 
 
 def meaning_of(row: Mapping[str, Any]) -> str | None:
@@ -158,11 +156,16 @@ def is_free(table: DesignTable) -> np.ndarray:
 def base_under(ground: Ground) -> Base:
     """Return the ground under the foot for a second opinion: its water table [m] and slope [rad]."""
     water = math.inf if ground.water_table_m is None else ground.water_table_m
-    return USUAL_BASE._replace(water=water, slope=math.radians(ground.slope_deg))
+    varies = not ground.is_proportional
+    return USUAL_BASE._replace(water=water, slope=math.radians(ground.slope_deg), varies=varies)
 
 
-def resists_less(table: DesignTable, law: str) -> np.ndarray:
-    """Return where a soil model resists less than `DECISIVE`, in some layer of the soil, bool, shape (n,)."""
+def resists_less(designs: Designs, law: str) -> np.ndarray:
+    """Return where a soil model resists less than `DECISIVE`, in some layer of the soil, bool, shape (n,).
+
+    Where a boulder is narrow `DECISIVE` resists most.
+    """
+    table: Any = designs.table._replace(W=designs.narrowest)
     return np.asarray((layer_coefficients(table, law) < layer_coefficients(table, DECISIVE)).any(axis=1))
 
 
@@ -174,7 +177,7 @@ def stands(
     Parameters
     ----------
     designs
-        The designs, all of which the vehicle hits.
+        The designs, all of which the vehicle hits. Taped ones pass if each of their shapes does.
     law
         Soil model of the second opinion, one of `SECOND_OPINIONS`.
     model
@@ -186,17 +189,26 @@ def stands(
     tolerance_m
         Error of a step [m] of one solution that decides in place of a quick and a fine one, nearly as they do.
     """
-    table, base = with_law(designs.table, law, model.resistance), base_under(model.ground)
+    passes, taped = np.ones(designs.size, dtype=bool), designs.taped
+    if taped.any():
+        passes[~taped] = stands(designs.rows(~taped), law, model, limits, longest_s, tolerance_m=tolerance_m)
+        for shape in range(len(SHAPES)):
+            left = np.flatnonzero(passes & taped)
+            if len(left):
+                shaped = designs.rows(left).in_shape(shape, model)
+                passes[left] = stands(shaped, law, model, limits, longest_s, tolerance_m=tolerance_m)
+        return passes
+    table, base = designs.under(law, model), base_under(model.ground)
     fine = HeaveControl(limits.rotation - math.radians(ERROR_DEG), longest_s, TOLERANCE_M, FINENESS)
     usual = HeaveControl(limits.rotation, longest_s, QUICK_M, margin=math.radians(NEAR_DEG))
     if tolerance_m is not None:
         usual = fine._replace(tolerance=tolerance_m, fineness=1)
-    passes = np.empty(designs.size, dtype=bool)
+    length = designs.length
 
     def below(some: np.ndarray, control: HeaveControl) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return which of some designs stay below the limit of rotation, how far they turn, and how far in."""
         outcome = second_opinions(some_rows(table, some), control, base=base)
-        penetration = outcome.x_v_max - designs.bed_offset[some] - table.L[some]
+        penetration = outcome.x_v_max - designs.bed_offset[some] - length[some]
         return np.equal(outcome.status, Status.BELOW_LIMIT.value), np.asarray(outcome.theta_max), penetration
 
     for at in range(0, designs.size, AT_ONCE):
@@ -218,7 +230,7 @@ def stands_under_the_weakest(
     there = stands(designs, DECISIVE, model, limits, longest_s, tolerance_m=tolerance_m)
     for law in SECOND_OPINIONS:
         if law != DECISIVE:
-            rows = np.flatnonzero(there & resists_less(designs.table, law))
+            rows = np.flatnonzero(there & resists_less(designs, law))
             there[rows] = stands(designs.rows(rows), law, model, limits, longest_s, tolerance_m=tolerance_m)
     return there
 
@@ -277,7 +289,7 @@ def with_second_opinions(
     if laws == (DECISIVE,):
         for law in SECOND_OPINIONS:
             if law != DECISIVE:
-                ask(law, np.flatnonzero(turned | resists_less(passes.table, law)))
+                ask(law, np.flatnonzero(turned | resists_less(passes, law)))
     grade[passing[turned]] = SENSITIVE
     if DECISIVE in laws:
         studied = are_studied(passes, limits)
@@ -288,6 +300,7 @@ def with_second_opinions(
 
 
 def is_studied(sweep: Sweep) -> bool:
-    """Return whether a sweep has the study's model: the paper's law, its plain soil, and what second opinions know."""
+    """Return whether a sweep has the study's model: the paper's law, its plain soil, and boxes of known rock."""
     model = sweep.model
-    return model.resistance == RESISTANCES[0] and model.ground.is_usual and can_be_asked(sweep)
+    boxes = model.shape.is_box and not any(case.is_taped for case in (sweep, *sweep.cases))
+    return boxes and model.resistance == RESISTANCES[0] and model.ground.is_usual and can_be_asked(sweep)

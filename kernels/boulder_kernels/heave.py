@@ -14,8 +14,8 @@ are averaged exactly, strips of the foot that are narrower at its ends, and Gaus
 added up in one order, so that every processor gives the same bits. Every force is either the slope of one potential or
 takes energy out of the motion.
 
-In uniform soil all parts have the same stiffness, yield displacement and drag. In other soil each has its own
-(`lay_soil`); the type of the constants of the planar motion says which (`part_of_soil`).
+Beside a box in uniform soil all parts have the same faces, stiffness, yield displacement and drag. Elsewhere each has
+its own (`lay_soil`); the type of the constants of the planar motion says which (`part_of_soil`).
 """
 
 from __future__ import annotations
@@ -26,20 +26,27 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import inlined, kernel, overload
+from ._jit import by_types, inlined, is_none, kernel, type_of
+from .design import FAR as REACH_FAR
+from .design import NEAR as REACH_NEAR
 from .design import (
+    WIDTH,
+    Body,
     Constants,
     Design,
     G,
     SoilMass,
-    boulder_mass,
+    at_height,
+    body_of_box,
     passive_pressure_coefficient,
+    piece_at,
+    slope_of,
     soil_mass,
 )
-from .dynamics import contact_displacement, contact_lever, spring_compression, type_of
+from .dynamics import contact_displacement, contact_lever, spring_compression
 from .ground import WATER
 from .numerics import field, put, sine_versine
-from .pieces import DENSITY, FRICTION, TO, ManyPieces, SoilConstants, combined, powers_of
+from .pieces import DENSITY, FRICTION, TO, ManyPieces, SoilConstants, combined, powers_of, times
 from .soil import TINY, Kinematics, soil_kinematics
 
 GROUP, FINEST = 16, 4
@@ -51,14 +58,18 @@ SETS, FOOT, STRIP, SIDE_A, SIDE_DEPTH, SIDE, ALONG_X, TURNING, LIFTING, FAR, NEA
 """Offsets in the workspace: sets of the strips, where they lie along the foot, and their shares of it; points of the
 sides, and their friction per depth; what all pieces have of five sums."""
 RATIO, HEIGHT, INVERSE_HEIGHT, STIFFNESS, YIELD, DRAG, ROUGHNESS = (ROW * n for n in range(11, 18))
-"""Offsets of what only the parts of a soil that is not uniform keep there: see `lay_soil`."""
-ROOM = 18 * ROW
+FACES, TURNING_FAR, TURNING_NEAR = ROW * 18, ROW * 22, ROW * 23
+"""Offsets of what only the parts of a soil that is not uniform, or beside no box, keep there, see `lay_soil`; of these
+the fields of `Faces` have a row each."""
+ROOM = 24 * ROW
 """Numbers in the workspace."""
 RISE, FALL = 0.45, 0.25
 """How far a face rises and falls at most while it presses on the soil, over the length of the boulder: 0.41 and 0.22 of
 600 boulders that turn by up to 20 degrees."""
 SIDE_POINTS = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262)
 """Gauss's four points of a length 1: the sides are four points by four."""
+ROUNDING = 1e-9
+"""Slope of a side that widens upwards by rounding alone."""
 SIDE_WEIGHTS = (0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692)
 """Weights of Gauss's four points."""
 
@@ -76,6 +87,8 @@ class Base(NamedTuple):
     """Depth of the water table [m], below which soil presses on foot and sides by its weight under water."""
     slope: float = 0.0
     """Angle at which the ground falls away behind the boulder [rad]."""
+    varies: bool = True
+    """Whether soil that a face meets at another depth may be weaker or softer for that depth."""
 
 
 class HeaveOptions(NamedTuple):
@@ -92,7 +105,8 @@ class HeaveConstants(NamedTuple):
 
     c: Any
     """Constants of the planar motion, with corrected readings and the soil in closed form: `Constants` in uniform soil
-    beside a box, `SoilConstants` where the workspace holds the parts of the soil."""
+    beside a box, `SoilConstants` where the workspace holds the parts of the soil, with a ``soil`` that is not None
+    where it holds the faces beside them, too."""
     heave: float
     """1 where the boulder may rise, else 0."""
     m_b: float
@@ -110,7 +124,15 @@ class HeaveConstants(NamedTuple):
     M_second: float
     """Sum of m_n d_n^2 [kg m^2]."""
     L: float
-    """Length of the boulder [m]."""
+    """Length of the boulder, where it is longest [m]."""
+    steepest: float
+    """Horizontal over vertical of the face that is inclined most; 0 of a box [-]."""
+    foot: float
+    """Length of its foot [m]."""
+    foot_a: float
+    """Near end of its foot right of the common centre of mass [m]."""
+    lean: float
+    """Distance of the boulder's centre from the middle of the foot, towards the vehicle [m]."""
     pieces: int
     """Parts of the soil, strips of the foot, and points of the sides: 16, 64, 144 or 256."""
     k_foot: float
@@ -127,6 +149,8 @@ class HeaveConstants(NamedTuple):
     """Friction of both sides per mean depth of their points [N/m]."""
     v_s: float
     """Speed of slip at which friction has 0.71 of its full value [m/s]."""
+    sunk: float
+    """How far a far face that narrows upwards counts as sunk where the least energy is looked for; 0 in motion [m]."""
 
 
 class Forces(NamedTuple):
@@ -196,28 +220,61 @@ def heave_constants(design: Design, c: Constants, form: HeaveOptions, base: Base
     friction = friction_of(design.phi, form)
     side = 2.0 * friction * (1.0 - math.sin(design.phi)) * density * G * design.L * design.d
     bed = Bed(soil_mass(design, 0), design.rho_s, design.phi, density * G * design.d, side)
-    return constants_on(bed, design, c, form, base, fineness)
+    reach = Reach(design.L, 0.0, design.W)
+    return constants_on(bed, body_of_box(design), reach, c, form, base, fineness)
+
+
+class Reach(NamedTuple):
+    """What of an outline holds for the boulder as a whole."""
+
+    L: float
+    """Length where it is longest [m]."""
+    steepest: float
+    """Horizontal over vertical of the face that is inclined most; 0 of a box [-]."""
+    foot_width: float
+    """Width of its foot [m]."""
+
+
+@inlined
+def reach_of(design: Design, outline: np.ndarray) -> Reach:
+    """Return the reach of a boulder with an outline, shape (P, 4), or of the box of the design."""
+    if len(outline) == 0:
+        return Reach(design.L, 0.0, design.W)
+    near = far = steepest = 0.0
+    for i in range(len(outline)):
+        near, far = max(near, outline[i, REACH_NEAR]), max(far, outline[i, REACH_FAR])
+        if i > 0:
+            steepest = max(
+                steepest, max(slope_of(outline, i - 1, REACH_NEAR), abs(slope_of(outline, i - 1, REACH_FAR)))
+            )
+    return Reach(near + far, steepest, outline[0, WIDTH])
 
 
 @kernel
-def constants_on(bed: Bed, design: Design, c: Any, form: HeaveOptions, base: Base, fineness: int) -> HeaveConstants:
-    """Constants of the motion with heave and friction (Eqs 131-134) on a bed; see `heave_constants`."""
-    m_b = boulder_mass(design)
+def constants_on(
+    bed: Bed, body: Body, reach: Reach, c: Any, form: HeaveOptions, base: Base, fineness: int
+) -> HeaveConstants:
+    """Constants of the motion of a body with heave and friction (Eqs 131-134) on a bed; see `heave_constants`."""
+    m_b = body.m_b
     soil = bed.mass
-    a_b, b_b = 0.5 * design.L - c.c_x, 0.5 * design.H - c.c_y
-    J_box = m_b / 12.0 * (design.H * design.H + design.L * design.L)
-    foot = design.W * design.L
+    a_b, b_b = body.x - c.c_x, body.y - c.c_y
+    length = 2.0 * body.foot
+    foot = reach.foot_width * length
     return HeaveConstants(
         c,
         1.0 if form.heave else 0.0,
         m_b,
         a_b,
         b_b,
-        J_box + m_b * (a_b * a_b + b_b * b_b),
+        body.J + m_b * (a_b * a_b + b_b * b_b),
         soil.mass,
         c.c_y * soil.mass - soil.first,
         c.c_y * c.c_y * soil.mass - 2.0 * c.c_y * soil.first + soil.second,
-        design.L,
+        reach.L,
+        reach.steepest,
+        length,
+        body.x + body.lean - body.foot - c.c_x,
+        body.lean,
         GROUP * fineness * fineness,
         base.stiffness * foot,
         bed.density * base.wave_speed * foot,
@@ -226,6 +283,7 @@ def constants_on(bed: Bed, design: Design, c: Any, form: HeaveOptions, base: Bas
         friction_of(bed.phi, form),
         bed.side,
         base.slip_speed,
+        0.0,
     )
 
 
@@ -234,12 +292,14 @@ def prepare(work: np.ndarray, f: HeaveConstants) -> None:
     """Fill a workspace, shape (ROOM,), for a design at rest."""
     c = f.c
     fineness = round(math.sqrt(f.pieces // GROUP))
-    edge = 0.0
+    edge, tilt = 0.0, 12.0 * f.s_0 * f.lean / f.foot
     for n in range(f.pieces):
-        # Strips between the feet of evenly spread points of a half circle.
+        # Strips between the feet of evenly spread points of a half circle. They carry the boulder at rest, below its
+        # centre more than elsewhere.
         next_edge = 0.5 * sine_versine(math.pi * (n + 1.0) / f.pieces).versin
-        put(work, SETS, n, 0.0)
-        put(work, FOOT, n, f.L * 0.5 * (edge + next_edge) - c.c_x)
+        middle = 0.5 * (edge + next_edge)
+        put(work, SETS, n, tilt * (middle - 0.5))
+        put(work, FOOT, n, f.foot * middle + f.foot_a)
         put(work, STRIP, n, next_edge - edge)
         edge = next_edge
         square, point = n // GROUP, n % GROUP
@@ -270,11 +330,11 @@ def layer_under(depth: float, layers: np.ndarray) -> int:
 
 
 @kernel
-def bed_of(design: Design, mass: SoilMass, layers: np.ndarray, form: HeaveOptions, base: Base) -> Bed:
-    """Return what a boulder in layers of soil, shape (M, 6), stands on (Eq 148)."""
+def bed_of(design: Design, length: float, mass: SoilMass, layers: np.ndarray, form: HeaveOptions, base: Base) -> Bed:
+    """Return what a boulder of a length in layers of soil, shape (M, 6), stands on (Eq 148)."""
     under = layer_under(design.d, layers)
     phi, stress = layers[under, FRICTION], vertical_stress(design.d, layers, base.water)
-    side = 2.0 * friction_of(phi, form) * design.L * design.d
+    side = 2.0 * friction_of(phi, form) * length * design.d
     return Bed(mass, layers[under, DENSITY], phi, stress, side)
 
 
@@ -291,21 +351,57 @@ def edge_of(n: int, count: int, parts: np.ndarray) -> float:
     return n / count
 
 
+class Faces(NamedTuple):
+    """Where the faces of a boulder press on a part of the soil."""
+
+    far: float
+    near: float
+    """Far and near face right of the common centre of mass [m]."""
+    far_slope: float
+    near_slope: float
+    """What these grow by per height, but 0 where the near face narrows upwards [-] (Eq 150)."""
+
+
+@inlined
+def faces_of_box(f: HeaveConstants) -> Faces:
+    """Return the faces of a box."""
+    return Faces(f.c.l_n, f.c.l_n - f.L, 0.0, 0.0)
+
+
+@inlined
+def faces_between(low: float, high: float, outline: np.ndarray, f: HeaveConstants) -> Faces:
+    """Return the faces of a boulder with an outline, shape (P, 4), between two heights over its foot [m]."""
+    if len(outline) == 0:
+        return faces_of_box(f)
+    middle, inverse = f.foot_a + outline[0, REACH_NEAR], 1.0 / (high - low)
+    far, far_to = at_height(outline, REACH_FAR, low), at_height(outline, REACH_FAR, high)
+    near, near_to = at_height(outline, REACH_NEAR, low), at_height(outline, REACH_NEAR, high)
+    return Faces(
+        middle + 0.5 * (far + far_to),
+        middle - 0.5 * (near + near_to),
+        (far_to - far) * inverse,
+        min(near - near_to, 0.0) * inverse,
+    )
+
+
 @kernel
-def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces, f: HeaveConstants) -> None:
-    """Write the parts of a soil beside a box into a workspace that `prepare` has filled (Eq 149).
+def lay_soil(
+    work: np.ndarray, layers: np.ndarray, outline: np.ndarray, base: Base, soil: ManyPieces, f: HeaveConstants
+) -> None:
+    """Write the parts of a soil and the faces beside them into a workspace that `prepare` has filled (Eqs 149, 150).
 
     As a face rises or falls, its parts press on the soil of another depth. Strength and stiffness of a part grow in
     proportion to its depth, as in uniform soil, and nowhere exceed the soil from `FALL` below its lower end to `RISE`
     above its upper end: for its depth, it is as weak and as soft as the weakest and the softest there. So coarse parts
-    err on the safe side. Cohesion gives no friction. The boulder's buoyancy and the soil below the foot are left out.
+    err on the safe side. The width is the boulder's beside the part. Sides that widen upwards lose the soil as they
+    rise and do not rub. Cohesion gives no friction. The boulder's buoyancy and the soil below the foot are left out.
 
     Parameters
     ----------
     work
         The workspace.
-    layers
-        Layers of the design, shape (M, 6).
+    layers, outline
+        Layers, shape (M, 6), and outline, shape (P, 4), of the design.
     base
         The ground under the foot, with its water.
     soil
@@ -313,21 +409,22 @@ def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces,
     f
         Constants of the design.
     """
-    d, parts = f.c.d, soil.pieces
+    d, parts, reach = f.c.d, soil.pieces, f.heave if base.varies else 0.0
     foot = math.tan(2.0 / 3.0 * layers[layer_under(d, layers), FRICTION])
     for n in range(f.pieces):
         low, to = edge_of(n, f.pieces, parts), edge_of(n + 1, f.pieces, parts)
         r, inverse = 0.5 * (low + to), 1.0 / (to - low)
-        spring = ultimate = drag = 0.0
+        spring = ultimate = drag = width = 0.0
         for m in range(len(parts)):
             start, end = max(parts[m, 0], low), min(parts[m, 1], to)
             if start < end:
-                i = combined(powers_of(end), -1.0, powers_of(start))
-                spring += parts[m, 2] * i.two
-                ultimate += parts[m, 4] * i.one + parts[m, 5] * i.two
-                drag += parts[m, 6] * i.one
-        soft, weak, half = spring * inverse / r, ultimate * inverse / r, 0.5 * (to - low)
-        top, bottom = r - f.heave * (RISE * f.L / d + half), r + f.heave * (FALL * f.L / d + half)
+                i, w_0, w_1 = combined(powers_of(end), -1.0, powers_of(start)), parts[m, 7], parts[m, 8]
+                spring += parts[m, 2] * (w_0 * i.two + w_1 * i.three)
+                ultimate += parts[m, 4] * (w_0 * i.one + w_1 * i.two) + parts[m, 5] * (w_0 * i.two + w_1 * i.three)
+                drag += parts[m, 6] * (w_0 * i.one + w_1 * i.two)
+                width += w_0 * i.one + w_1 * i.two
+        soft, weak, half = spring / (width * r), ultimate / (width * r), 0.5 * (to - low)
+        top, bottom = r - reach * (RISE * f.L / d + half), r + reach * (FALL * f.L / d + half)
         for m in range(len(parts)):
             K, P_0, P_1 = parts[m, 2], parts[m, 4], parts[m, 5]
             start, end = max(parts[m, 0], top), min(parts[m, 1], bottom)
@@ -336,9 +433,12 @@ def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces,
         put(work, RATIO, n, r)
         put(work, HEIGHT, n, (to - low) * f.pieces)
         put(work, INVERSE_HEIGHT, n, inverse / f.pieces)
-        put(work, STIFFNESS, n, soft * (to - low) / d)
+        put(work, STIFFNESS, n, soft * width / d)
         put(work, YIELD, n, weak / soft)
         put(work, DRAG, n, drag)
+        faces = faces_between(d - to * d, d - low * d, outline, f)
+        for side in range(4):
+            put(work, FACES + ROW * side, n, faces[side])
         above = rough = 0.0
         for m in range(len(layers)):
             below = layers[m, TO] / d if m < len(layers) - 1 else 1.0
@@ -350,6 +450,12 @@ def lay_soil(work: np.ndarray, layers: np.ndarray, base: Base, soil: ManyPieces,
         phi = layers[layer_under(depth, layers), FRICTION]
         pressure = (1.0 - math.sin(phi)) * vertical_stress(depth, layers, base.water) / depth
         put(work, SIDE, n, field(work, SIDE, n) * pressure * math.tan(2.0 / 3.0 * phi) / foot)
+        if len(outline) > 0:
+            near, far = at_height(outline, REACH_NEAR, d - depth), at_height(outline, REACH_FAR, d - depth)
+            share, middle = (field(work, SIDE_A, n) + f.c.c_x) / f.L, f.foot_a + outline[0, REACH_NEAR]
+            put(work, SIDE_A, n, middle - near + (near + far) * share)
+            rubs = slope_of(outline, piece_at(outline, min(d - depth, outline[-1, 0])), WIDTH) <= ROUNDING
+            put(work, SIDE, n, field(work, SIDE, n) * (near + far) / f.L if rubs else 0.0)
 
 
 @inlined
@@ -421,29 +527,42 @@ class Part(NamedTuple):
     """What its depth is multiplied by for the share of its drag, see `Parts` [1/m]."""
     roughness: float
     """Coefficient of its friction over the foot's [-]."""
+    faces: Faces
+    """Where the boulder presses on it."""
 
 
-def part_of_soil(n: int, work: np.ndarray, p: Parts, f: HeaveConstants) -> Part:
-    """Return part n of the soil: from the workspace, but in uniform soil beside a box, where all are alike."""
-    return laid_part(n, work, p) if type(f.c) is SoilConstants else uniform_part(n, p, f)
-
-
-@overload(part_of_soil)
-def _part_of_soil(n: Any, work: Any, p: Any, f: Any) -> Callable[..., Part]:
+@by_types
+def part_of_soil(n: Any, work: Any, p: Any, f: Any) -> Callable[..., Part]:
+    """Return what gives part n of the soil: from the workspace, but beside a box in uniform soil, all are alike."""
+    if has_outline(f):
+        return lambda n, work, p, f: laid_part(n, work, p, laid_faces(n, work))
     if type_of(f[0]) is SoilConstants:
-        return lambda n, work, p, f: laid_part(n, work, p)
+        return lambda n, work, p, f: laid_part(n, work, p, faces_of_box(f))
     return lambda n, work, p, f: uniform_part(n, p, f)
+
+
+def has_outline(f: Any) -> bool:
+    """Return whether faces lie in the workspace, by the type of the constants."""
+    return type_of(f[0]) is SoilConstants and not is_none(f[0][-1])
 
 
 @inlined
 def uniform_part(n: int, p: Parts, f: HeaveConstants) -> Part:
     """Return part n of a uniform soil."""
     ratio = (n + 0.5) * p.share
-    return Part(ratio, p.w, p.inverse_w, p.slope_w, p.stiffness, f.c.x_yield, p.drag, p.inverse_cover, 1.0)
+    faces = faces_of_box(f)
+    return Part(ratio, p.w, p.inverse_w, p.slope_w, p.stiffness, f.c.x_yield, p.drag, p.inverse_cover, 1.0, faces)
 
 
 @inlined
-def laid_part(n: int, work: np.ndarray, p: Parts) -> Part:
+def laid_faces(n: int, work: np.ndarray) -> Faces:
+    """Return the faces beside part n of the soil that `lay_soil` has written."""
+    a = FACES + ROW
+    return Faces(field(work, FACES, n), field(work, a, n), field(work, a + ROW, n), field(work, a + 2 * ROW, n))
+
+
+@inlined
+def laid_part(n: int, work: np.ndarray, p: Parts, faces: Faces) -> Part:
     """Return part n of the soil that `lay_soil` has written."""
     height, inverse = field(work, HEIGHT, n), field(work, INVERSE_HEIGHT, n)
     return Part(
@@ -456,6 +575,7 @@ def laid_part(n: int, work: np.ndarray, p: Parts) -> Part:
         field(work, DRAG, n),
         p.inverse_cover * inverse,
         field(work, ROUGHNESS, n),
+        faces,
     )
 
 
@@ -533,30 +653,84 @@ class Element(NamedTuple):
     """Energy in its springs [J]."""
     roughness: float
     """Coefficient of its friction over the foot's [-]."""
+    faces: Faces
+    """Where the boulder presses on it."""
     stiffness: float
     """What the force of its springs grows by, per displacement [N/m]."""
 
 
 @inlined
 def soil_element(
-    n: int, y_b: float, sin: float, versin: float, k: Kinematics, p: Parts, work: np.ndarray, f: HeaveConstants
+    n: int,
+    y_b: float,
+    w_b: float,
+    omega_b: float,
+    sin: float,
+    versin: float,
+    k: Kinematics,
+    p: Parts,
+    work: np.ndarray,
+    f: HeaveConstants,
 ) -> Element:
-    """Forces and energy of part n of the soil: its depth follows the rise of the faces that press on it (Eq 132)."""
+    """Forces and energy of part n of the soil (Eqs 132, 150).
+
+    Its depth follows the rise of the faces that press on it. A face that widens upwards leaves the soil as it rises,
+    and what it is pressed in with lifts it. A far face that narrows upwards leaves it as it sinks, and is held down.
+    """
     c, part = f.c, part_of_soil(n, work, p, f)
-    ratio = part.ratio
+    ratio, a = part.ratio, part.faces
     u, v = k.A - k.slope_x * ratio, k.B - k.slope_v * ratio
-    alpha = c.d * ratio
-    d_n, l_near = alpha - c.z_0, c.l_n - f.L
-    drag = -part.drag * v * abs(v)
+    alpha, cos = c.d * ratio, 1.0 - versin
+    d_n = alpha - c.z_0
     z = alpha - f.heave * (y_b + d_n * versin)
-    far = pressed(u, drag, z + f.heave * c.l_n * sin, part, f)
-    near = pressed(-u, drag, z + f.heave * l_near * sin, part, f)
+    z_far, z_near = z + f.heave * a.far * sin, z + f.heave * a.near * sin
+    rising = f.heave * (w_b + omega_b * d_n * sin)
+    sunk = (a.far_slope < 0.0) & (f.sunk > 0.0)
+    far_rise, far_slope = -f.sunk if sunk else alpha - z_far, 0.0 if sunk else a.far_slope
+    v_far = v - times(a.far_slope, rising - f.heave * omega_b * a.far * cos)
+    v_near = v - times(a.near_slope, rising - f.heave * omega_b * a.near * cos)
+    far = pressed(u - times(a.far_slope, far_rise), -part.drag * v_far * abs(v_far), z_far, part, f)
+    near = pressed(times(a.near_slope, alpha - z_near) - u, -part.drag * v_near * abs(v_near), z_near, part, f)
     F_far, F_near = far.drag - far.spring, near.drag + near.spring
-    lift = far.lift + near.lift
-    turning = lift * d_n * sin - (far.lift * c.l_n + near.lift * l_near) * (1.0 - versin)
+    lift_far = far.lift - times(f.heave * far_slope, F_far)
+    lift_near = near.lift - times(f.heave * a.near_slope, F_near)
+    lift = lift_far + lift_near
+    turning = lift * d_n * sin - (lift_far * a.far + lift_near * a.near) * cos
     turning -= (F_far + F_near) * (k.lever_d * ratio + k.q) + (far.widening + near.widening) * part.slope_w
     spring, energy, stiffness = near.spring - far.spring, far.energy + near.energy, far.stiffness + near.stiffness
-    return Element(spring, F_far, F_near, turning, lift, energy, part.roughness, stiffness)
+    return Element(spring, F_far, F_near, turning, lift, energy, part.roughness, a, stiffness)
+
+
+class Levers(NamedTuple):
+    """Where the friction of the faces acts, right of the common centre of mass."""
+
+    far: float
+    near: float
+
+
+@by_types
+def put_levers(n: Any, a: Any, far: Any, near: Any, work: Any, f: Any) -> Callable[..., None]:
+    """Return what notes what presses on the faces of a part times their levers, where these differ."""
+    if has_outline(f):
+        return lambda n, a, far, near, work, f: put_turnings(n, a, far, near, work)
+    return lambda n, a, far, near, work, f: None
+
+
+@inlined
+def put_turnings(n: int, a: Faces, far: float, near: float, work: np.ndarray) -> None:
+    """Write what presses on the faces of part n of the soil times their levers."""
+    put(work, TURNING_FAR, n, far * a.far)
+    put(work, TURNING_NEAR, n, near * a.near)
+
+
+@by_types
+def levers_of(far: Any, near: Any, work: Any, f: Any) -> Callable[..., Levers]:
+    """Return what gives the levers of the faces by what presses on them as a whole."""
+    if has_outline(f):
+        return lambda far, near, work, f: Levers(
+            summed(work, TURNING_FAR, f.pieces) / max(far, TINY), summed(work, TURNING_NEAR, f.pieces) / max(near, TINY)
+        )
+    return lambda far, near, work, f: Levers(f.c.l_n, f.c.l_n - f.L)
 
 
 class Strip(NamedTuple):
@@ -632,7 +806,7 @@ def forces(
     k = soil_kinematics(x_b, v_b, omega_b, sin, versin, c)
     p = parts_of_soil(sin, k, f)
     for n in range(f.pieces):
-        e = soil_element(n, y_b, sin, versin, k, p, work, f)
+        e = soil_element(n, y_b, w_b, omega_b, sin, versin, k, p, work, f)
         a, depth = field(work, SIDE_A, n), field(work, SIDE_DEPTH, n)
         b = c.z_0 - depth
         X, Y = a * cos + b * sin, b * cos - a * sin
@@ -649,23 +823,27 @@ def forces(
         put(work, ALONG_X, n, e.far + e.near + share * v_x + rub)
         put(work, TURNING, n, e.turning + share * (v_x * Y - v_y * X) + rub * s.Y - push * s.X)
         put(work, LIFTING, n, e.lift + share * v_y + push)
-        put(work, FAR, n, e.roughness * (max(-e.far, 0.0) + max(-e.near, 0.0)))
-        put(work, NEAR, n, e.roughness * (max(e.far, 0.0) + max(e.near, 0.0)))
+        on_far = e.roughness * (max(-e.far, 0.0) + max(-e.near, 0.0))
+        on_near = e.roughness * (max(e.far, 0.0) + max(e.near, 0.0))
+        put(work, FAR, n, on_far)
+        put(work, NEAR, n, on_near)
+        put_levers(n, e.faces, on_far, on_near, work, f)
     far, near = summed(work, FAR, f.pieces), summed(work, NEAR, f.pieces)
-    # The faces slip along themselves, each with one speed all over.
-    along = v_b * sin + w_b * cos
-    F_far = -f.friction * far * slipping(along - omega_b * c.l_n, f)
-    F_near = -f.friction * near * slipping(along + omega_b * (f.L - c.l_n), f)
+    # The faces slip along themselves, each with one speed all over, that of where it is pressed on.
+    along, at = v_b * sin + w_b * cos, levers_of(far, near, work, f)
+    F_far = -f.friction * far * slipping(along - omega_b * at.far, f)
+    F_near = -f.friction * near * slipping(along - omega_b * at.near, f)
     Q_x = summed(work, ALONG_X, f.pieces) + (F_far + F_near) * sin
     Q_y = summed(work, LIFTING, f.pieces) + (F_far + F_near) * cos
-    Q_theta = summed(work, TURNING, f.pieces) + F_near * (f.L - c.l_n) - F_far * c.l_n
+    Q_theta = summed(work, TURNING, f.pieces) - F_near * at.near - F_far * at.far
     weight = f.m_b * G
     if f.heave > 0.0:
         Q_theta += weight * (f.a_b * cos + f.b_b * sin)
         Q_y -= weight
     else:
         # The whole weight, on the corner that the boulder turns about (Eq 135).
-        a = f.a_b + 0.5 * f.L * min(max(sin / seated_sine(f), -1.0), 1.0)
+        on_end = min(max(sin / seated_sine(f), -1.0), 1.0)
+        a = f.a_b + 0.5 * f.foot * on_end + f.lean * abs(on_end)
         X, Y = a * cos - c.c_y * sin, -a * sin - c.c_y * cos
         rub = -f.friction * weight * slipping(v_b + omega_b * Y, f)
         Q_x += rub
@@ -679,7 +857,7 @@ def forces(
 @inlined
 def seated_sine(f: HeaveConstants) -> float:
     """Sine of the rotation at which the weight is on the end of the foot, when the boulder may not rise (Eq 135)."""
-    return 6.0 * f.s_0 / f.L
+    return 6.0 * f.s_0 / f.foot
 
 
 class Inertia(NamedTuple):

@@ -19,9 +19,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ._jit import by_types, inlined, is_none, kernel
-from .design import Constants, Design, DesignTable, G, body_of_box, constants_of, corrected, design_in, is_computable
+from .design import Constants, Design, DesignTable, G, body_with, constants_of, corrected, design_in, is_computable
 from .dormand_prince import displacement_at, slope_at, time_of_limit, turning_point
-from .dynamics import empty_soil
+from .dynamics import BOX, empty_soil
 from .heave import (
     ALONG_X,
     FAR,
@@ -40,6 +40,7 @@ from .heave import (
     lay_soil,
     parts_of_soil,
     prepare,
+    reach_of,
     seated_sine,
     soil_element,
     strip_depth,
@@ -178,7 +179,7 @@ def potential_energy(x_b: float, theta_b: float, y_b: float, work: np.ndarray, f
     k = soil_kinematics(x_b, 0.0, 0.0, sin, versin, f.c)
     p = parts_of_soil(sin, k, f)
     for n in range(f.pieces):
-        e = soil_element(n, y_b, sin, versin, k, p, work, f)
+        e = soil_element(n, y_b, 0.0, 0.0, sin, versin, k, p, work, f)
         depth = max(strip_depth(work, n, y_b, sin, versin, f), 0.0)
         elastic = min(f.k_foot * depth, f.q_foot)
         share = f.heave * field(work, STRIP, n)
@@ -194,8 +195,8 @@ def potential_energy(x_b: float, theta_b: float, y_b: float, work: np.ndarray, f
         V += weight * (y_b - f.a_b * sin - f.b_b * versin)
     else:
         seated = seated_sine(f)
-        over = max(abs(sin) - seated, 0.0)
-        V += weight * (0.5 * f.L * ((abs(sin) - over) ** 2 / (2.0 * seated) + over) - (f.b_b + f.c.c_y) * versin)
+        over, end = max(abs(sin) - seated, 0.0), 0.5 * f.foot + math.copysign(f.lean, sin)
+        V += weight * (end * ((abs(sin) - over) ** 2 / (2.0 * seated) + over) - (f.b_b + f.c.c_y) * versin)
     return Potential(V, Q_x, Q_y - f.heave * weight, K_x, K_y)
 
 
@@ -220,20 +221,25 @@ def least_energy(theta: float, work: np.ndarray, f: HeaveConstants) -> float:
     Notes
     -----
     Along x_b alone, and along y_b alone, the energy is convex: its least is where its slope is zero, in either in turn.
-    Along x_b it is between the positions where the uppermost and the lowest soil are as they were; along y_b between
-    those where all strips carry what they can, which is more than the weight, and where the boulder is out of the soil.
-    There may be several, of large rotations: the search starts from both ends along x_b.
+    (As a face that widens upwards rises, depth and pressure of the soil both fall, and so their product is convex. As
+    one that narrows rises, the pressure grows: it counts as sunk by as much as it can be, which is no more than the
+    energy.) Along x_b the least is between the positions where the uppermost and the lowest soil are as they were, and
+    further by what an inclined face moves the soil; along y_b between those where all strips carry what they can, which
+    is more than the weight, and where the boulder is out of the soil. There may be several, of large rotations: the
+    search starts from both ends along x_b.
     """
     sin, versin = sine_versine(theta)
     upper = f.c.l_n * versin - f.c.z_0 * sin
     left, right = min(upper, upper + f.c.d * sin), max(upper, upper + f.c.d * sin)
+    inclined, most = f.steepest * (f.L + f.c.d), f.q_foot / f.k_foot
+    ends = left - inclined, right + inclined
     bottom, touch, top = 0.0, -np.inf, f.L + 3.0 * f.c.d + f.s_0
-    most = f.q_foot / f.k_foot
+    f = HeaveConstants(*f[:-1], f.L * abs(sin) + most)
     for n in range(f.pieces):
         depth = strip_depth(work, n, 0.0, sin, versin, f)
         bottom, touch = min(bottom, depth - most), max(touch, depth)
     # Begin where the end of the foot, pressed in along a wedge, carries the weight.
-    y = touch - min(most, math.sqrt(2.0 * f.m_b * G * f.L * abs(sin) / f.k_foot))
+    y = touch - min(most, math.sqrt(2.0 * f.m_b * G * f.foot * abs(sin) / f.k_foot))
     least = np.inf
     for x in (left, right):
         position = Equilibrium(x, f.heave * y, np.inf)
@@ -241,7 +247,7 @@ def least_energy(theta: float, work: np.ndarray, f: HeaveConstants) -> float:
             precision = PLACED if turn == TURNS - 1 else ROUGHLY
             if f.heave > 0.0:
                 position = move_to_least_energy(position, False, bottom, top, precision, theta, work, f)
-            position = move_to_least_energy(position, True, left, right, precision, theta, work, f)
+            position = move_to_least_energy(position, True, *ends, precision, theta, work, f)
         y, least = position.y, min(least, position.energy)
     return least
 
@@ -411,18 +417,25 @@ def simulate_heave(
 def prepare_in_layers(
     design: Design,
     layers: np.ndarray,
+    outline: np.ndarray,
+    inclined: float | None,
     soil: ManyPieces,
     form: HeaveOptions,
     base: Base,
     fineness: int,
     work: np.ndarray,
 ) -> HeaveConstants:
-    """Fill the workspace for a box in layers, shape (M, 6), and return its constants; the pieces are filled anew."""
-    lumped = fill_pieces(design, layers, np.empty((0, 4)), soil)
-    c = constants_in_soil(design, READINGS, body_of_box(design), lumped, None)
-    f = constants_on(bed_of(design, lumped.mass, layers, form, base), design, c, form, base, fineness)
+    """Fill the workspace for a design in layers, shape (M, 6), with an outline, shape (P, 4); return its constants.
+
+    The pieces are filled anew. None tells, by its type, that the boulder is a box, whose faces are upright.
+    """
+    lumped, body = fill_pieces(design, layers, outline, soil), body_with(design, outline)
+    reach = reach_of(design, outline)
+    c = constants_in_soil(design, READINGS, body, lumped, inclined)
+    bed = bed_of(design, reach.L, lumped.mass, layers, form, base)
+    f = constants_on(bed, body, reach, c, form, base, fineness)
     prepare(work, f)
-    lay_soil(work, layers, base, soil, f)
+    lay_soil(work, layers, outline, base, soil, f)
     return f
 
 
@@ -438,15 +451,19 @@ def prepare_in_uniform_soil(
 
 @by_types
 def prepare_design(
-    design: Any, row: Any, layers: Any, soil: Any, form: Any, base: Any, fineness: Any, work: Any
+    design: Any, row: Any, layers: Any, outlines: Any, soil: Any, form: Any, base: Any, fineness: Any, work: Any
 ) -> Callable[..., HeaveConstants]:
     """Return what fills the workspace for a design of a table; arguments: see `run_second_opinions`."""
     if is_none(layers):
-        return lambda design, row, layers, soil, form, base, fineness, work: prepare_in_uniform_soil(
+        return lambda design, row, layers, outlines, soil, form, base, fineness, work: prepare_in_uniform_soil(
             design, form, base, fineness, work
         )
-    return lambda design, row, layers, soil, form, base, fineness, work: prepare_in_layers(
-        design, layers[row], soil, form, base, fineness, work
+    if is_none(outlines):
+        return lambda design, row, layers, outlines, soil, form, base, fineness, work: prepare_in_layers(
+            design, layers[row], np.empty((0, 4)), None, soil, form, base, fineness, work
+        )
+    return lambda design, row, layers, outlines, soil, form, base, fineness, work: prepare_in_layers(
+        design, layers[row], outlines[row], 1.0, soil, form, base, fineness, work
     )
 
 
@@ -454,6 +471,7 @@ def prepare_design(
 def run_second_opinions(
     designs: np.ndarray,
     layers: np.ndarray | None,
+    outlines: np.ndarray | None,
     soil: ManyPieces | None,
     form: HeaveOptions,
     base: Base,
@@ -464,12 +482,13 @@ def run_second_opinions(
 ) -> None:
     """Simulate designs one by one; see `second_opinions`.
 
-    Layers, shape (n, M, 6), and the pieces that every design fills anew are None in uniform soils.
+    Layers, shape (n, M, 6), and the pieces that every design fills anew are None of boxes in uniform soils; outlines,
+    shape (n, P, 4), of all boxes.
     """
     for row in range(designs.shape[1]):
         design = design_in(designs, row)
         outcome = HeaveOutcome(Status.INVALID.value, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, 0.0)
-        f = prepare_design(design, row, layers, soil, form, base, control.fineness, work)
+        f = prepare_design(design, row, layers, outlines, soil, form, base, control.fineness, work)
         # A boulder that the base cannot carry is not at rest at first, and no depth of it is the least energy.
         if is_computable(f.c) and (not form.heave or f.k_foot * f.s_0 < f.q_foot):
             outcome = simulate_heave(f, design.m_v, control, work, record)
@@ -490,7 +509,7 @@ def second_opinions(
     Parameters
     ----------
     table
-        `boulder_kernels.DesignTable` of n designs that the truck hits, or a `PiecewiseTable` of boxes.
+        `boulder_kernels.DesignTable` of n designs that the truck hits, or a `PiecewiseTable`.
     control
         Limit, horizon and tolerance.
     form
@@ -508,9 +527,11 @@ def second_opinions(
     if not 1 <= control.fineness <= FINEST:
         raise ValueError(f"the fineness is 1 to {FINEST}, not {control.fineness}")
     layers: np.ndarray | None = getattr(table, "layers", None)
-    soil = None if layers is None else empty_soil(layers.shape[1], 0, 0)
+    outlines: np.ndarray = getattr(table, "outlines", BOX[None])
+    points = outlines.shape[1]
+    soil = None if layers is None else empty_soil(layers.shape[1], points, 0)
     designs = np.stack(table[: len(DesignTable._fields)])
     out = np.full((len(HeaveOutcome._fields), designs.shape[1]), np.nan)
     work, kept = np.empty(WORKSPACE), record or no_heave_record()
-    run_second_opinions(designs, layers, soil, form, base, control, work, kept, out)
+    run_second_opinions(designs, layers, outlines if points else None, soil, form, base, control, work, kept, out)
     return HeaveOutcome(out[0].astype(np.int8), *out[1:])

@@ -372,7 +372,7 @@ def test_robust_costs_depth_and_answers_are_graded_without_asking() -> None:
 def test_what_second_opinions_do_not_know_is_refused_in_words() -> None:
     assumed = site()
     assumed = replace(assumed, model=replace(assumed.model, rock_assumed=True))
-    with pytest.raises(QuestionError, match="second opinions know boxes"):
+    with pytest.raises(QuestionError, match="second opinions know rock"):
         bare_need(assumed, robust=True)
     assert set(bare_need(assumed).arrow["robustness"].to_pylist()) <= {"open", None}
 

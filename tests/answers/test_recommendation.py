@@ -177,12 +177,13 @@ def test_a_depth_is_shown_no_less_than_what_passes(depth: float, shown: str) -> 
 
 
 def test_what_second_opinions_do_not_know_is_asked_by_the_margin_alone() -> None:
-    found = need(CONFIGS / "quarry_stone.yaml")
+    printed = load(CONFIGS / "quarry_stone.yaml", ["model.readings={preset: corrected, inertia: printed}"])
+    found = need(printed)
     assert (found.robust, found.least_margin, design_of(found).grade) == (False, 0.25, "open")
-    assert said(found).startswith("Not graded: second opinions know boxes of rock of given density and corrected")
+    assert said(found).startswith("Not graded: second opinions know rock of given density and corrected")
     assert "By the margin alone, bury the boulder (23.0 t)" in said(found)
-    with pytest.raises(QuestionError, match="second opinions know boxes"):
-        need(CONFIGS / "quarry_stone.yaml", robust=True)
+    with pytest.raises(QuestionError, match="second opinions know rock"):
+        need(printed, robust=True)
 
 
 def test_where_none_qualifies_the_nearest_has_what_is_said_of_it() -> None:

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-EQUATIONS = (*range(1, 56), 101, 102, *range(105, 109), *range(131, 138), *range(141, 150))
+EQUATIONS = (*range(1, 56), 101, 102, *range(105, 109), *range(131, 138), *range(141, 151))
 """Equations of the paper, and equations added to it."""
 WAYS = ("implemented", "derived", "explained")
 SWITCHES = ("inertia", "impact_arm", "contact", "restoring", "separation")

@@ -11,6 +11,7 @@ import pytest
 
 import boulder_sweep
 from boulder_kernels import Control, corrected, simulate_table
+from boulder_sweep.columns import SHAPES
 from boulder_sweep.designs import block_of
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.impact.recomputing import recompute
@@ -18,6 +19,8 @@ from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.accuracy import DESIGNS_A_PIECE, accuracy_of, control_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.inputs import designs_of
+from boulder_sweep.judge.judged import PASS
+from boulder_sweep.judge.robustness import DECISIVE, ROBUST, SENSITIVE, stands
 from boulder_sweep.settings import Sweep, load, load_text
 from boulder_sweep.settings.loader import SECOND_OPINION
 from boulder_sweep.settings.model import Ground, tapered
@@ -196,7 +199,7 @@ def test_a_row_is_what_one_impact_gives(tmp_path, entry, more):
     assert row.verdict == one["verdict"] == "pass"
     assert row.solidity == pytest.approx(sweep.model.shape.filled)
     assert row.max_rotation_deg == pytest.approx(one["max_rotation_deg"], abs=row.rotation_error_deg + 1e-9)
-    assert row.robustness == "open"
+    assert row.robustness in ("robust", "sensitive")
     assert recompute(tmp_path / "table", 0).unequal == ()
 
 
@@ -258,8 +261,26 @@ def test_answers_take_profiles_and_give_their_mass(tmp_path):
     assert answer.boulder_mass_kg == pytest.approx(2596 * 1.65 * 1.68 * 3.44 * tapered(0.8).filled)
     box = bare_need(load(RWG)).frame.iloc[0]
     assert answer.least_embedment_depth_m > box.least_embedment_depth_m
-    with pytest.raises(QuestionError, match="second opinions know boxes"):
-        bare_need(sweep, robust=True)
+    assert bare_need(sweep, robust=True).frame.iloc[0].least_embedment_depth_m > answer.least_embedment_depth_m
+
+
+def test_a_taped_boulder_is_robust_if_all_of_its_shapes_stand():
+    """Simulated one by one: the last that passes does not make up for the first."""
+    masses = [round(share * 2600 * BOX) for share in np.linspace(0.6, 0.94, 12)]
+    sweep = sweep_of(f"mass: {masses} kg, density: 2600 kg/m^3")
+    evaluation = evaluation_of(sweep, accuracy_of(sweep)).asked()
+    judged = evaluation(sweep.block(0, len(masses)))
+    passing = np.flatnonzero(judged.verdict == PASS)
+    designs = designs_of(sweep.block(0, len(masses)), model=sweep.model).rows(passing)
+    assert designs.taped.all()
+    model, limits = sweep.model, evaluation.limits
+    each = [stands(designs.in_shape(shape, model), DECISIVE, model, limits, 10.0) for shape in range(len(SHAPES))]
+    assert np.array_equal(stands(designs, DECISIVE, model, limits, 10.0), np.logical_and.reduce(each))
+    expected = np.where(np.logical_and.reduce(each), ROBUST, SENSITIVE)
+    assert np.array_equal(judged["robustness"][passing], expected)
+    assert set(expected) == {ROBUST, SENSITIVE}
+    assert not np.array_equal(each[0], each[2])
+    assert np.array_equal(evaluation.stand(sweep.block(0, len(masses)))[passing], expected == ROBUST)
 
 
 KNOWN = Path(__file__).parent / "known"

@@ -202,9 +202,9 @@ def test_other_outcomes_do_not_change() -> None:
             assert np.array_equal(values, asked[name], equal_nan=values.dtype.kind == "f"), name
 
 
-@pytest.mark.parametrize("override", ["model.readings=as_printed", "boulder.taper=0.8"])
-def test_where_second_opinions_know_nothing_a_pass_is_open(override: str) -> None:
-    sweep = load("configs/rwg.yaml", ["model.second_opinion=[broms, width_capped]", override])
+def test_where_second_opinions_know_nothing_a_pass_is_open() -> None:
+    how = ["model.second_opinion=[broms, width_capped]", "model.readings=as_printed"]
+    sweep = load("configs/rwg.yaml", how)
     assert not robustness.can_be_asked(sweep)
     evaluation = evaluation_of(sweep, accuracy_of(sweep))
     assert evaluation.second_opinion == ()
@@ -212,9 +212,17 @@ def test_where_second_opinions_know_nothing_a_pass_is_open(override: str) -> Non
 
 
 @pytest.mark.parametrize(
-    "override", ["soil.water_table=1.2 m", "soil.water_table=0 m", "soil.cohesion=2 kPa", "soil.slope=5 deg"]
+    "override",
+    [
+        "soil.water_table=1.2 m",
+        "soil.water_table=0 m",
+        "soil.cohesion=2 kPa",
+        "soil.slope=5 deg",
+        "boulder.taper=0.9",
+        "boulder.taper=1.1",
+    ],
 )
-def test_passes_in_other_soil_have_grades(override: str) -> None:
+def test_passes_in_other_soil_and_of_other_shapes_have_grades(override: str) -> None:
     """As second opinions of the kernels say, with water and slope under the foot, too."""
     sweep = load("configs/m30_sizing.yaml", [override, "boulder.width=1.8 m"])
     _, judged = evaluated(sweep, *SECOND_OPINIONS)
@@ -222,7 +230,7 @@ def test_passes_in_other_soil_have_grades(override: str) -> None:
     passing = np.flatnonzero(judged.verdict == PASS)
     ground = sweep.model.ground
     base = Base(water=ground.water_table_m if ground.water_table_m is not None else math.inf)
-    base = base._replace(slope=math.radians(ground.slope_deg))
+    base = base._replace(slope=math.radians(ground.slope_deg), varies=not ground.is_proportional)
     how = HeaveControl(evaluation.limits.rotation, evaluation.longest_s, 1e-6, 2)
     under = np.zeros(len(passing), dtype=int)
     for bit, law in enumerate(SECOND_OPINIONS):
@@ -239,10 +247,12 @@ def test_passes_in_other_soil_have_grades(override: str) -> None:
     assert np.array_equal(standing(decided)[passing], stand)
 
 
-def test_another_law_of_the_file_keeps_its_second_opinions() -> None:
+@pytest.mark.parametrize(("law", "taper"), [("broms", 1.0), ("broms", 0.85), ("width_capped", 0.97)])
+def test_another_law_of_the_file_keeps_its_second_opinions(law: str, taper: float) -> None:
     """The soil model asked for gives the factor on the resistance, whatever the file says."""
     sweep = grid()
-    weaker = replace(sweep, model=replace(sweep.model, resistance="broms"))
+    sweep = replace(sweep, model=replace(sweep.model, taper=taper))
+    weaker = replace(sweep, model=replace(sweep.model, resistance=law))
     _, ours = evaluated(sweep, *SECOND_OPINIONS)
     _, theirs = evaluated(weaker, *SECOND_OPINIONS)
     both = (ours.verdict == PASS) & (theirs.verdict == PASS)

@@ -91,8 +91,10 @@ def prepared(
 ) -> tuple[HeaveConstants, np.ndarray, bk.Design]:
     """Constants and workspace of the only design of a table."""
     design, work = bk.Design(*(column[0] for column in table[:15])), np.full(WORKSPACE, np.nan)
-    soil = empty_soil(table.layers.shape[1], 0, 0)
-    return prepare_in_layers(design, table.layers[0], soil, form, base, fineness, work), work, design
+    soil = empty_soil(table.layers.shape[1], table.outlines.shape[1], 0)
+    outline = table.outlines[0]
+    inclined = 1.0 if len(outline) else None
+    return prepare_in_layers(design, table.layers[0], outline, inclined, soil, form, base, fineness, work), work, design
 
 
 def some_grounds(count: int, seed: int) -> list[tuple[bk.Design, Ground]]:
