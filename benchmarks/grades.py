@@ -58,7 +58,7 @@ FAR_DEG = 9.0
 """in the planar motion."""
 WATCHED_S = 0.6
 """How long the soil as it lies is simulated [s]."""
-SEED = 55
+SEED, SHAPES_SEED = 55, 77
 NARROWEST, LEANS = 0.55, 0.06
 """Least share of the whole sides that a shape has, and how far a profile leans, as a share of its length."""
 FILLS = (0.45, 0.94)
@@ -143,7 +143,7 @@ def random_profile(rng: np.random.Generator) -> tuple[ProfilePoint, ...]:
             return tuple(points)
 
 
-def shapes(evaluation: Evaluation, count: int, seed: int = SEED) -> Iterator[tuple[Evaluation, Designs]]:
+def shapes(evaluation: Evaluation, count: int, seed: int = SHAPES_SEED) -> Iterator[tuple[Evaluation, Designs]]:
     """Yield how designs of random shapes are judged, every other in the soil of a site, and passes that turn far."""
     rng = np.random.default_rng(seed)
     n = max(count // OF_A_SITE, LEAST_SITES)
