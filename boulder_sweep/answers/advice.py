@@ -14,7 +14,7 @@ from boulder_sweep.answers.recommendation import OF_A_DESIGN, Design, Nearest, R
 from boulder_sweep.answers.trials import USUALLY
 from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.designs import SIDES
-from boulder_sweep.judge.robustness import DECISIVE, MEANINGS, can_be_asked
+from boulder_sweep.judge.robustness import MEANINGS, can_be_asked
 from boulder_sweep.judge.validity import BY_FLAG, UNSTUDIED
 from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT
 from boulder_sweep.settings.units import quantity_text, shown_unit
@@ -172,9 +172,9 @@ class _Words:
         text = quantity_text(unit, self.units, value, digits=digits).replace("^3", "³").replace(" deg", "°")
         return text.replace(" ", NO_BREAK_SPACE)
 
-    def length(self, metres: float, digits: str = ".4g") -> str:
+    def length(self, metres: float) -> str:
         """Return a length with its unit."""
-        return self.quantity("m", metres, digits)
+        return self.quantity("m", metres)
 
     def mass(self, row: Mapping[str, Any]) -> str:
         """Return the mass of the boulder of a row: tonnes, or pounds."""
@@ -183,8 +183,13 @@ class _Words:
         return f"{row[BOULDER_MASS] / 1000:.1f}{NO_BREAK_SPACE}t"
 
     def depth(self, design: Design) -> str:
-        """Return the depth of a design, to 1 mm."""
-        return f"{self.length(design.sizes[DEPTH], '.3f')} deep"
+        """Return the depth of a design."""
+        return self.deep(design.sizes[DEPTH])
+
+    def deep(self, metres: float) -> str:
+        """Return how deep a boulder is buried."""
+        unit, size = shown_unit("m", self.units)
+        return f"{depth_text(metres / size)}{NO_BREAK_SPACE}{unit} deep"
 
     def dug(self, design: Design) -> str:
         """Return what is excavated for a design."""
@@ -253,14 +258,14 @@ class _Words:
         return f"Which of {found.boulders:,} boulders, buried how deep, stops {stops}?"
 
     def truck(self) -> str:
-        """Return the vehicles and their speeds."""
-        given = self.need.sweep.plan.given
-        ends = {}
-        for name in ("vehicle_mass_kg", "impact_speed_m_s"):
-            values, digits = given[name].values, ",.0f" if name == "vehicle_mass_kg" else ".4g"
-            text = quantity_text(BY_NAME[name].unit, self.units, values.min(), values.max(), digits=digits)
-            ends[name] = text.replace(" ", NO_BREAK_SPACE)
-        return f"a truck of {ends['vehicle_mass_kg']} at {ends['impact_speed_m_s']}"
+        """Return the vehicles and their speeds, without what is asked for."""
+        given, words = self.need.sweep.plan.given, "a truck"
+        for name, before, digits in (("vehicle_mass_kg", "of", ",.0f"), ("impact_speed_m_s", "at", ".4g")):
+            if name != self.need.key.name:
+                values = given[name].values
+                text = quantity_text(BY_NAME[name].unit, self.units, values.min(), values.max(), digits=digits)
+                words += f" {before} {text.replace(' ', NO_BREAK_SPACE)}"
+        return words
 
     def terms(self) -> str:
         """Return what is asked for beside passing."""
@@ -285,7 +290,7 @@ class _Words:
             holds = f" with {percent(design.margin)} to spare{self.opinions(design)}"
         begin = "B"
         if not_graded := self.not_graded(design):
-            begin = f"{not_graded} {'B' if self.stands(design) else 'By the margin alone, b'}"
+            begin = f"{not_graded} {'B' if design.stands else 'By the margin alone, b'}"
         return f"{begin}{build}{holds}.{self.why(design)}"
 
     def why(self, design: Design) -> str:
@@ -305,13 +310,9 @@ class _Words:
     def opinions(self, design: Design) -> str:
         """Return what second opinions say of a design."""
         margin = self.need.least_margin
-        if design.grade == "robust" or self.stands(design):
+        if design.stands:
             return f", and with {percent(margin)} {MODELS}" if margin and self.need.robust else f", and stands {MODELS}"
         return ", but a second opinion overturns it (sensitive)" if design.grade == "sensitive" else ""
-
-    def stands(self, design: Design) -> bool:
-        """Whether a design stands under the second opinion that decides, in every case."""
-        return all(DECISIVE in (row["stands_under"] or "").split(";") for row in design.rows)
 
     def not_graded(self, design: Design) -> str:
         """Return why a design has no grade; empty where it has one, or none is asked for."""
@@ -398,7 +399,7 @@ class _Words:
             )
         else:
             why = (row["reason"] or row["verdict"]).replace("_", " ")
-            deep = f"{self.length(row[DEPTH], '.3f')} deep"
+            deep = self.deep(row[DEPTH])
             never = f"passes at no depth{self.here(row)}; {deep}"
             if self.found.of_run:
                 some = f" in {len(failing):,} of {len(nearest.rows):,} cases" if len(nearest.rows) > 1 else ""
@@ -413,6 +414,11 @@ class _Words:
             changes.append(words)
         either = "; or ".join(changes)
         return f"{text} It would qualify with {either}." if changes else text
+
+
+def depth_text(depth: float) -> str:
+    """Return a depth in three decimals [m, ft], rounded up, so that it is never less than what passes."""
+    return f"{math.ceil(depth * 1000.0 - 1e-6) / 1000.0:.3f}"
 
 
 def percent(share: float) -> str:

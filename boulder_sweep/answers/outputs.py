@@ -375,6 +375,7 @@ def asked_sweep(identity: Mapping[str, Any], table: pa.Table) -> Sweep:
         criterion=Criterion(**settings["criterion"]),
         model=model_of(settings, Control(**identity["control"])),
         units=units_in(settings),
+        taken_at=settings.get("taken_at", {}),
         depth_sought=given.get(EMBEDMENT[1]) == TO_BE_FOUND,
         allowed=allowed_in(settings),
     )

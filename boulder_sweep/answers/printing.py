@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from boulder_sweep.answers.advice import MODELS, Again, advice, next_questions
+from boulder_sweep.answers.advice import MODELS, Again, advice, depth_text, next_questions
 from boulder_sweep.answers.recommendation import OF_A_DESIGN, PREFERENCES, Design
 from boulder_sweep.answers.search import ALWAYS, BLOCKED, NEVER, NOT_MONOTONE, UNKNOWN, WORDS
 from boulder_sweep.columns import BY_NAME as COLUMNS
@@ -292,7 +292,8 @@ def answer_cell(key: Key, column: str, found: str, units: str) -> Cell:
         if row[column] is None:
             return "blocked" if kind == WORDS[BLOCKED] else f"{'never' if star else kind}{star}"
         before = {WORDS[ALWAYS]: "≥" if key.most else "≤"}.get(kind, "")
-        return f"{before}{row[column]:.{decimals}f}{star}"
+        text = depth_text(row[column]) if key.name == DEPTH else f"{row[column]:.{decimals}f}"
+        return f"{before}{text}{star}"
 
     return cell
 
@@ -681,7 +682,7 @@ def _where_it_passes(cell: Cell) -> Cell:
 
 def _length(name: str) -> Cell:
     """Return a formatter for a side of the boulder or its depth."""
-    return lambda row: f"{row[name]:.3f}"
+    return lambda row: depth_text(row[name]) if name == DEPTH else f"{row[name]:.3f}"
 
 
 def _chance(name: str) -> Cell:

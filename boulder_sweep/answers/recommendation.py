@@ -23,6 +23,7 @@ from boulder_sweep.answers.trials import InputRows, Judges, block_at, judges_of,
 from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.designs import SIDES
 from boulder_sweep.judge.quantities import EXCAVATED
+from boulder_sweep.judge.robustness import DECISIVE
 from boulder_sweep.judge.validity import FLAGS, SEPARATOR
 from boulder_sweep.settings.fields import EMBEDMENT
 
@@ -86,6 +87,15 @@ class Design:
     def grade(self) -> str | None:
         """Worst grade, one of `GRADES`; None where there is none."""
         return max((row["robustness"] for row in self.rows), key=RANKS.__getitem__)
+
+    @property
+    def stands(self) -> bool:
+        """Whether it stands under the second opinion that decides, in every row."""
+        return all(
+            row["robustness"] == "robust"
+            or (row["robustness"] == "open" and DECISIVE in (row["stands_under"] or "").split(SEPARATOR))
+            for row in self.rows
+        )
 
     @property
     def flags(self) -> tuple[str, ...]:

@@ -23,7 +23,7 @@ from boulder_sweep.answers.result import (
     to_build,
 )
 from boulder_sweep.answers.search import WORDS
-from boulder_sweep.answers.trials import Judges, judges_of, ranges
+from boulder_sweep.answers.trials import Judges, judges_of, ranges, rows_at
 from boulder_sweep.designs import block_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.runner.pool import Pool, call
@@ -141,16 +141,23 @@ def _table(sweep: Sweep, judges: Judges, start: int, stop: int) -> pa.Table:
     columns: list[TableColumn] = []
     withstood = {}
     for key, column, word, meaning in RESERVES:
-        own = rows[key.name]
-        low, high = usual_ends(key)
-        answers = ValueSearch(sweep, key, judges).answers_of(rows, np.minimum(low, own), np.maximum(high, own))
-        withstood[column] = answers.passes
+        own, usual = rows[key.name], usual_ends(key)
+        asked = {name: values for name, values in rows.items() if name != key.name}
+        ends = np.minimum(usual[0], own), np.maximum(usual[1], own)
+        # Designs that differ in this input alone ask the same.
+        every = np.stack([*ends, *asked.values()])
+        _, once, each = np.unique(every, axis=1, return_index=True, return_inverse=True)
+        answers = ValueSearch(sweep, key, judges).answers_of(rows_at(asked, once), *(end[once] for end in ends))
+        each = each.reshape(-1)
+        withstood[column], kinds = answers.passes[each], word_array(answers.kind[each], WORDS)
+        stretches = [answers.stretches[row] for row in each.tolist()]
         safe = "all greater angles" if key.name == "friction_angle_deg" else "all smaller values"
+        meaning = f"{meaning} at which the design passes, as at {safe}; simulated"
         columns += [
-            (column, key.field.unit, f"{meaning} at which the design passes, as at {safe}; simulated", answers.passes),
-            (f"{word}_fails_at", key.field.unit, "value next to it that does not pass", answers.fails),
-            (f"{word}_found", "", "kind of the answer, in the words of sweep need", word_array(answers.kind, WORDS)),
-            (f"{word}_passes_within", key.field.unit, "where not monotone: all stretches that pass", answers.stretches),
+            (column, key.field.unit, meaning, withstood[column]),
+            (f"{word}_fails_at", key.field.unit, "value next to it that does not pass", answers.fails[each]),
+            (f"{word}_found", "", "kind of the answer, in the words of sweep need", kinds),
+            (f"{word}_passes_within", key.field.unit, "where not monotone: all stretches that pass", stretches),
         ]
     speed, mass = withstood["withstands_speed_m_s"], rows["vehicle_mass_kg"]
     meaning = "class of ASTM F2656 whose nominal speed is withstood; simulated, which rates no barrier"

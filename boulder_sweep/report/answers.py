@@ -88,9 +88,9 @@ def need_sentences(rows: ResultRows, need: Need) -> tuple[list[Sentence], NamedD
 
 
 def screens(rows: ResultRows) -> dict[str, Screen]:
-    """Return the answers as tables by system of units; none of a run."""
-    file = rows.finished
-    if not isinstance(file, AnswerFile):
+    """Return the answers as tables by system of units; none of a run, or of one that is the design recommended."""
+    file, found = rows.finished, rows.need and rows.need.recommendation
+    if not isinstance(file, AnswerFile) or (found and found.design is not None and len(rows.codes) == 1):
         return {}
     answers = file.answers()
     return {system: SCREENS[file.kind](answers, system) for system in SYSTEMS}

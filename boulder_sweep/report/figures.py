@@ -43,9 +43,9 @@ PARTS = {
     "soil_drag": ("soil, dragged", "#7FCFB5"),
 }
 """Energies in stacking order: word and colour."""
-LEFT, RIGHT = 5.3, 4.3
+LEFT, RIGHT = 5.3, 4.6
 """How much is drawn before and behind the boulder [m]: room for constants of the soil there, and dimensions here."""
-PLAN = 1.7, 2.3
+PLAN = 1.7, 2.45
 """Room before and behind the boulder in the plan [m]: for the arrow of the truck, and for the width."""
 BARS = {"si": (2.0, "2 m"), "us": (1.524, "5 ft")}
 """Length of the scale bar [m], and how it is called."""
@@ -268,7 +268,7 @@ def sketch_of(
     dimensions = (
         upright(beside, 0.0, above, "above", above / 2 - 0.1),
         upright(beside, -depth, 0.0, "d =", low),
-        upright(last + 2.6, -depth, above, "H =", max(above / 2 - 0.1, 0.2)),
+        upright(last + 2.7, -depth, above, "H =", max(above / 2 - 0.1, 0.2)),
         across(first, last, above, "L =")._replace(value=length),  # the sides may lean
         Dimension(-3.0, 0.0, -3.0, bumper, "bumper", bumper, -3.12, 0.12, "end"),
         across(wide - length, wide, upper, "L ="),

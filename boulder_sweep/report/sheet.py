@@ -115,7 +115,7 @@ def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
         qualifies=qualifies,
         title=answer.named.title,
         sketch=sketch_of(inputs_of(row), settings, units, _profile(row)),
-        checks=_checks(row, settings["criterion"], answer.need),
+        checks=_checks(row, settings["criterion"], answer.need, design),
         build=_build(rows, row, design),
         soil=_inputs(design.rows, SOIL, settings),
         vehicle=_inputs(design.rows, VEHICLE, settings),
@@ -150,7 +150,7 @@ def _named(name: str, value: str | float, units: str) -> str:
 
 
 def _checks(
-    row: Mapping[str, Any], criterion: Mapping[str, Any], need: Need
+    row: Mapping[str, Any], criterion: Mapping[str, Any], need: Need, design: Design
 ) -> tuple[tuple[str, Cell, Cell, str], ...]:
     """Return loads and limits of the row that governs; a boulder that is hardly buried may not slide far."""
     slides = ISLAND_SLIDE if row[DEPTH] < ISLAND_RATIO * row["boulder_height_m"] else None
@@ -158,7 +158,7 @@ def _checks(
     of: list[tuple[str, str, str, float | None]] = [
         ("rotation", "max_rotation_deg", "deg", criterion["max_rotation_deg"]),
         ("displacement", "max_displacement_m", "m", slides),
-        (f"penetration of cargo bed, {criterion['rating']}", "penetration_m", "m", limit),
+        (f"cargo bed penetration, {criterion['rating']}", "penetration_m", "m", limit),
         ("overlap, at least", "overlap_m", "m", overlap),
         ("peak force of the truck", "peak_force_kN", "kN", None),
         ("acting above ground at", "impact_height_m", "m", None),
@@ -172,6 +172,12 @@ def _checks(
         none = "no limit" if name == "max_displacement_m" else "–"
         computed = _outcome(row, name, unit)
         lines.append((words, computed, none if allowed is None else Measure(allowed, unit), used))
+    if "p_pass" not in row and (design.stands or design.grade == "sensitive"):
+        # A second opinion tells whether the boulder stays below a limit, not how far it turns.
+        found, limit = need.recommendation, criterion["max_rotation_deg"]
+        share = 1.0 - need.least_margin * (need.robust and (found is None or found.design is design))
+        computed, used = (f"≤ {share * limit:.4g}°", f"≤ {100.0 * share:.0f} %") if design.stands else ("fails", "–")
+        lines.insert(1, ("rotation, weakest model", computed, Measure(limit, "deg"), used))
     if "p_pass" in row:
         least = "–" if need.probability is None else f"≥ {100.0 * need.probability:.4g} %"
         chances = [("probability of passing", f"{row['p_pass']:.1%}", "–" if need.robust else least, "–")]

@@ -136,7 +136,7 @@ def write_report(
         readings=readings,
         start=chosen[0]["inputs"],
         sheet=sheet_of(rows, answer, units),
-        sentences=answer.sentences,
+        sentences=answer.sentences[answer.need.recommendation is None :],  # the first is then the headline
         answers=screens(rows),
         rows=rows,
         chosen=chosen,
@@ -269,8 +269,9 @@ def _general_notes(settings: Mapping[str, Any], control: Control, units: str) ->
 
 def _taken(name: str, how: str, inputs: Mapping[str, Any], units: str) -> str:
     """Return at which quantile an uncertain input was taken, with its value if that is the same in all designs."""
-    value = inputs.get(name)
-    return f"{value_text(name, value, units) if isinstance(value, float) else name_of(name)} ({how})"
+    value, (at, _, side) = inputs.get(name), how.partition(" ")
+    which = f"{'lower' if side == 'low' else 'upper'} {at[1:]} %" if side else at
+    return f"{value_text(name, value, units) if isinstance(value, float) else name_of(name)} ({which})"
 
 
 def _facts(identity: Mapping[str, Any], command: str, out: str = "") -> list[tuple[str, str]]:

@@ -252,7 +252,7 @@ def _as_measured(lacking: Collection[str]) -> str:
 
 def _span(depths: list[float], units: str = "si") -> str:
     """Return sorted depths [m] in words, by their ends."""
-    return quantity_text("m", units, *dict.fromkeys((depths[0], depths[-1])))
+    return quantity_text("m", units, *dict.fromkeys((depths[0], depths[-1])), digits=".3g")
 
 
 def covered_depth(derived: dict[str, Any]) -> float:

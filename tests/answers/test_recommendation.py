@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import boulder_sweep
-from boulder_sweep.answers.advice import advice
+from boulder_sweep.answers.advice import advice, depth_text
 from boulder_sweep.answers.need import Need, need
 from boulder_sweep.answers.recommendation import PREFERENCES, Design, _Boulders
 from boulder_sweep.answers.trials import judges_of
@@ -152,6 +152,30 @@ def test_what_no_study_covers_is_said_first_though_it_stands_under_the_second_op
     assert all("width_capped" in row["stands_under"] for row in design_of(found).rows)
 
 
+@pytest.mark.parametrize(
+    ("grade", "under", "stands"),
+    [
+        ("robust", None, True),
+        ("open", "paper;width_capped", True),
+        ("open", None, False),
+        ("sensitive", "width_capped", False),
+        (None, None, False),
+    ],
+)
+def test_a_design_stands_where_every_row_is_robust_or_nearly_so(
+    grade: str | None, under: str | None, stands: bool
+) -> None:
+    robust, row = ({"robustness": name, "stands_under": laws} for name, laws in (("robust", None), (grade, under)))
+    assert Design([robust, row]).stands is stands
+
+
+@pytest.mark.parametrize(
+    ("depth", "shown"), [(2.433, "2.433"), (2.6409999999999996, "2.641"), (8.66470, "8.665"), (8.66410, "8.665")]
+)
+def test_a_depth_is_shown_no_less_than_what_passes(depth: float, shown: str) -> None:
+    assert depth_text(depth) == shown
+
+
 def test_what_second_opinions_do_not_know_is_asked_by_the_margin_alone() -> None:
     found = need(CONFIGS / "quarry_stone.yaml")
     assert (found.robust, found.least_margin, design_of(found).grade) == (False, 0.25, "open")
@@ -267,7 +291,7 @@ vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*
 
 def test_numbers_are_read_in_the_units_asked_for() -> None:
     words = said(need(site(**SIX)), "us")
-    assert words.startswith("Bury the 11.15 ft boulder (54,023 lb) 7.982 ft deep: ")
+    assert words.startswith("Bury the 11.15 ft boulder (54,023 lb) 7.983 ft deep: ")
     assert " m " not in words
 
 

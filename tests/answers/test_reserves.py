@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from boulder_sweep.answers.printing import reserve_lines
+from boulder_sweep.answers.questions import Answers, ValueSearch
 from boulder_sweep.answers.reserves import CLASSES, ISO_MASS_KG, ISO_SPEEDS, RESERVES, Reserve, capacity, classes
 from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.judge.accuracy import accuracy_of
@@ -187,6 +188,28 @@ def test_only_the_end_of_what_is_tried_is_marked() -> None:
     text = "\n".join(reserve_lines(capacity(site())))
     assert "≥" not in text
     assert "≤" not in text
+
+
+def test_designs_that_differ_in_what_is_asked_for_ask_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    grid = site(height="[3.0, 3.4] m", friction="[36, 40, 45] deg", site="embedment_depth: [1.8, 2.1] m")
+    asked, answers_of = [], ValueSearch.answers_of
+
+    def counted(self: ValueSearch, rows: dict[str, np.ndarray], low: np.ndarray, high: np.ndarray) -> Answers:
+        asked.append(len(low))
+        return answers_of(self, rows, low, high)
+
+    monkeypatch.setattr(ValueSearch, "answers_of", counted)
+    found = capacity(grid, jobs=1).frame
+    assert asked == [12, 12, 4]
+    alone = [
+        capacity(with_constants(site(height="3.0 m", friction=f"{angle} deg"), embedment_depth_m=depth)).frame
+        for angle in (36, 40, 45)
+        for depth in (1.8, 2.1)
+    ]
+    again = pd.concat(alone).set_index(["friction_angle_deg", "embedment_depth_m"]).sort_index()
+    same = found[found.boulder_height_m == 3.0].set_index(["friction_angle_deg", "embedment_depth_m"]).sort_index()
+    columns = [name for one in RESERVES for name in (one.column, f"{one.word}_fails_at", f"{one.word}_found")]
+    assert same[columns].astype(object).equals(again[columns].astype(object))
 
 
 def test_threads_do_not_matter() -> None:

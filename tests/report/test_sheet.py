@@ -20,11 +20,11 @@ from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.outputs import AnswerFile
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report, writing
-from boulder_sweep.report.answers import Measure, answer_of
+from boulder_sweep.report.answers import Measure, answer_of, screens
 from boulder_sweep.report.rows import read_rows
 from boulder_sweep.report.sheet import Sheet, sheet_of
 from boulder_sweep.settings.sweep import Heading
-from tests.answers.designs import UNCERTAIN_FRICTION, site
+from tests.answers.designs import UNCERTAIN_FRICTION, bare_need, site
 from tests.report.conftest import OTHER_VALUES, places, put
 
 HEADING = Heading("Main Street", "City", "North gate", "2026-11-28", "A", "C. Day", "E. Fox")
@@ -41,6 +41,9 @@ def needs() -> dict[str, Need]:
         "chance": boulder_sweep.need(site(height="3.4 m", **UNCERTAIN_FRICTION), probability=0.9),
         "nearest": boulder_sweep.need(site(height="3.0 m")),
         "soils": boulder_sweep.need(site(height="3.4 m", friction="{from: 34, to: 40, count: 9}")),
+        "taken": boulder_sweep.need(site(height="3.4 m", **UNCERTAIN_FRICTION)),
+        "stands": boulder_sweep.need(site(height="3.6 m", friction="40 deg"), margin=0.4, robust=False),
+        "bare": bare_need(site(height="3.6 m")),
         "never": boulder_sweep.need(site(height="2.0 m", friction="36 deg")),
     }
 
@@ -58,7 +61,7 @@ def sheet(file: Path, units: str = "si") -> Sheet:
     return sheet_of(rows, answer_of(rows), units)
 
 
-NAMES = ("depth", "mass", "chance", "nearest", "never")
+NAMES = ("depth", "mass", "chance", "taken", "nearest", "never")
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -81,7 +84,16 @@ def test_answers_without_a_recommendation_have_none_in_their_file(tmp_path: Path
     assert isinstance(read, Need)
     assert read.recommendation is None
     assert b"boulder_sweep.recommendation" not in pq.read_schema(tmp_path / "speed.parquet").metadata
-    assert "largest vehicle speed" in sheet(tmp_path / "speed.parquet").words["si"].recommendation[0]
+    words = sheet(tmp_path / "speed.parquet").words["si"]
+    assert words.question.startswith(
+        "What is the largest vehicle speed at which the boulder stops a truck of 6,804\u00a0kg, with"
+    )
+    assert "largest vehicle speed" in words.recommendation[0]
+    assert {name: rest for name, *rest in sheet(tmp_path / "speed.parquet").checks}["rotation, weakest model"][
+        2
+    ] == "≤ 75 %"
+    page = write_report(tmp_path / "speed.parquet", tmp_path / "page.html").read_text()
+    assert page.count(words.recommendation[0].partition(":")[0]) == len(("si", "us"))
 
 
 @pytest.mark.parametrize(
@@ -108,7 +120,7 @@ def test_the_limits_are_those_of_the_case_with_the_least_margin(needs: dict[str,
     worst = min(best.design.rows, key=lambda row: row["margin"])
     lines = {name: (computed, allowed, used) for name, computed, allowed, used in found.checks}
     assert lines["rotation"][:2] == (Measure(worst["max_rotation_deg"], "deg"), Measure(20.0, "deg"))
-    used = [int(line[2].split()[0]) for line in (lines["rotation"], lines["penetration of cargo bed, P1"])]
+    used = [int(line[2].split()[0]) for line in (lines["rotation"], lines["cargo bed penetration, P1"])]
     assert 100 - max(used) == round(100 * worst["margin"])
     assert f"friction angle φ′ {worst['friction_angle_deg']:g}°" in found.words["si"].governs
     assert len(found.cases["si"].rows) == len(best.design.rows) == 2
@@ -116,6 +128,37 @@ def test_the_limits_are_those_of_the_case_with_the_least_margin(needs: dict[str,
     assert ("bumper above ground", Measure(0.5, "m"), "default") in found.vehicle
     assert found.grade[0] == "robust"
     assert found.qualifies
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("depth", ("≤ 15°", Measure(20.0, "deg"), "≤ 75 %")),
+        ("stands", ("≤ 20°", Measure(20.0, "deg"), "≤ 100 %")),
+        ("bare", ("fails", Measure(20.0, "deg"), "–")),
+        ("chance", None),
+        ("never", None),
+    ],
+)
+def test_a_second_opinion_is_among_the_limits_with_what_it_proves(
+    files: dict[str, Path], name: str, line: tuple[str, Measure, str] | None
+) -> None:
+    checks = {words: tuple(rest) for words, *rest in sheet(files[name]).checks}
+    assert checks.get("rotation, weakest model") == line
+
+
+def test_the_drawing_is_as_deep_as_the_headline_says(files: dict[str, Path], tmp_path: Path, opened: Any) -> None:
+    for units in ("si", "us"):
+        page = opened(write_report(files["depth"], tmp_path / "page.html", units=units))
+        (deep,) = re.findall(r"([0-9.]+\u00a0(?:m|ft)) deep", sheet(files["depth"]).words[units].recommendation[0])
+        drawn = page.locator(".section svg").text_content()
+        assert f"d = {deep}" in drawn
+
+
+def test_one_answer_is_not_shown_again(files: dict[str, Path]) -> None:
+    assert screens(read_rows(files["taken"])) == {}
+    assert len(screens(read_rows(files["soils"]))["si"].rows) == 1
+    assert len(screens(read_rows(files["never"]))["si"].rows) == 1
 
 
 def test_what_does_not_qualify_is_not_recommended(files: dict[str, Path]) -> None:

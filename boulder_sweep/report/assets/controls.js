@@ -299,12 +299,13 @@ class Units {
    * A number with its unit.
    * @param {number | string | null} value in the unit of the table
    * @param {string} unit of the table
+   * @param {boolean} [up] whether it is a depth, which is rounded up, as on the command line
    */
-  text(value, unit) {
+  text(value, unit, up = false) {
     if (value === null) return "–";
     if (typeof value === "string") return value;
     const name = this.name(unit);
-    return name === "" ? number(value) : `${this.bare(value, unit)}${name === "°" ? "" : "\u00a0"}${name}`;
+    return name === "" ? number(value) : `${up ? this.rounded(value, unit) : this.bare(value, unit)}${name === "°" ? "" : "\u00a0"}${name}`;
   }
 
   /**
@@ -316,6 +317,11 @@ class Units {
   written(value, unit, digits = 6) {
     const plain = this.plain(unit);
     return `${sixDigits(value / this.size(unit), digits)}${plain === "1" ? "" : ` ${plain}`}`;
+  }
+
+  /** @param {number} value @param {string} unit of the table @returns {string} a depth that is not less than the value */
+  rounded(value, unit) {
+    return (Math.ceil((value / this.size(unit)) * 1000 - 1e-6) / 1000).toFixed(3);
   }
 
   /** @param {number | string | null} value @param {string} unit of the table @returns {string} a number without its unit */

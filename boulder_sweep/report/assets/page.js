@@ -133,12 +133,12 @@ class Page {
     place.replaceChildren(element("b", `${sign} ${found.verdict}`), element("span", words.length > 0 ? `: ${words.join("; ")}` : ""));
   }
 
-  /** @param {string} label @param {number | string | null} value @param {string} unit */
-  row(label, value, unit) {
+  /** @param {string} label @param {number | string | null} value @param {string} unit @param {boolean} [up] see `Units.text` */
+  row(label, value, unit, up = false) {
     const line = document.createElement("tr");
     const head = element("th", label);
     head.setAttribute("scope", "row");
-    line.append(head, element("td", this.units.text(value, unit)));
+    line.append(head, element("td", this.units.text(value, unit, up)));
     return line;
   }
 
@@ -267,13 +267,13 @@ class Page {
   refresh() {
     document.documentElement.dataset.units = this.units.system;
     for (const place of document.querySelectorAll(".quantity")) {
-      const { value, unit } = /** @type {HTMLElement} */ (place).dataset;
-      place.textContent = this.units.text(Number(value), String(unit));
+      const { value, unit, up } = /** @type {HTMLElement} */ (place).dataset;
+      place.textContent = this.units.text(Number(value), String(unit), up !== undefined);
     }
     this.data.chosen.forEach((/** @type {any} */ one, /** @type {number} */ k) => {
       this.show(`chosen${k}`, one.inputs);
       byId(`chosen${k}-inputs`).replaceChildren(
-        ...this.inputs.map((input) => this.row(input.label, one.inputs[input.name], input.unit)),
+        ...this.inputs.map((input) => this.row(input.label, one.inputs[input.name], input.unit, input.name === "embedment_depth_m")),
       );
     });
     if (this.axes.sweep !== null) {
