@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from boulder_sweep.answers.advice import MODELS, Again, advice, depth_text, next_questions
 from boulder_sweep.answers.recommendation import OF_A_DESIGN, PREFERENCES, Design
-from boulder_sweep.answers.search import ALWAYS, BLOCKED, NEVER, NOT_MONOTONE, UNKNOWN, WORDS
+from boulder_sweep.answers.search import ALWAYS, BLOCKED, FAULTY, NEVER, NOT_MONOTONE, UNKNOWN, WORDS
 from boulder_sweep.columns import BY_NAME as COLUMNS
 from boulder_sweep.columns import GRADES, WAY_OUT
 from boulder_sweep.designs import SIDES
@@ -69,6 +69,7 @@ WITHSTOOD = {
     WORDS[NEVER]: "never: passes at no value tried",
     WORDS[BLOCKED]: "blocked: the truck would pass or ride over the boulder",
     WORDS[UNKNOWN]: "undecided: passes at no value tried; see the reason below",
+    WORDS[FAULTY]: "error: cannot be computed (column reason, -o)",
 }
 """What the kinds of answers mean to a design that withstands something."""
 MOST_IN_ALL = 1000
@@ -391,7 +392,7 @@ def need_lines(
             lines += [f"next, {words}:", f"  {command}"]
     shown = _every_answer(need, units) if table else screen_lines(need, units)
     lines += ["", *shown]
-    remarks = yard_lines(need)
+    remarks = [*yard_lines(need), *_errors(need)]
     remarks += undecided_lines(need.arrow) if need.probability is not None else []
     remarks += caution_lines(need.sweep.model, reasons_in(need.arrow), units)
     if need.key.name == BOULDER_MASS.name:
@@ -426,7 +427,9 @@ def _shown_part(need: Need) -> pa.Table:
 def _every_answer(need: Need, units: str) -> list[str]:
     """Return a table with a line for each answer."""
     rows = rows_of(_shown_part(need), units)
-    lines = table_lines(_need_columns(need, units), rows[:MOST_IN_ALL])
+    found = need.recommendation
+    mark = [_marker(need, units)] if found is not None and found.design is not None and found.boulders > 1 else []
+    lines = table_lines([*mark, *_need_columns(need, units)], rows[:MOST_IN_ALL])
     if len(rows) > MOST_IN_ALL:
         lines.append(f"(the first {MOST_IN_ALL:,} of {len(rows):,} answers; -o writes them all)")
     return lines
@@ -471,10 +474,25 @@ def yard_lines(need: Need) -> list[str]:
     rows = _shown_part(need).to_pylist()
     serve = sorted((row for row in rows if row["passes_at"] is not None), key=lambda row: row["passes_at"])
     names = [" ".join(str(row[name]) for name in need.sweep.plan.labels or ("design_id",)) for row in serve]
-    more = "" if len(names) <= MOST_SHOWN else f" and {len(names) - MOST_SHOWN} more"
-    some = f": {', '.join(names[:MOST_SHOWN])}{more}" if names else ""
+    some = f": {_named(names)}" if names else ""
     does = "serves" if len(serve) == 1 else "serve"
     return [f"{len(serve)} of the {counted(len(rows), 'boulder')} {does} at this site{some}"]
+
+
+def _errors(need: Need) -> list[str]:
+    """Return why rows cannot be computed, and which."""
+    names = (*(need.sweep.plan.labels or ("design_id",)),)
+    rows: dict[str, list[str]] = {}
+    for row in need.arrow.select([*names, "found", "reason"]).to_pylist() if need.errors else ():
+        if row["found"] == WORDS[FAULTY]:
+            rows.setdefault(row["reason"], []).append(" ".join(str(row[name]) for name in names))
+    return [f"error: {reason} ({_named(some)})" for reason, some in rows.items()]
+
+
+def _named(names: Sequence[str]) -> str:
+    """Return the first of some names, and how many more there are."""
+    more = "" if len(names) <= MOST_SHOWN else f" and {len(names) - MOST_SHOWN} more"
+    return f"{', '.join(names[:MOST_SHOWN])}{more}"
 
 
 def _by_boulder(need: Need, rows: Sequence[Row], units: str) -> Screen:

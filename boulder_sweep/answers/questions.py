@@ -16,6 +16,7 @@ from boulder_sweep.answers.search import (
     CELLS,
     FAILS,
     FAR,
+    FAULTY,
     HOLDS,
     NEVER,
     NOT_MONOTONE,
@@ -38,6 +39,7 @@ from boulder_sweep.answers.trials import (
     beyond_reach,
     block_at,
     depth_within,
+    not_computable,
     ranges,
     rows_at,
     too_low,
@@ -114,6 +116,11 @@ class Answers(Brackets):
     stretches: list[str | None]
     simulated: int
     chances: Chances | None = None
+
+    @property
+    def found(self) -> np.ndarray:
+        """Kinds of answers, `FAULTY` where none passes because the designs cannot be computed, int8, shape (n,)."""
+        return np.where(np.isnan(self.passes) & not_computable(self.judged), FAULTY, self.kind).astype(np.int8)
 
 
 class ValueSearch:
