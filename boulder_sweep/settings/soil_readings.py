@@ -92,7 +92,7 @@ SOURCE_OF_DENSITY = "EM 1110-2-2504, Table 3-1"
 _SCATTER_DEG = {"spt": sand.SPT_SD_DEG, "cpt": sand.CPT_SD_DEG, RELATIVE_DENSITY.key: sand.DENSITY_SD_DEG}
 CORRELATION = 0.99
 """Correlation of friction angle and subgrade reaction where the second follows from the first; 1 is not admitted."""
-IN_TOPSOIL, BELOW_FOOT, STRONGER = "topsoil", "below the foot", "stronger than the soil above and below"
+IN_TOPSOIL, BELOW_FOOT, HARD_SPOT = "topsoil", "below the foot", "a hard spot"
 """Why a reading is left out."""
 
 Located = list[tuple[Position, dict[str, Any]]]
@@ -382,7 +382,7 @@ def layers_of(readings: list[dict[str, Any]], foot_m: float, scatter_deg: float,
     firm = [group for group, (top, bottom) in zip(groups, spans, strict=True) if bottom - top >= 0.5 * WINDOW_M]
     if firm and len(firm) < len(groups):  # without what is strong alone between weaker ones
         for reading in (one for group in groups if group not in firm for one in readings[group]):
-            reading["left_out"] = STRONGER
+            reading["left_out"] = HARD_SPOT
         kept = [reading for group in firm for reading in readings[group]]
         return layers_of(kept, foot_m, scatter_deg, is_cone=is_cone)
     each = zip(groups, spans, strict=True)
@@ -627,7 +627,7 @@ def _remarks(data: dict[str, Any], units: str) -> list[str]:
     kinds = (
         ("above_range", True, "above the range of the correlation, taken as its end"),
         ("left_out", IN_TOPSOIL, "left out, in the topsoil"),
-        ("left_out", STRONGER, f"left out, {STRONGER}"),
+        ("left_out", HARD_SPOT, f"left out, {HARD_SPOT} between weaker ones"),
         ("left_out", BELOW_FOOT, f"left out, below the first one under the deepest foot ({foot})"),
     )
     remarks = []
@@ -720,9 +720,10 @@ def unfold_soils(
                 needed = {"friction_angle", "subgrade_reaction"} | ({"density"} if density is None else set())
                 is_one = soil.label or "layers" in soil.entries or not needed <= set(lacking) or math.isinf(foot_m)
                 log = log._replace(may_be_layered=not is_one)
-                if log.water_m is not None and "water_table" not in soil.entries:
+                if log.water_m is not None and log.water_m < foot_m and "water_table" not in soil.entries:
                     words = f"ground water at {log.water_m:g} m in {log.file} is not used; give soil.water_table"
                     words += " and soil.subgrade_reaction" if "subgrade_reaction" in lacking else ""
+                    words += ", in a file of its own" if soil.label else ""
                     log = log._replace(remarks=(*log.remarks, words))
                 method, node = _nodes_of(log, node.position, beside.get(ENERGY), topsoil_m)
             constants = _soil_of(node, method, lacking, density, foot_m, topsoil_m, log)
