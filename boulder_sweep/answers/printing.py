@@ -474,25 +474,17 @@ def yard_lines(need: Need) -> list[str]:
     rows = _shown_part(need).to_pylist()
     serve = sorted((row for row in rows if row["passes_at"] is not None), key=lambda row: row["passes_at"])
     names = [" ".join(str(row[name]) for name in need.sweep.plan.labels or ("design_id",)) for row in serve]
-    some = f": {_named(names)}" if names else ""
+    more = "" if len(names) <= MOST_SHOWN else f" and {len(names) - MOST_SHOWN} more"
+    some = f": {', '.join(names[:MOST_SHOWN])}{more}" if names else ""
     does = "serves" if len(serve) == 1 else "serve"
     return [f"{len(serve)} of the {counted(len(rows), 'boulder')} {does} at this site{some}"]
 
 
 def _errors(need: Need) -> list[str]:
-    """Return why rows cannot be computed, and which."""
-    names = (*(need.sweep.plan.labels or ("design_id",)),)
-    rows: dict[str, list[str]] = {}
-    for row in need.arrow.select([*names, "found", "reason"]).to_pylist() if need.errors else ():
-        if row["found"] == WORDS[FAULTY]:
-            rows.setdefault(row["reason"], []).append(" ".join(str(row[name]) for name in names))
-    return [f"error: {reason} ({_named(some)})" for reason, some in rows.items()]
-
-
-def _named(names: Sequence[str]) -> str:
-    """Return the first of some names, and how many more there are."""
-    more = "" if len(names) <= MOST_SHOWN else f" and {len(names) - MOST_SHOWN} more"
-    return f"{', '.join(names[:MOST_SHOWN])}{more}"
+    """Return which rows cannot be computed, and why; of many the first."""
+    rows = [row for row in need.arrow.to_pylist() if row["found"] == WORDS[FAULTY]] if need.errors else []
+    names = need.sweep.plan.labels or ("design_id",)
+    return [f"error: {' '.join(str(row[name]) for name in names)}: {row['reason']}" for row in rows[:MOST_SHOWN]]
 
 
 def _by_boulder(need: Need, rows: Sequence[Row], units: str) -> Screen:

@@ -29,6 +29,7 @@ from boulder_sweep.answers.search import (
     steady,
 )
 from boulder_sweep.answers.trials import (
+    NO_FACE,
     SHARE,
     UNASKED_M,
     USUALLY,
@@ -39,14 +40,13 @@ from boulder_sweep.answers.trials import (
     beyond_reach,
     block_at,
     depth_within,
-    not_computable,
     ranges,
     rows_at,
     too_low,
     uncertain_rows,
 )
 from boulder_sweep.designs import block_of
-from boulder_sweep.judge.judged import UNDECIDED, with_rows
+from boulder_sweep.judge.judged import ERROR, UNDECIDED, with_rows
 from boulder_sweep.settings.fields import EMBEDMENT
 from boulder_sweep.settings.soil_readings import covered_depth
 
@@ -119,8 +119,10 @@ class Answers(Brackets):
 
     @property
     def found(self) -> np.ndarray:
-        """Kinds of answers, `FAULTY` where none passes because the designs cannot be computed, int8, shape (n,)."""
-        return np.where(np.isnan(self.passes) & not_computable(self.judged), FAULTY, self.kind).astype(np.int8)
+        """Kinds of answers, `FAULTY` where designs cannot be computed although they have a face, int8, shape (n,)."""
+        no_face = [code for code, word in enumerate(self.judged.reasons) if word in NO_FACE]
+        faulty = np.isnan(self.passes) & (self.judged.verdict == ERROR) & ~np.isin(self.judged.reason, no_face)
+        return np.where(faulty, FAULTY, self.kind).astype(np.int8)
 
 
 class ValueSearch:

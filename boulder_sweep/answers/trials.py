@@ -13,7 +13,7 @@ import numpy as np
 from boulder_sweep.designs import REASONS, DesignBlock, Label, block_of, input_of, some
 from boulder_sweep.judge.accuracy import Accuracy, accuracy_of, steps_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
-from boulder_sweep.judge.judged import ERROR, PASS, Judged, joined
+from boulder_sweep.judge.judged import PASS, Judged, joined
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.model import SetDistributions
 from boulder_sweep.settings.sweep import DesignList
@@ -267,12 +267,6 @@ def beyond_reach(block: DesignBlock, judged: Judged) -> np.ndarray:
     """Return whether the truck goes over the boulder or the row is not a valid design, bool, shape (n,)."""
     words = [code for code, word in enumerate(judged.reasons) if word in OUT_OF_REACH]
     return np.isin(judged.reason, words) | (np.asarray(block.reasons.codes) != 0)
-
-
-def not_computable(judged: Judged) -> np.ndarray:
-    """Return which designs cannot be computed, other than those with no face left for the truck, bool, shape (n,)."""
-    words = [code for code, word in enumerate(judged.reasons) if word in NO_FACE]
-    return (judged.verdict == ERROR) & ~np.isin(judged.reason, words)
 
 
 def too_low(block: DesignBlock, least_overlap_m: float) -> np.ndarray:

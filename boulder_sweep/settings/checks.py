@@ -16,7 +16,7 @@ from boulder_sweep.designs import LEAST_SOLIDITY, LEAST_TAPED, MOST_SOLIDITY
 from boulder_sweep.investigation import api_curve, off_families, terzaghi_curve
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.entries import Entries
-from boulder_sweep.settings.fields import BY_NAME, Field, Usual
+from boulder_sweep.settings.fields import BY_NAME, Field
 from boulder_sweep.settings.model import (
     BOUNDED,
     CLOSED_FORM,
@@ -115,10 +115,11 @@ def _far_words(values: np.ndarray, field: Field, written: str = "") -> str:
     assert field.usual is not None
     low, high = float(values.min()), float(values.max())
     usual = range_words(field.usual.low, field.usual.high, field.unit, written)
+    remark = field.usual.remark.partition("; a bare number")[0] if written else field.usual.remark
     far = f"less than 1/{fields.FAR:g} of" if high < field.usual.low else f"more than {fields.FAR:g} times"
     if low < field.usual.low < high:
         far = f"more than {fields.FAR:g} times outside"
-    return f"{range_words(low, high, field.unit, written)} is {far} the usual {usual} ({_remark(field.usual, written)})"
+    return f"{range_words(low, high, field.unit, written)} is {far} the usual {usual} ({remark})"
 
 
 def _check_embedment(entries: Entries, present: set[str], table_refused: bool) -> None:
@@ -300,34 +301,29 @@ def _on_list(sweep: Sweep, table: DesignList) -> Iterator[Problem]:
                 more = f" ({len(some) - 1} more like it)" if len(some) > 1 else ""
                 words = f"{table.called(row)}: {_unusual(name, values[row : row + 1], field.unit)}{more}"
                 yield Problem(table.position(row), words, field.path)
-    heavy = np.flatnonzero(sweep.fills > MOST_SOLIDITY) if BOULDER_MASS in table.columns else np.empty(0, dtype=int)
+    heavy = np.flatnonzero(sweep.fills > MOST_SOLIDITY)
     for row in heavy[:MAX_ALIKE].tolist():
         words = f"{table.called(row)} fills {sweep.fills[row]:.0%} of the box of its sizes by its mass: above "
         words += f"{MOST_SOLIDITY:.0%} a size or the mass is wrong; not computed (error)"
+        words += f" ({len(heavy)} boulders like it)" if len(heavy) > MAX_ALIKE else ""
         yield Problem(table.position(row), words, "boulder.mass")
-    if len(heavy) > MAX_ALIKE:
-        yield Problem(Position(table.source), f"and {len(heavy) - MAX_ALIKE} more like these", "boulder.mass")
-    if all(BY_NAME[name].section == "boulder" for name in table.columns):  # else of one boulder in several soils
-        for name, label in table.labels.items():
-            _, first, each, count = np.unique(label.codes, return_index=True, return_inverse=True, return_counts=True)
-            again = np.flatnonzero((count[each] > 1) & (first[each] != np.arange(len(each))))
-            if name.lower().endswith("id") and len(again):
-                row, more = int(again[0]), f" ({len(again) - 1} more like it)" if len(again) > 1 else ""
-                words = f"{table.called(row)} stands at {table.position(int(first[each[row]]))}, too{more}"
-                yield Problem(table.position(row), words, name)
+    ids = [(name, label.codes) for name, label in table.labels.items() if name[-2:] == "id"]
+    for name, codes in ids if all(BY_NAME[name].section == "boulder" for name in table.columns) else ():
+        again = np.setdiff1d(np.arange(len(codes)), np.unique(codes, return_index=True)[1])
+        if len(again):  # which one boulder does in a list of soils or vehicles, too
+            yield Problem(table.position(int(again[0])), f"{table.called(int(again[0]))} stands twice", name)
 
 
 def _on_mass(sweep: Sweep) -> str:
     """Return what is assumed of boulders that were weighed, and what stands for those that are no boxes."""
-    if BOULDER_MASS not in sweep.plan.given:
+    table = sweep.table
+    rows = np.flatnonzero((sweep.fills <= MOST_SOLIDITY) | (table is None))  # the others have notes of their own
+    if BOULDER_MASS not in sweep.plan.given or not len(rows):
         return ""
-    table, fills = sweep.table, sweep.fills
-    if table is not None and (fills <= MOST_SOLIDITY).any():  # the others have notes of their own
-        fills = np.where(fills <= MOST_SOLIDITY, fills, fills[fills <= MOST_SOLIDITY].min())
-    low, high = float(fills.min()), float(fills.max())
+    low, high = float(sweep.fills[rows].min()), float(sweep.fills[rows].max())
     share = " to ".join(dict.fromkeys((f"{low:.0%}", f"{high:.0%}")))
     if table is not None and high > 1.0:
-        share += f" ({table.called(int(fills.argmax()))})"
+        share += f" ({table.called(int(rows[sweep.fills[rows].argmax()]))})"
     words = [f"by its mass a boulder fills {share} of the box of its length, width and height"]
     if sweep.model.rock_assumed:
         words[0] += f" if its rock has {ROCK_KG_M3:g} kg/m^3, which is assumed: give boulder.density. No pass is robust"
@@ -411,12 +407,8 @@ def _unusual(name: str, values: np.ndarray, written: str = "") -> str:
     low, high = float(values.min()), float(values.max())
     given = range_words(low, high, unit, written)
     ends = range_words(usual.low, usual.high, unit, written)
-    return f"{given} is outside the usual range of {ends} ({_remark(usual, written)}); {_outcome(name, low, high)}"
-
-
-def _remark(usual: Usual, written: str) -> str:
-    """Return what the usual range is of; what a bare number means only where no unit was written."""
-    return usual.remark.partition("; a bare number")[0] if written else usual.remark
+    remark = usual.remark.partition("; a bare number")[0] if written else usual.remark
+    return f"{given} is outside the usual range of {ends} ({remark}); {_outcome(name, low, high)}"
 
 
 def _outcome(name: str, low: float, high: float) -> str:

@@ -142,9 +142,8 @@ class DesignList:
 
     def called(self, row: int) -> str:
         """Return what the list calls the boulder of a row, ``stone_id 16``, else its number from 1 up."""
-        own = (name for name in self.labels if name.lower().endswith(("id", "name")))
-        name = next(own, None)
-        return f"row {row + 1}" if name is None else f"{name} {self.labels[name].words[self.labels[name].codes[row]]}"
+        own = [f"{name} {label.words[label.codes[row]]}" for name, label in self.labels.items() if name[-2:] == "id"]
+        return own[0] if own else f"row {row + 1}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -378,18 +377,14 @@ class Sweep:
         }
 
     @cached_property
-    def solidity(self) -> tuple[float, float]:
-        """Least and largest share of the box of its sides that a boulder fills by its mass; 1 where none is given."""
-        return float(self.fills.min()), float(self.fills.max())
-
-    @cached_property
     def fills(self) -> np.ndarray:
-        """The shares themselves, in the order of a list; of crossed axes the ends of what may occur."""
+        """Shares of the boxes of their sides that boulders fill by their mass: of a list each, else the ends."""
         values = self.values
         if BOULDER_MASS not in values:
             return np.ones(1)
         names = (BOULDER_MASS, "boulder_density_kg_m3", *SIDES)
-        listed = next((group for group in self.groups if len(group) > 1 and BOULDER_MASS in group), {})
+        with_mass = (group for group in self.groups if len(group) > 1 and BOULDER_MASS in group)
+        listed = next(with_mass, {}) if self.table is None else self.table.columns
         if all(name in listed or len(values[name]) == 1 for name in names):
             mass, rock, *sides = (values[name] for name in names)
             return np.asarray(mass / (rock * np.prod(np.broadcast_arrays(*sides), axis=0)))
@@ -399,7 +394,7 @@ class Sweep:
     @property
     def is_taped(self) -> bool:
         """Whether a family of shapes stands for some boulder, see `boulder_sweep.stones.taped`."""
-        return self.model.shape.is_box and self.solidity[0] < LEAST_SOLIDITY
+        return self.model.shape.is_box and self.fills.min() < LEAST_SOLIDITY
 
     def _inputs(self) -> dict[str, Any]:
         """Return the values of the inputs by column name, lists where they vary."""

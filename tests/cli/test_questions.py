@@ -431,6 +431,6 @@ def test_a_stone_too_heavy_for_its_sizes_is_an_error_and_the_others_are_answered
     assert code == 3
     assert ["slip", "3", "error", "198.0", "-"] in lines
     assert [line[1] for line in lines if line and line[0] == "→"] == ["deep"]
-    assert "error: boulder is heavier than a solid box of its size and rock (slip)" in out
+    assert "error: slip: boulder is heavier than a solid box of its size and rock" in out
     assert "At no depth: flat." in out
     assert "blocked_by_overlap 1, error 1" in err

@@ -84,7 +84,7 @@ ROCK = "boulder.rock=granite"
         ),
         ((ROCK,), "yard.csv: boulder.mass: by its mass a boulder fills 60% to 101% (stone_id 2) of the box"),
         ((ROCK,), "yard.csv:5: boulder.mass: stone_id 3 fills 1013% of the box of its sizes by its mass: above 115%"),
-        ((ROCK,), "yard.csv:5: stone_id: stone_id 3 stands at yard.csv:4, too"),
+        ((ROCK,), "yard.csv:5: stone_id: stone_id 3 stands twice"),
         (("table=tape.csv", ROCK), "boulder.mass: no mass: each boulder is a solid box of its sizes"),
     ],
 )
