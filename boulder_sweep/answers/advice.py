@@ -11,6 +11,7 @@ import numpy as np
 
 from boulder_sweep.answers.lightest import DEPTH, HEIGHT, RATIO
 from boulder_sweep.answers.recommendation import OF_A_DESIGN, Design, Nearest, Recommendation
+from boulder_sweep.answers.search import FAULTY, WORDS
 from boulder_sweep.answers.trials import USUALLY
 from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.designs import SIDES
@@ -343,12 +344,13 @@ class _Words:
     def will_not_do(self) -> list[str]:
         """Return which boulders have no depth, and where: one by one if they are few and differ by height alone."""
         found = self.found
-        none = found.boulders - found.qualified
+        none = found.boulders - found.qualified - (self.need.errors if found.conditions == 1 else 0)
         if not none:
             return []
         at_no_depth = f"At no depth{self.terms().lstrip(',')}"
         if self.told_apart != [HEIGHT] or none > MOST_NAMED or self.rocks:
             failing = [row for row in self.need.arrow.to_pylist() if row["passes_at"] is None]
+            failing = [row for row in failing if row["found"] != WORDS[FAULTY]]
             names = [self.label(row).removesuffix(", ") for row in failing]
             if all(names) and none <= MOST_NAMED:
                 return [f"{at_no_depth}: {', '.join(names)}."]
@@ -366,14 +368,11 @@ class _Words:
 
     def tested(self, design: Design) -> str:
         """Return in what a design lies outside the crash tests."""
-        outside = [name for name in design.flags if design.grade != "open" or name not in UNSTUDIED]
         if not design.flags:
             return (
                 "It lies inside what the model was tested on, and is a simulation all the same, not a rating by test."
             )
-        if not outside:
-            return "No crash test covers it."
-        return f"No crash test covers it: {'; '.join(BY_FLAG[name].meaning for name in outside)}."
+        return f"No crash test covers it: {'; '.join(BY_FLAG[name].meaning for name in design.flags)}."
 
     def none(self) -> str:
         """Return that nothing qualifies."""

@@ -26,8 +26,8 @@ from boulder_sweep.answers.result import (
     rows_table,
     to_build,
 )
-from boulder_sweep.answers.search import BLOCKED, WORDS
-from boulder_sweep.answers.trials import NO_FACE, Judges, judges_of, ranges
+from boulder_sweep.answers.search import FAULTY, WORDS
+from boulder_sweep.answers.trials import Judges, judges_of, ranges
 from boulder_sweep.columns import INPUTS
 from boulder_sweep.designs import SIDES
 from boulder_sweep.drawing import draw
@@ -99,9 +99,7 @@ class Need(Result):
     @property
     def errors(self) -> int:
         """Number of rows that cannot be computed, other than where the boulder has no face left for the truck."""
-        rows = zip(*(self.arrow[name].to_pylist() for name in ("verdict", "reason", "found")), strict=True)
-        blocked = WORDS[BLOCKED]
-        return sum(v == "error" and not (kind == blocked and why in NO_FACE) for v, why, kind in rows)
+        return self.counts().get(WORDS[FAULTY], 0)
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data."""
@@ -336,7 +334,7 @@ def _table_of(asked: Question | LightestQuestion, start: int, stop: int) -> tupl
         (key.answer, unit, f"{what}; null where none does", answers.passes),
         ("fails_at", unit, next_to_it, answers.fails),
         ("passes_at", unit, "the same as the answer: judged as a run judges it", answers.passes),
-        ("found", "", ", ".join(WORDS), word_array(answers.kind, WORDS)),
+        ("found", "", ", ".join(WORDS), word_array(answers.found, WORDS)),
         ("passes_within", unit, "where it is not monotone: all stretches that pass", answers.stretches),
         *to_build(answers.block, asked.sweep),
     ]

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 from boulder_sweep.answers.keys import Key, key_of
 from boulder_sweep.answers.need import Need, need
-from boulder_sweep.answers.search import ALWAYS, BLOCKED, NEVER, NOT_MONOTONE, UNKNOWN, WORDS
+from boulder_sweep.answers.search import ALWAYS, BLOCKED, FAULTY, NEVER, NOT_MONOTONE, UNKNOWN, WORDS
 from boulder_sweep.answers.trials import ROUNDING_M
 from boulder_sweep.drawing import draw
 from boulder_sweep.settings import Sweep
@@ -29,6 +29,7 @@ NOTHING = {
     WORDS[NEVER]: "it fails at every depth",
     WORDS[BLOCKED]: "it fails down to where the truck would pass or ride over it",
     WORDS[NOT_MONOTONE]: "it passes at some depths, and fails at greater ones",
+    WORDS[FAULTY]: "it cannot be computed",
 }
 """Why there is no depth."""
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from boulder_sweep.answers.advice import MODELS, Again, advice, depth_text, next_questions
 from boulder_sweep.answers.recommendation import OF_A_DESIGN, PREFERENCES, Design
-from boulder_sweep.answers.search import ALWAYS, BLOCKED, NEVER, NOT_MONOTONE, UNKNOWN, WORDS
+from boulder_sweep.answers.search import ALWAYS, BLOCKED, FAULTY, NEVER, NOT_MONOTONE, UNKNOWN, WORDS
 from boulder_sweep.columns import BY_NAME as COLUMNS
 from boulder_sweep.columns import GRADES, WAY_OUT
 from boulder_sweep.designs import SIDES
@@ -69,6 +69,7 @@ WITHSTOOD = {
     WORDS[NEVER]: "never: passes at no value tried",
     WORDS[BLOCKED]: "blocked: the truck would pass or ride over the boulder",
     WORDS[UNKNOWN]: "undecided: passes at no value tried; see the reason below",
+    WORDS[FAULTY]: "error: cannot be computed (column reason, -o)",
 }
 """What the kinds of answers mean to a design that withstands something."""
 MOST_IN_ALL = 1000
@@ -391,7 +392,7 @@ def need_lines(
             lines += [f"next, {words}:", f"  {command}"]
     shown = _every_answer(need, units) if table else screen_lines(need, units)
     lines += ["", *shown]
-    remarks = yard_lines(need)
+    remarks = [*yard_lines(need), *_errors(need)]
     remarks += undecided_lines(need.arrow) if need.probability is not None else []
     remarks += caution_lines(need.sweep.model, reasons_in(need.arrow), units)
     if need.key.name == BOULDER_MASS.name:
@@ -426,7 +427,9 @@ def _shown_part(need: Need) -> pa.Table:
 def _every_answer(need: Need, units: str) -> list[str]:
     """Return a table with a line for each answer."""
     rows = rows_of(_shown_part(need), units)
-    lines = table_lines(_need_columns(need, units), rows[:MOST_IN_ALL])
+    found = need.recommendation
+    mark = [_marker(need, units)] if found is not None and found.design is not None and found.boulders > 1 else []
+    lines = table_lines([*mark, *_need_columns(need, units)], rows[:MOST_IN_ALL])
     if len(rows) > MOST_IN_ALL:
         lines.append(f"(the first {MOST_IN_ALL:,} of {len(rows):,} answers; -o writes them all)")
     return lines
@@ -475,6 +478,13 @@ def yard_lines(need: Need) -> list[str]:
     some = f": {', '.join(names[:MOST_SHOWN])}{more}" if names else ""
     does = "serves" if len(serve) == 1 else "serve"
     return [f"{len(serve)} of the {counted(len(rows), 'boulder')} {does} at this site{some}"]
+
+
+def _errors(need: Need) -> list[str]:
+    """Return which rows cannot be computed, and why; of many the first."""
+    rows = [row for row in need.arrow.to_pylist() if row["found"] == WORDS[FAULTY]] if need.errors else []
+    names = need.sweep.plan.labels or ("design_id",)
+    return [f"error: {' '.join(str(row[name]) for name in names)}: {row['reason']}" for row in rows[:MOST_SHOWN]]
 
 
 def _by_boulder(need: Need, rows: Sequence[Row], units: str) -> Screen:

@@ -16,6 +16,7 @@ from boulder_sweep.answers.search import (
     CELLS,
     FAILS,
     FAR,
+    FAULTY,
     HOLDS,
     NEVER,
     NOT_MONOTONE,
@@ -28,6 +29,7 @@ from boulder_sweep.answers.search import (
     steady,
 )
 from boulder_sweep.answers.trials import (
+    NO_FACE,
     SHARE,
     UNASKED_M,
     USUALLY,
@@ -44,7 +46,7 @@ from boulder_sweep.answers.trials import (
     uncertain_rows,
 )
 from boulder_sweep.designs import block_of
-from boulder_sweep.judge.judged import UNDECIDED, with_rows
+from boulder_sweep.judge.judged import ERROR, UNDECIDED, with_rows
 from boulder_sweep.settings.fields import EMBEDMENT
 from boulder_sweep.settings.soil_readings import covered_depth
 
@@ -114,6 +116,13 @@ class Answers(Brackets):
     stretches: list[str | None]
     simulated: int
     chances: Chances | None = None
+
+    @property
+    def found(self) -> np.ndarray:
+        """Kinds of answers, `FAULTY` where designs cannot be computed although they have a face, int8, shape (n,)."""
+        no_face = [code for code, word in enumerate(self.judged.reasons) if word in NO_FACE]
+        faulty = np.isnan(self.passes) & (self.judged.verdict == ERROR) & ~np.isin(self.judged.reason, no_face)
+        return np.where(faulty, FAULTY, self.kind).astype(np.int8)
 
 
 class ValueSearch:

@@ -149,7 +149,7 @@ def _table(sweep: Sweep, judges: Judges, start: int, stop: int) -> pa.Table:
         _, once, each = np.unique(every, axis=1, return_index=True, return_inverse=True)
         answers = ValueSearch(sweep, key, judges).answers_of(rows_at(asked, once), *(end[once] for end in ends))
         each = each.reshape(-1)
-        withstood[column], kinds = answers.passes[each], word_array(answers.kind[each], WORDS)
+        withstood[column], kinds = answers.passes[each], word_array(answers.found[each], WORDS)
         stretches = [answers.stretches[row] for row in each.tolist()]
         safe = "all greater angles" if key.name == "friction_angle_deg" else "all smaller values"
         meaning = f"{meaning} at which the design passes, as at {safe}; simulated"

@@ -15,9 +15,9 @@ import numpy as np
 
 FAILS, HOLDS, BEYOND, FAR = range(4)
 """Values of the predicate: it fails, it holds, there is nothing to try at this position, or it is far from holding."""
-FOUND, ALWAYS, NEVER, NOT_MONOTONE, BLOCKED, UNKNOWN = range(6)
-"""Kinds of result, codes of `WORDS`; a search gives all but the last, which is for designs that stay undecided."""
-WORDS = ("found", "always", "never", "not_monotone", "blocked_by_overlap", "undecided")
+FOUND, ALWAYS, NEVER, NOT_MONOTONE, BLOCKED, UNKNOWN, FAULTY = range(7)
+"""Kinds of result, codes of `WORDS`; a search gives all but the last two: designs that stay undecided, or in error."""
+WORDS = ("found", "always", "never", "not_monotone", "blocked_by_overlap", "undecided", "error")
 CELLS = 16
 """Number of cells into which the scan divides a range."""
 STRIDE = 4

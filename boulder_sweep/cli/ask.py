@@ -121,7 +121,8 @@ def need(
     one, which does not, both judged as in `sweep run`. A largest speed or vehicle mass is the end of the interval from
     zero in which everything passes; from a least friction angle or embedment on everything passes. A row of which
     nothing passes is `blocked_by_overlap` if the truck goes over the boulder at the end of the range (overlap below
-    criterion.min_overlap), `undecided` if the last value tried is, and `never` if neither.
+    criterion.min_overlap), `undecided` if the last value tried is, `error` if it cannot
+    be computed, and `never` otherwise.
     """
     from boulder_sweep.answers.advice import Again
     from boulder_sweep.answers.need import need as answer

@@ -28,8 +28,8 @@ from boulder_sweep.settings.model import (
     SetDistributions,
     SolverSettings,
 )
-from boulder_sweep.settings.problems import Position, Problem
-from boulder_sweep.settings.sweep import Sweep
+from boulder_sweep.settings.problems import MAX_ALIKE, Position, Problem
+from boulder_sweep.settings.sweep import DesignList, Sweep
 from boulder_sweep.settings.units import range_words
 from boulder_sweep.settings.values import is_unusual
 from boulder_sweep.stones.rock import ROCK_KG_M3
@@ -115,10 +115,11 @@ def _far_words(values: np.ndarray, field: Field, written: str = "") -> str:
     assert field.usual is not None
     low, high = float(values.min()), float(values.max())
     usual = range_words(field.usual.low, field.usual.high, field.unit, written)
+    remark = field.usual.remark.partition("; a bare number")[0] if written else field.usual.remark
     far = f"less than 1/{fields.FAR:g} of" if high < field.usual.low else f"more than {fields.FAR:g} times"
     if low < field.usual.low < high:
         far = f"more than {fields.FAR:g} times outside"
-    return f"{range_words(low, high, field.unit, written)} is {far} the usual {usual} ({field.usual.remark})"
+    return f"{range_words(low, high, field.unit, written)} is {far} the usual {usual} ({remark})"
 
 
 def _check_embedment(entries: Entries, present: set[str], table_refused: bool) -> None:
@@ -235,23 +236,22 @@ def notes_on(sweep: Sweep, positions: Mapping[str, Position], written: Mapping[s
     written : mapping of str to str
         Unit in which inputs were written in the file, by the columns of the table.
     """
+    table = sweep.table
+    listed = {} if table is None else {BY_NAME[name].path: Position(table.source) for name in table.columns}
     for path, message in _remarks(sweep, written):
         if message:
-            at = positions.get(path, Position(str(sweep.path)))
+            at = listed.get(path) or positions.get(path, Position(str(sweep.path)))
             yield Problem(at, message, path)
+    if table is not None:
+        yield from _on_list(sweep, table)
 
 
 def _remarks(sweep: Sweep, written: Mapping[str, str]) -> Iterator[tuple[str, str]]:
     """Yield dotted keys, and what is to be remarked of each; empty where nothing is. Arguments: see `notes_on`."""
     values = sweep.values
     for name, of_input in values.items():
-        field = BY_NAME[name]
-        off = is_unusual(of_input, field) if sweep.is_held(name) else np.zeros(of_input.shape, dtype=bool)
-        if off.any():  # in a table: of single values and axes the file has been refused
-            rows = counted(int(off.sum()), "design")
-            words = f"{_far_words(of_input[off], field)}: {rows} not computed (error, unusual), the first is design"
-            yield field.path, f"{words} {off.argmax()}; {_allowing([*sweep.allowed, field.path])}"
-        yield field.path, _unusual(name, of_input[~off], written.get(name, ""))
+        if sweep.table is None or name not in sweep.table.columns:
+            yield BY_NAME[name].path, _unusual(name, of_input, written.get(name, ""))
     for axis in sweep.axes:
         if len(set(axis.values.tolist())) < len(axis.values):
             yield BY_NAME[axis.name].path, "contains a value more than once"
@@ -262,6 +262,8 @@ def _remarks(sweep: Sweep, written: Mapping[str, str]) -> Iterator[tuple[str, st
         if off.any():
             yield "site.embedment_depth", f"depth over height: {_unusual('embedment_ratio', ratio[off])}"
     yield "boulder.mass", _on_mass(sweep)
+    if "boulder_density_kg_m3" in sweep.distributions and BOULDER_MASS not in values and sweep.model.shape.is_box:
+        yield "boulder.mass", "no mass: each boulder is a solid box of its sizes; weigh any that is no sawn block"
     yield "vehicle.spring", _off_front(sweep)
     if not sweep.model.shape.stands_flat:
         foot = "its foot is less than half as wide or long as the largest section"
@@ -281,12 +283,47 @@ def _remarks(sweep: Sweep, written: Mapping[str, str]) -> Iterator[tuple[str, st
     yield "soil.subgrade_reaction", _off_families(angle, reaction) or _mixed_families(angle, reaction)
 
 
+def _on_list(sweep: Sweep, table: DesignList) -> Iterator[Problem]:
+    """Yield what is to be remarked of the rows of a list, where they stand: of values alike, at the farthest off."""
+    for name, values in table.columns.items():
+        field = BY_NAME[name]
+        far = is_unusual(values, field) if sweep.is_held(name) else np.zeros(values.shape, dtype=bool)
+        if far.any():  # of single values and axes the file has been refused
+            rows = counted(int(far.sum()), "design")
+            words = f"{_far_words(values[far], field, field.unit)}: {rows} not computed (error, unusual), the first is"
+            words += f" design {far.argmax()}; {_allowing([*sweep.allowed, field.path])}"
+            yield Problem(table.position(int(far.argmax())), words, field.path)
+        off = np.flatnonzero(_outside(values, field) & ~far)
+        low = 0.0 if field.usual is None else field.usual.low
+        for some in (off[values[off] < low], off[values[off] > low]):
+            if len(some):
+                row = int(some[np.abs(values[some] - low).argmax()])
+                more = f" ({len(some) - 1} more like it)" if len(some) > 1 else ""
+                words = f"{table.called(row)}: {_unusual(name, values[row : row + 1], field.unit)}{more}"
+                yield Problem(table.position(row), words, field.path)
+    heavy = np.flatnonzero(sweep.fills > MOST_SOLIDITY)
+    for row in heavy[:MAX_ALIKE].tolist():
+        words = f"{table.called(row)} fills {sweep.fills[row]:.0%} of the box of its sizes by its mass: above "
+        words += f"{MOST_SOLIDITY:.0%} a size or the mass is wrong; not computed (error)"
+        words += f" ({len(heavy)} boulders like it)" if len(heavy) > MAX_ALIKE else ""
+        yield Problem(table.position(row), words, "boulder.mass")
+    ids = [(name, label.codes) for name, label in table.labels.items() if name[-2:] == "id"]
+    for name, codes in ids if all(BY_NAME[name].section == "boulder" for name in table.columns) else ():
+        again = np.setdiff1d(np.arange(len(codes)), np.unique(codes, return_index=True)[1])
+        if len(again):  # which one boulder does in a list of soils or vehicles, too
+            yield Problem(table.position(int(again[0])), f"{table.called(int(again[0]))} stands twice", name)
+
+
 def _on_mass(sweep: Sweep) -> str:
     """Return what is assumed of boulders that were weighed, and what stands for those that are no boxes."""
-    if BOULDER_MASS not in sweep.plan.given:
+    table = sweep.table
+    rows = np.flatnonzero((sweep.fills <= MOST_SOLIDITY) | (table is None))  # the others have notes of their own
+    if BOULDER_MASS not in sweep.plan.given or not len(rows):
         return ""
-    low, high = sweep.solidity
+    low, high = float(sweep.fills[rows].min()), float(sweep.fills[rows].max())
     share = " to ".join(dict.fromkeys((f"{low:.0%}", f"{high:.0%}")))
+    if table is not None and high > 1.0:
+        share += f" ({table.called(int(rows[sweep.fills[rows].argmax()]))})"
     words = [f"by its mass a boulder fills {share} of the box of its length, width and height"]
     if sweep.model.rock_assumed:
         words[0] += f" if its rock has {ROCK_KG_M3:g} kg/m^3, which is assumed: give boulder.density. No pass is robust"
@@ -370,7 +407,8 @@ def _unusual(name: str, values: np.ndarray, written: str = "") -> str:
     low, high = float(values.min()), float(values.max())
     given = range_words(low, high, unit, written)
     ends = range_words(usual.low, usual.high, unit, written)
-    return f"{given} is outside the usual range of {ends} ({usual.remark}); {_outcome(name, low, high)}"
+    remark = usual.remark.partition("; a bare number")[0] if written else usual.remark
+    return f"{given} is outside the usual range of {ends} ({remark}); {_outcome(name, low, high)}"
 
 
 def _outcome(name: str, low: float, high: float) -> str:

@@ -11,6 +11,7 @@ import io
 import math
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -64,10 +65,12 @@ _AGS = {
     "ISPT": {"depth": "ISPT_TOP", "n": "ISPT_NVAL", "energy_ratio": "ISPT_ERAT"},
     "SCPT": {"depth": "SCPT_DPTH", CONE: "SCPT_RES"},
 }
+_AGS_WATER = {"ISPT": "ISPT_WAT", "SCPG": "SCPG_WAT", "WSTG": "WSTG_DPTH", "WSTK": "WSTK_DEP"}
+"""Depths of ground water by the group [m]: at a test, under a cone, and as struck."""
 _WHOLE_MM = 450.0
 """Penetration of a whole test by AGS, with the seating drive."""
-_GEF_LENGTH, _GEF_CONE, _GEF_DEPTH = "1", "2", "11"
-"""Numbers of quantities in GEF."""
+_GEF_LENGTH, _GEF_CONE, _GEF_DEPTH, _GEF_WATER = "1", "2", "11", "14"
+"""Numbers of quantities in GEF; the last is a measured variable, the depth of the ground water [m]."""
 _BRO_EMPTY = "-999999"
 
 
@@ -87,6 +90,7 @@ class _Hole:
         self.names: dict[str, None] = {}
         self.readings: dict[str, list[LogReading]] = {}
         self.unused: list[str] = []
+        self.water: dict[str, float] = {}
 
     def add(self, hole: str, key: str, at: Position, depth: str, text: str, ratio: str = "", unit: float = 1.0) -> None:
         """Add a reading that stands at a place; depth in units of so many metres."""
@@ -117,6 +121,12 @@ class _Hole:
         value = size * self.number(text, CONE, at)
         self.check(value if value < -_DRIFT_MPA else max(0.0, value), CONE, at)
         return repr(value)
+
+    def add_water(self, hole: str, text: str) -> None:
+        """Keep the least depth of the ground water in a hole; what is no depth is left out."""
+        with suppress(ValueError):
+            if 0.0 <= float(text) < math.inf:
+                self.water[hole] = min(float(text), self.water.get(hole, math.inf))
 
     def check(self, value: float, key: str, at: Position) -> None:
         """Refuse a value that no reading has; NaN stands for none."""
@@ -172,8 +182,8 @@ def _log_of(found: _Hole, node: Scalar, hole: Scalar) -> Log:
     remarks = [f"not used: {', '.join([shorten(name, 30) for name in unused[:_SHOWN]] + more)}"] if unused else []
     if len(readings) < len(given):
         remarks.append(f"{counted(len(given) - len(readings), 'row')} without a depth or a reading left out")
-    name = shorten(next(iter(found.names)) if found.name is None else found.name)
-    return Log(key, tuple(readings), node.text.strip(), name, tuple(remarks))
+    name = next(iter(found.names)) if found.name is None else found.name
+    return Log(key, tuple(readings), node.text.strip(), shorten(name), tuple(remarks), found.water.get(name))
 
 
 def _read_table(path: Location, found: _Hole) -> None:
@@ -266,12 +276,15 @@ def _read_ags(path: Location, found: _Hole) -> None:
     try:
         for cells in rows:
             kind, line = cells[0].strip() if cells else "", rows.line_num
+            if kind == "DATA" and group in _AGS_WATER:
+                row = {name: cell.strip() for name, cell in zip(names, cells, strict=False)}
+                found.add_water(row.get("LOCA_ID", ""), row.get(_AGS_WATER[group], ""))
             if kind == "GROUP":
                 group, names, sizes = "".join(cells[1:2]).strip(), [], dict.fromkeys(_UNITS, 1.0)
-            elif group not in _AGS:
-                continue
             elif kind == "HEADING":
                 names = [name.strip() for name in cells]
+            elif group not in _AGS:
+                continue
             elif kind in ("UNIT", "DATA") and len(cells) != len(names):
                 raise refuse(label, f"has {len(cells)} cells; the headings of {group} are {len(names)}", line)
             elif kind == "UNIT":
@@ -313,7 +326,7 @@ def _read_gef(path: Location, found: _Hole) -> None:
     at: dict[str, int] = {}
     sizes: dict[int, float] = {}
     voids: dict[str, float] = {}
-    hole, separator, ending, end = "", None, "", 0
+    hole, separator, ending, end, water = "", None, "", 0, ""
     for end, line in enumerate(lines, 1):
         match = re.fullmatch(r"\s*#\s*(\w+)\s*=\s*(.*?)\s*", line)
         key, rest = (match[1].upper(), match[2]) if match else ("", "")
@@ -326,6 +339,8 @@ def _read_gef(path: Location, found: _Hole) -> None:
                 sizes[column] = _size(values[1], kind, Position(label, end))
         elif key == "COLUMNVOID" and len(values) > 1:
             voids[values[0]] = found.number(values[1], "COLUMNVOID", Position(label, end))
+        elif key == "MEASUREMENTVAR" and values[0] == _GEF_WATER:
+            water = "".join(values[1:2])
         elif key == "TESTID":
             hole = rest
         elif key == "COLUMNSEPARATOR":
@@ -336,6 +351,7 @@ def _read_gef(path: Location, found: _Hole) -> None:
             break
     else:
         raise refuse(label, "is not a GEF file: its header has no #EOH=")
+    found.add_water(hole, water)
     depth, cone = at.get(_GEF_DEPTH, at.get(_GEF_LENGTH)), at.get(_GEF_CONE)
     if depth is None or cone is None or min(depth, cone) < 0:
         raise refuse(label, "has no columns (#COLUMNINFO) of depth and cone resistance, quantities 1 and 2")

@@ -92,7 +92,7 @@ SOURCE_OF_DENSITY = "EM 1110-2-2504, Table 3-1"
 _SCATTER_DEG = {"spt": sand.SPT_SD_DEG, "cpt": sand.CPT_SD_DEG, RELATIVE_DENSITY.key: sand.DENSITY_SD_DEG}
 CORRELATION = 0.99
 """Correlation of friction angle and subgrade reaction where the second follows from the first; 1 is not admitted."""
-IN_TOPSOIL, BELOW_FOOT = "topsoil", "below the foot"
+IN_TOPSOIL, BELOW_FOOT, HARD_SPOT = "topsoil", "below the foot", "a hard spot"
 """Why a reading is left out."""
 
 Located = list[tuple[Position, dict[str, Any]]]
@@ -294,6 +294,8 @@ class Log(NamedTuple):
         The file as it is named in the settings, and the hole in it.
     remarks : tuple of str
         What of the file was not used.
+    water_m : float or None
+        Least depth of the ground water that the file gives [m].
     may_be_layered : bool
         Whether the soil may have layers: it is no named one, and the file gives no constant that is not one value.
     """
@@ -303,6 +305,7 @@ class Log(NamedTuple):
     file: str
     hole: str
     remarks: tuple[str, ...]
+    water_m: float | None = None
     may_be_layered: bool = True
 
     def averaged(self, topsoil_m: float) -> tuple[LogReading, ...]:
@@ -347,7 +350,8 @@ def layers_of(readings: list[dict[str, Any]], foot_m: float, scatter_deg: float,
     Parameters
     ----------
     readings
-        What counts, with depths and friction angles, see `boulder_sweep.settings.soil_readings`.
+        What counts, with depths and friction angles, see `boulder_sweep.settings.soil_readings`. Those that are no
+        layer of their own, strong alone between weaker ones, are marked as left out.
     foot_m
         The deepest foot [m]; the last reading stands for the soil down to it. One below it counts in full where it is
         weaker than the one above, else for its share of the soil down to the foot.
@@ -377,6 +381,8 @@ def layers_of(readings: list[dict[str, Any]], foot_m: float, scatter_deg: float,
     spans = list(pairwise(bounds))
     firm = [group for group, (top, bottom) in zip(groups, spans, strict=True) if bottom - top >= 0.5 * WINDOW_M]
     if firm and len(firm) < len(groups):  # without what is strong alone between weaker ones
+        for reading in (one for group in groups if group not in firm for one in readings[group]):
+            reading["left_out"] = HARD_SPOT
         kept = [reading for group in firm for reading in readings[group]]
         return layers_of(kept, foot_m, scatter_deg, is_cone=is_cone)
     each = zip(groups, spans, strict=True)
@@ -621,11 +627,13 @@ def _remarks(data: dict[str, Any], units: str) -> list[str]:
     kinds = (
         ("above_range", True, "above the range of the correlation, taken as its end"),
         ("left_out", IN_TOPSOIL, "left out, in the topsoil"),
+        ("left_out", HARD_SPOT, f"left out, {HARD_SPOT} between weaker ones"),
         ("left_out", BELOW_FOOT, f"left out, below the first one under the deepest foot ({foot})"),
     )
     remarks = []
     for key, value, words in kinds:
         some = [reading for reading in data["readings"] if reading.get(key) == value]
+        some = [reading for reading in some if key == "left_out" or "left_out" not in reading]
         if some:
             depths = sorted(reading["depth_m"] for reading in some if "depth_m" in reading)
             where = f" at {_span(depths, units)}" if depths else ""
@@ -712,6 +720,11 @@ def unfold_soils(
                 needed = {"friction_angle", "subgrade_reaction"} | ({"density"} if density is None else set())
                 is_one = soil.label or "layers" in soil.entries or not needed <= set(lacking) or math.isinf(foot_m)
                 log = log._replace(may_be_layered=not is_one)
+                if log.water_m is not None and log.water_m < foot_m and "water_table" not in soil.entries:
+                    words = f"ground water at {log.water_m:g} m in {log.file} is not used; give soil.water_table"
+                    words += " and soil.subgrade_reaction" if "subgrade_reaction" in lacking else ""
+                    words += ", in a file of its own" if soil.label else ""
+                    log = log._replace(remarks=(*log.remarks, words))
                 method, node = _nodes_of(log, node.position, beside.get(ENERGY), topsoil_m)
             constants = _soil_of(node, method, lacking, density, foot_m, topsoil_m, log)
             data.append(soil.label | constants)

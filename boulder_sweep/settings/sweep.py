@@ -17,7 +17,7 @@ from boulder_sweep.designs import LEAST_SOLIDITY, SIDES, UNUSUAL, DesignBlock, D
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings.fields import ALLOW_UNUSUAL, BY_NAME, EMBEDMENT, HELD, INPUTS, TO_BE_FOUND
 from boulder_sweep.settings.model import CLOSED_FORM, Criterion, Distribution, Model, SetDistributions, SolverSettings
-from boulder_sweep.settings.problems import Problem
+from boulder_sweep.settings.problems import Position, Problem
 from boulder_sweep.settings.soil_readings import soil_words
 from boulder_sweep.settings.units import SYSTEMS
 from boulder_sweep.settings.values import is_unusual
@@ -120,15 +120,30 @@ class DesignList:
         Text columns that are carried into the result.
     units : str
         ``us`` where the column of the height is in feet or inches, else ``si``.
+    source : str
+        The file, for messages.
+    lines : ndarray of int, shape (n,)
+        Lines of the rows in it; of shape (0,) where it has none.
     """
 
     file: str
     columns: dict[str, np.ndarray]
     labels: dict[str, Label] = field(default_factory=dict)
     units: str = SYSTEMS[0]
+    source: str = ""
+    lines: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
+
+    def position(self, row: int) -> Position:
+        """Return where a row stands."""
+        return Position(self.source, int(self.lines[row]) if len(self.lines) else None)
+
+    def called(self, row: int) -> str:
+        """Return what the list calls the boulder of a row, ``stone_id 16``, else its number from 1 up."""
+        own = [f"{name} {label.words[label.codes[row]]}" for name, label in self.labels.items() if name[-2:] == "id"]
+        return own[0] if own else f"row {row + 1}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -362,25 +377,24 @@ class Sweep:
         }
 
     @cached_property
-    def solidity(self) -> tuple[float, float]:
-        """Least and largest share of the box of its sides that a boulder fills by its mass; 1 where none is given."""
+    def fills(self) -> np.ndarray:
+        """Shares of the boxes of their sides that boulders fill by their mass: of a list each, else the ends."""
         values = self.values
         if BOULDER_MASS not in values:
-            return 1.0, 1.0
+            return np.ones(1)
         names = (BOULDER_MASS, "boulder_density_kg_m3", *SIDES)
-        listed = next((group for group in self.groups if len(group) > 1 and BOULDER_MASS in group), {})
+        with_mass = (group for group in self.groups if len(group) > 1 and BOULDER_MASS in group)
+        listed = next(with_mass, {}) if self.table is None else self.table.columns
         if all(name in listed or len(values[name]) == 1 for name in names):
             mass, rock, *sides = (values[name] for name in names)
-            fills = mass / (rock * np.prod(np.broadcast_arrays(*sides), axis=0))
-            return float(fills.min()), float(fills.max())
+            return np.asarray(mass / (rock * np.prod(np.broadcast_arrays(*sides), axis=0)))
         ends = [(float(values[name].min()), float(values[name].max())) for name in names]
-        low, high = (ends[0][i] / math.prod(end[1 - i] for end in ends[1:]) for i in range(2))
-        return low, high
+        return np.array([ends[0][i] / math.prod(end[1 - i] for end in ends[1:]) for i in range(2)])
 
     @property
     def is_taped(self) -> bool:
         """Whether a family of shapes stands for some boulder, see `boulder_sweep.stones.taped`."""
-        return self.model.shape.is_box and self.solidity[0] < LEAST_SOLIDITY
+        return self.model.shape.is_box and self.fills.min() < LEAST_SOLIDITY
 
     def _inputs(self) -> dict[str, Any]:
         """Return the values of the inputs by column name, lists where they vary."""

@@ -199,7 +199,7 @@ class TextTable:
             try:
                 number, written = split_number(cell, unit)
                 if written:
-                    raise NumberError(f"'{shorten(cell)}' has a unit; units belong in the column's name")
+                    raise NumberError(f"'{shorten(cell)}' is not a plain number; a unit belongs in the column's name")
                 values[at] = float(number)
             except (NumberError, OverflowError) as error:
                 self.alike.add("cells", self.position(rows[at], index), str(error), key)
@@ -419,10 +419,10 @@ def _designs_of(table: TextTable, path: Location, problems: Problems) -> DesignL
     columns = read_header(table.names, table.positions, problems)
     numbers: dict[str, list[np.ndarray]] = {column.field.name: [] for column in columns if column and column.field}
     words: dict[str, _Words] = {column.name: _Words() for column in columns if column and not column.field}
-    count = 0
+    lines: list[int] = []
     for rows in table.chunks():
-        count += len(rows)
-        if count * len(numbers) * _FLOAT > MOST_BYTES:
+        lines += [row[1] for row in rows]
+        if len(lines) * len(numbers) * _FLOAT > MOST_BYTES:
             raise refuse(table.label, f"has more than {size_text(MOST_BYTES)} of numbers")
         for index, column in enumerate(columns):
             if column is None:
@@ -437,14 +437,14 @@ def _designs_of(table: TextTable, path: Location, problems: Problems) -> DesignL
                 if not np.isnan(values[row]):  # those have been reported as they were read
                     table.alike.add("cells", table.position(rows[row], index), message, column.name)
             numbers[column.field.name].append(values)
-    if count == 0 and len(problems) == before:
+    if not lines and len(problems) == before:
         raise refuse(table.label, "has no rows below the column names")
     for column, position in zip(columns, table.positions, strict=True):
         if column is not None and column.field is None and _are_numbers(words[column.name].codes):
             check_numbers(column, position, problems)
     values_of = {name: np.concatenate(parts or [np.empty(0)]) for name, parts in numbers.items()}
     labels = {name: own.label() for name, own in words.items()}
-    return DesignList(path.name, values_of, labels, _system(columns))
+    return DesignList(path.name, values_of, labels, _system(columns), table.label, np.array(lines))
 
 
 class _Words:
@@ -574,7 +574,7 @@ def _checked_columns(file: TableFile, path: Location, problems: Problems) -> Des
     if len(names) > MAX_COLUMNS:
         raise refuse(label, f"has {len(names):,} columns; at most {MAX_COLUMNS:,} are read")
     columns = read_header(names, [position] * len(names), problems)
-    designs = DesignList(path.name, {}, units=_system(columns))
+    designs = DesignList(path.name, {}, units=_system(columns), source=label)
     for name, column in zip(names, columns, strict=True):
         if column is None:
             continue

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import shlex
+from contextlib import suppress
+from pathlib import Path
 
 from boulder_sweep.errors import EXIT_CONFLICT, EXIT_INTERNAL, EXIT_WRONG_USE, BoulderSweepError
 from boulder_sweep.locations import Location
+from boulder_sweep.settings import SettingsError, load
 from boulder_sweep.text import printable
 
 _LONGEST = 200
@@ -16,7 +19,11 @@ def settings_file(path: object) -> str:
     """Say that a path at which a result is expected is a settings file, and what to do; empty for another."""
     if not str(path).lower().endswith((".yaml", ".yml")):
         return ""
-    return f"{path} is a settings file; run it first:\n  sweep run {shlex.quote(str(path))}"
+    command = f"sweep run {shlex.quote(str(path))}"
+    with suppress(SettingsError):
+        if load(str(path)).depth_sought:
+            command = shlex.join(["sweep", "need", str(path), "-o", f"{Path(str(path)).stem}.parquet"])
+    return f"{path} is a settings file; run it first:\n  {command}"
 
 
 class StoreError(BoulderSweepError):

@@ -17,6 +17,7 @@ from boulder_sweep.answers.recommendation import PREFERENCES, Design, _Boulders
 from boulder_sweep.answers.trials import judges_of
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.quantiles import at_values
+from boulder_sweep.judge.validity import BY_FLAG
 from boulder_sweep.settings import Sweep, load, load_text
 from boulder_sweep.text import NO_BREAK_SPACE
 from tests.answers.designs import DEPTH, UNCERTAIN_FRICTION, bare_need, site
@@ -148,6 +149,9 @@ def test_what_no_study_covers_is_said_first_though_it_stands_under_the_second_op
     words = said(found)
     assert words.startswith("Not graded: no study of second opinions covers ")
     assert why in words.partition(" Bury the ")[0]
+    flags = words.partition("No crash test covers it: ")[2]
+    assert why in flags
+    assert all(BY_FLAG[name].meaning in flags for name in design_of(found).flags)
     assert "to spare, and with 25 % under the weakest of three soil models" in words
     assert all("width_capped" in row["stands_under"] for row in design_of(found).rows)
 

@@ -395,7 +395,9 @@ good,170,180,280,19.8
 """
 
 
-def test_a_yard_of_taped_stones_is_sorted_by_depth_and_says_which_serve(sweep, tmp_path):
+@pytest.fixture
+def yard(tmp_path):
+    """Write a list of taped stones, and return its settings."""
     (tmp_path / "yard.csv").write_text(YARD, encoding="utf-8")
     (tmp_path / "yard.yaml").write_text(
         """table: yard.csv
@@ -406,10 +408,29 @@ vehicle: {mass: 15000 lb, speed: 20 mph, spring: 3103.3 kN/m, damper: 138.91 kN*
 """,
         encoding="utf-8",
     )
-    _, out, _ = sweep("need", tmp_path / "yard.yaml", "-q", "--margin", "0")
+    return tmp_path / "yard.yaml"
+
+
+def test_a_yard_of_taped_stones_is_sorted_by_depth_and_says_which_serve(sweep, yard):
+    _, out, _ = sweep("need", yard, "-q", "--margin", "0")
     assert "2 of the 3 boulders serve at this site: good, deep" in out
-    _, out, _ = sweep("need", tmp_path / "yard.yaml", "-q", "--margin", "0", "--set", "vehicle.speed=28 mph")
+    _, out, _ = sweep("need", yard, "-q", "--margin", "0", "--set", "vehicle.speed=28 mph")
     assert "1 of the 3 boulders serves at this site: good" in out
     assert "the boulder good, 1.7 m long, 1.8 m wide and 2.8 m high (19.8 t)" in " ".join(out.split())
     places = [out.index(f"{name} ", out.index("stone  design")) for name in ("good", "deep", "flat")]
     assert places == sorted(places)
+
+
+def test_a_stone_too_heavy_for_its_sizes_is_an_error_and_the_others_are_answered(sweep, yard):
+    with (yard.parent / "yard.csv").open("a", encoding="utf-8") as file:
+        file.write("slip,170,180,280,198\n")
+    _, _, err = sweep("check", yard)
+    assert f"{yard.parent}/yard.csv:5: boulder.mass: row 4 fills 872% of the box of its sizes by its mass" in err
+    code, out, err = sweep("need", yard, "--margin", "0", "--table")
+    lines = [line.split() for line in out.splitlines()]
+    assert code == 3
+    assert ["slip", "3", "error", "198.0", "-"] in lines
+    assert [line[1] for line in lines if line and line[0] == "→"] == ["deep"]
+    assert "error: slip: boulder is heavier than a solid box of its size and rock" in out
+    assert "At no depth: flat." in out
+    assert "blocked_by_overlap 1, error 1" in err

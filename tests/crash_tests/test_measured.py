@@ -118,7 +118,10 @@ def test_empty_cells_are_gaps(tmp_path: Path) -> None:
         ("x [m];time [ms]\n0;1\n12;1\n", ["3:4: time: 0.001 s comes after 0.001 s"]),
         ('time [ms],"x [m]"\n0,1\n"1",two\n', ["3: displacement: 'two' is not a number"]),
         ("time [ms],x [m]\n0,1\n1,two\n", ["3:3: displacement: 'two' is not a number"]),
-        ("time [ms],x [m]\n0,1\n1,2 mm\n", ["3:3: displacement: '2 mm' has a unit; units belong in the column's name"]),
+        (
+            "time [ms],x [m]\n0,1\n1,2 mm\n",
+            ["3:3: displacement: '2 mm' is not a plain number; a unit belongs in the column's name"],
+        ),
         ("time [ms],x [m]\n0,1\n1,nan\n", ["3:3: displacement: 'nan' is not a finite number"]),
         ("time [ms],x [m]\n0,1\n1,1_0\n", ["3:3: displacement:"]),
         ("time [ms],x [m]\n0,1\n1,\u0661\n", ["3:3: displacement: '\u0661' is not a number"]),

@@ -14,7 +14,16 @@ from boulder_sweep import need
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings import SettingsError, load_text
 from boulder_sweep.settings.logs import count_of
-from boulder_sweep.settings.soil_readings import BELOW_FOOT, FEWEST, IN_TOPSOIL, WINDOW_M, covered_depth, layers_of
+from boulder_sweep.settings.soil_readings import (
+    BELOW_FOOT,
+    FEWEST,
+    HARD_SPOT,
+    IN_TOPSOIL,
+    WINDOW_M,
+    covered_depth,
+    layers_of,
+    soil_words,
+)
 from boulder_sweep.settings.sweep import derived_words
 from boulder_sweep.views.log_text import log_lines
 from tests.settings.log_files import ags_cone, ags_counts, bro, gef, table, written
@@ -328,6 +337,35 @@ def test_the_weakest_counts_of_few_readings():
     (layer,) = layers_of([reading(0.5, 36.0), reading(1.5, 34.0)], 2.0, 3.0, is_cone=False)
     assert layer.readings < FEWEST
     assert (layer.angles["a"], layer.scatter_deg) == (34.0, 0.0)
+
+
+def test_a_refusal_between_weaker_counts_is_left_out_and_said_once(site):
+    text = FILES["plain.csv"].replace(f"{COUNTS[1][0]},{COUNTS[1][1]}\n", f"{COUNTS[1][0]},50/75mm\n")
+    data = log_of(site("log: log.csv\n  energy_ratio: 60 %", "log.csv", text))
+    assert [one["depth_m"] for one in data["readings"] if one.get("left_out") == HARD_SPOT] == [COUNTS[1][0]]
+    assert data["layers"][0]["readings"] == len(COUNTS) - 1
+    words = soil_words(data)
+    assert f"1 reading at {COUNTS[1][0]:g} m left out, a hard spot between weaker ones" in words
+    assert "taken as its end" not in words
+    assert max(map(len, log_lines(data))) <= 80
+
+
+_WATER_TABLE = (("GROUP", "WSTG"), ("HEADING", "LOCA_ID", "WSTG_DPTH"), ("DATA", "BH1", "0.9"), ("DATA", "B2", "0.1"))
+WATER = {
+    "water.gef": gef(CONE).replace("#EOH", "#MEASUREMENTVAR = 14, 0.90, m, grondwaterstand\n#EOH"),
+    "water.ags": ags_counts({"BH1": COUNTS}) + "\n".join(",".join(f'"{c}"' for c in row) for row in _WATER_TABLE),
+}
+
+
+@pytest.mark.parametrize("name", WATER)
+def test_ground_water_is_said_until_the_file_gives_a_water_table(site, name):
+    (words,) = derived_words(site(f"log: {name}", name, WATER[name]).derived)
+    assert f"ground water at 0.9 m in {name} is not used; give soil.water_table and soil.subgrade_reaction" in words
+    wet = site(f"log: {name}\n  water_table: 0.9 m\n  subgrade_reaction: 20 MN/m^3", name, WATER[name])
+    assert wet.model.ground.water_table_m == 0.9
+    assert "ground water" not in derived_words(wet.derived)[0]
+    (words,) = derived_words(site(f"log: {name}", name, WATER[name].replace("0.9", "3.9")).derived)
+    assert "ground water" not in words  # below every foot
 
 
 def test_a_thin_seam_of_a_cone_is_no_layer():

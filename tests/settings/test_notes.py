@@ -26,7 +26,7 @@ def test_usual_values_have_no_remarks(load_with, load_it, minimal):
             "vehicle.speed=30",
             "30 m/s is outside the usual range of 4 to 25 m/s (15 to 90 km/h; a bare number is in m/s, not in mph",
         ),
-        ("vehicle.speed=70 mph", "70 mph is outside the usual range of 8.94775 to 55.9234 mph"),
+        ("vehicle.speed=70 mph", "70 mph is outside the usual range of 8.94775 to 55.9234 mph (15 to 90 km/h); "),
         (
             "boulder.height={from: 4 ft, to: 20 ft, count: 3}",
             "4 to 20 ft is outside the usual range of 4.92126 to 13.1234 ft",
@@ -62,6 +62,43 @@ def test_usual_values_have_no_remarks(load_with, load_it, minimal):
 def test_unusual_values(load_with, override, words):
     notes = _notes(load_with(override))
     assert any(words in note for note in notes)
+
+
+YARD = """stone_id,boulder_length_m,boulder_width_m,boulder_height_m,boulder_mass_t
+1,1.5,1.6,2.5,12.7
+2,1.5,1.6,2.5,16.1
+3,3.1,1.6,2.5,20
+3,1.5,1.6,2.5,161
+4,2.5,1.6,2.5,16
+"""
+ROCK = "boulder.rock=granite"
+
+
+@pytest.mark.parametrize(
+    ("overrides", "note"),
+    [
+        (
+            (ROCK,),
+            "yard.csv:4: boulder.length: stone_id 3: 3.1 m is outside the usual range of 0.6 to 2 m (usual boulders)"
+            "; computed as given (1 more like it)",
+        ),
+        ((ROCK,), "yard.csv: boulder.mass: by its mass a boulder fills 60% to 101% (stone_id 2) of the box"),
+        ((ROCK,), "yard.csv:5: boulder.mass: stone_id 3 fills 1013% of the box of its sizes by its mass: above 115%"),
+        ((ROCK,), "yard.csv:5: stone_id: stone_id 3 stands twice"),
+        (("table=tape.csv", ROCK), "boulder.mass: no mass: each boulder is a solid box of its sizes"),
+    ],
+)
+def test_remarks_on_a_list_stand_at_its_rows(tmp_path, monkeypatch, overrides, note):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "yard.csv").write_text(YARD)
+    (tmp_path / "tape.csv").write_text("".join(f"{line.rpartition(',')[0]}\n" for line in YARD.splitlines()))
+    (tmp_path / "yard.yaml").write_text(
+        f"table: yard.csv\nboulder: {{}}\n{LIST.partition('density: 2596 kg/m^3}')[2]}".replace(
+            "table: trucks.csv", ""
+        ).replace("vehicle: {", "vehicle: {mass: 15000 lb, ")
+    )
+    notes = _notes(boulder_sweep.load("yard.yaml", overrides))
+    assert sum(note in one for one in notes) == 1
 
 
 def test_a_remark_has_its_place(load_it, minimal):

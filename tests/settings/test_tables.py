@@ -116,7 +116,7 @@ def test_cells_are_reported_with_line_and_column_all_at_once(messages_of):
         "designs.csv:4:6: boulder_width_m: -1 m is outside the admitted range of 0.01 to 20 m",
         "designs.csv:5:1: has 2 cells; the first line has 4",
         "designs.csv:6: boulder_height_m: '3,44' is not a plain number; write 3.44",
-        "designs.csv:6: boulder_length_m: '1.65 m' has a unit; units belong in the column's name",
+        "designs.csv:6: boulder_length_m: '1.65 m' is not a plain number; a unit belongs in the column's name",
         "designs.csv:7:1: boulder_length_m: '1_0' is not a plain number",
         "designs.csv:7:9: embedment_depth_m: '010' begins with a zero",
     ]

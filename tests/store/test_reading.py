@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import warnings
+from pathlib import Path
 
 import duckdb
 import pandas as pd
@@ -117,6 +118,10 @@ def test_a_result_on_an_object_store(out):
         ("gone", "there is no .*gone; the result of a run is a folder"),
         ("empty", "is not the result of a sweep: no rows of it are finished"),
         ("x.yaml", r"x\.yaml is a settings file; run it first:\n  sweep run"),
+        (
+            "sought.yaml",
+            r"sought\.yaml is a settings file; run it first:\n  sweep need .*sought.yaml -o sought.parquet$",
+        ),
         ("x.csv", r"x\.csv is a file; the result of a run is a folder$"),
         ("x.parquet", "is a file; the result of a run is a folder; `sweep report`, .* take a file of answers"),
         ("part", r"is a file; the result of a run is a folder: name the folder it lies in, .*out$"),
@@ -127,6 +132,7 @@ def test_no_result(out, tmp_path, name, words):
     (tmp_path / "empty").mkdir()
     for file in ("x.yaml", "x.csv", "x.parquet"):
         (tmp_path / file).write_text("")
+    (tmp_path / "sought.yaml").write_text((Path(__file__).parents[2] / "configs/site.yaml").read_text())
     with pytest.raises(NotASweepError, match=words):
         read(path)
 
