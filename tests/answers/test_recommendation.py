@@ -176,6 +176,8 @@ def test_where_none_qualifies_the_nearest_has_what_is_said_of_it() -> None:
     models = "under the weakest of three soil models"
     assert words.startswith(f"No boulder of the file passes with 25 % to spare {models} in both soils.")
     assert f"Nearest: the 3.14 m boulder (22.6 t) 2.360 m deep, with 15 % to spare {models}." in words
+    assert "or less; or soil.friction_angle" in words
+    assert words.endswith(" or boulder.height 3.216 m or more (23.2 t, 2.448 m deep).")  # taller, it stands deeper
 
 
 def test_each_change_that_is_named_would_do_and_less_would_not() -> None:

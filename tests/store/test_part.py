@@ -101,8 +101,9 @@ def test_rows_are_counted_by_what_decided_them():
     }
     words = {"verdict": VERDICTS, "reason": REASONS, "robustness": GRADES, "stands_under": STANDINGS}
     rows = [row for times, row in enumerate(expected, 1) for _ in range(times)]
-    codes = [[-1 if word is None else words[name].index(word) for name, word in zip(words, row)] for row in rows]
-    columns = dict(zip(words, np.array(codes, dtype=np.int32).T, strict=True))
+    said = dict(zip(words, zip(*rows, strict=True), strict=True))
+    codes = {name: [-1 if word is None else words[name].index(word) for word in said[name]] for name in words}
+    columns = {name: np.array(column, dtype=np.int32) for name, column in codes.items()}
     assert verdict_counts(Judged(columns, words)) == {key: times for times, key in enumerate(expected.values(), 1)}
 
 
