@@ -180,6 +180,13 @@ def test_where_none_qualifies_the_nearest_has_what_is_said_of_it() -> None:
     assert words.endswith(" or boulder.height 3.216 m or more (23.2 t, 2.448 m deep).")  # taller, it stands deeper
 
 
+def test_no_change_of_an_uncertain_input_is_named() -> None:
+    found = need(site(height="[2.6, 3] m", friction="{mean: 38 deg, sd: 3 deg}"))
+    assert found.recommendation is not None
+    assert found.recommendation.nearest is not None
+    assert set(found.recommendation.nearest.changes) == {"impact_speed_m_s", "boulder_height_m"}
+
+
 def test_each_change_that_is_named_would_do_and_less_would_not() -> None:
     sweep = changed(site(height="[2.6, 3] m"), boulder_height_m=3.0)
     found = need(sweep)

@@ -8,7 +8,7 @@ import pytest
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.runner import run as running
-from boulder_sweep.runner.progress import RowCost, take_sample, time_and_disk, too_large
+from boulder_sweep.runner.progress import Progress, RowCost, take_sample, time_and_disk, too_large
 from boulder_sweep.runner.ranges import WORK_S, planned, seconds_per_row
 from boulder_sweep.runner.run import estimate
 from boulder_sweep.store.failures import DoesNotFitError
@@ -106,6 +106,10 @@ def test_an_estimate_is_in_proportion():
     assert one[0] == pytest.approx(0.5)
     assert ten[0] == pytest.approx(10 * one[0])
     assert ten[1] == pytest.approx(10 * one[1], rel=0.05)
+
+
+def test_a_rate_counts_the_rows_of_this_run():
+    assert [Progress(400, rows, 441, seconds).rows_per_second for rows, seconds in ((30, 0.5), (0, 0.0))] == [60.0, 0.0]
 
 
 def test_more_workers_than_cores_are_not_faster(monkeypatch):
