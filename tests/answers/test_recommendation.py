@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -205,6 +206,20 @@ def test_where_none_qualifies_the_nearest_has_what_is_said_of_it() -> None:
     models = "under the weakest of three soil models"
     assert words.startswith(f"No boulder of the file passes with 25 % to spare {models} in both soils.")
     assert f"Nearest: the 3.14 m boulder (22.6 t) 2.360 m deep, with 15 % to spare {models}." in words
+    assert "or less; or soil.friction_angle" in words
+    assert words.endswith(" or boulder.height 3.216 m or more (23.2 t, 2.448 m deep).")  # taller, it stands deeper
+
+
+def test_what_passes_in_one_model_alone_is_the_nearest_where_nothing_need_be_spared() -> None:
+    words = said(need(site(height="2.95 m"), margin=0.0))
+    assert re.search(r"Nearest: the boulder .* deep, with nothing to spare, but not under every soil model\.", words)
+
+
+def test_no_change_of_an_uncertain_input_is_named() -> None:
+    found = need(site(height="[2.6, 3] m", friction="{mean: 38 deg, sd: 3 deg}"))
+    assert found.recommendation is not None
+    assert found.recommendation.nearest is not None
+    assert set(found.recommendation.nearest.changes) == {"impact_speed_m_s", "boulder_height_m"}
 
 
 def test_each_change_that_is_named_would_do_and_less_would_not() -> None:

@@ -8,9 +8,10 @@ import pytest
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.runner import run as running
-from boulder_sweep.runner.progress import RowCost, take_sample, time_and_disk, too_large
-from boulder_sweep.runner.ranges import planned, seconds_per_row
+from boulder_sweep.runner.progress import Progress, RowCost, take_sample, time_and_disk, too_large
+from boulder_sweep.runner.ranges import WORK_S, planned, seconds_per_row
 from boulder_sweep.runner.run import estimate
+from boulder_sweep.store.failures import DoesNotFitError
 from boulder_sweep.store.part import encode, part_table
 from boulder_sweep.text import size_text
 from tests.runner.grids import grid, grid_of, plausible
@@ -38,6 +39,13 @@ def test_costs_grow_with_the_work_by_a_fixed_table(changes, least, most):
     assert least < seconds_per_row(sweep, evaluation) < most
     assert seconds_per_row(sweep, evaluation) == seconds_per_row(sweep, evaluation)
     assert planned(sweep, evaluation).rows == 441
+
+
+def test_a_range_takes_the_work_that_it_should():
+    sweep = grid_of(10**6)
+    evaluation = evaluation_of(sweep, accuracy_of(sweep), plausible)
+    ranges = planned(sweep, evaluation)
+    assert ranges.rows / ranges.count * seconds_per_row(sweep, evaluation) == pytest.approx(WORK_S, rel=0.1)
 
 
 def test_sizes_for_people():
@@ -100,6 +108,10 @@ def test_an_estimate_is_in_proportion():
     assert ten[1] == pytest.approx(10 * one[1], rel=0.05)
 
 
+def test_a_rate_counts_the_rows_of_this_run():
+    assert [Progress(400, rows, 441, seconds).rows_per_second for rows, seconds in ((30, 0.5), (0, 0.0))] == [60.0, 0.0]
+
+
 def test_more_workers_than_cores_are_not_faster(monkeypatch):
     monkeypatch.setattr(running, "take_sample", lambda *_: RowCost(1e-3, 50.0, 10_000.0))
     monkeypatch.setattr(running, "available_cores", lambda: 2)
@@ -117,10 +129,24 @@ def test_what_does_not_fit_is_said_with_numbers(tmp_path, monkeypatch):
     assert too_large(10, "about", 10**18, tmp_path / "not" / "there")
 
 
-def test_an_estimate_writes_nothing(tmp_path):
+def test_a_run_needs_room_for_what_is_missing(tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    running.run(grid(), out, simulate=plausible)
+    min(out.iterdir()).unlink()
+    monkeypatch.setattr(running, "take_sample", lambda *_: RowCost(1e-3, 100.0, 0.0))
+    monkeypatch.setattr("boulder_sweep.runner.progress._disk_free", lambda out: 20_000)
+    with pytest.raises(DoesNotFitError, match=r"needs about 44\.1 kB"):
+        running.run(grid(), tmp_path / "new", simulate=plausible)
+    assert running.run(grid(), out, resume=True, simulate=plausible).rows_computed == 110
+
+
+def test_an_estimate_writes_nothing_and_counts_what_is_there_only_to_resume(tmp_path):
     found = estimate(grid(), tmp_path / "out", simulate=plausible)
     assert found.rows == grid().n_designs
     assert list(tmp_path.iterdir()) == []
+    assert running.run(grid(), tmp_path / "out", simulate=plausible).jobs == running.available_cores()
+    assert estimate(grid(), tmp_path / "out", simulate=plausible).rows_to_compute == found.rows
+    assert estimate(grid(), tmp_path / "out", resume=True, simulate=plausible).rows_to_compute == 0
 
 
 def test_an_estimate_of_ten_to_the_twelve_is_exact_in_rows():

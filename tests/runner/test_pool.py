@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from distributed import LocalCluster
 
 from boulder_sweep.errors import BackendError, QuestionError
 from boulder_sweep.runner.pool import Pool, call, cluster
@@ -57,6 +58,17 @@ def test_a_failure_on_a_cluster_is_told_in_one_line(fails, words):
 def test_other_failures_of_calls_are_passed_on():
     with pytest.raises(ZeroDivisionError, match="by chance"):
         list(Pool(2)([call(fail, 1)]))
+
+
+def test_a_scheduler_without_a_worker_is_told(monkeypatch):
+    def wait(*_, **__):
+        raise TimeoutError
+
+    monkeypatch.setattr("distributed.Client.wait_for_workers", wait)
+    with LocalCluster(processes=False, n_workers=0, dashboard_address="127.0.0.1:0") as there:
+        words = f"the Dask scheduler at {there.scheduler_address} has no worker; start one with: dask worker"
+        with pytest.raises(BackendError, match=words), cluster(None, there.scheduler_address):
+            pass
 
 
 @pytest.mark.parametrize("jobs", [0, -5])

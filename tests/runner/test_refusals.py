@@ -61,6 +61,7 @@ def test_an_output_that_cannot_be_written(tmp_path, name):
         ({"progress": "bar"}, TypeError, "progress must be a function, not str"),
         ({"backend": "loky"}, BackendError, "unknown backend 'loky': choose one of threading, dask"),
         ({"backend": 3}, BackendError, "unknown backend 3"),
+        ({"scheduler": "tcp://a:1"}, BackendError, "a scheduler address needs the backend dask, not threading"),
     ],
 )
 def test_wrong_arguments_are_named(tmp_path, arguments, problem, words):

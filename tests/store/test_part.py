@@ -12,7 +12,17 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from boulder_sweep.columns import BY_NAME, COLUMNS, DESIGN_ID, INPUT_COLUMNS, OUTCOME_COLUMNS
+from boulder_sweep.columns import (
+    BY_NAME,
+    COLUMNS,
+    DESIGN_ID,
+    GRADES,
+    INPUT_COLUMNS,
+    OUTCOME_COLUMNS,
+    REASONS,
+    STANDINGS,
+    VERDICTS,
+)
 from boulder_sweep.designs import Column, DesignBlock
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import evaluation_of
@@ -77,6 +87,24 @@ def test_a_part_says_its_range_and_its_rows_by_verdict(block, judged):
     assert json.loads(metadata[b"boulder_sweep.verdicts"]) == verdicts == verdict_counts(judged)
     assert metadata[b"a"] == b"b"
     assert sum(verdicts.values()) == len(block)
+
+
+def test_rows_are_counted_by_what_decided_them():
+    """Passes by their grade; sensitive ones, where a second opinion was asked for, by what they stand under."""
+    expected = {
+        ("fail", "overturns", None, None): "fail/overturns",
+        ("pass", "", "open", "paper"): "pass/open",
+        ("pass", "", "robust", "paper;broms;width_capped"): "pass/robust",
+        ("pass", "", "sensitive", None): "pass/sensitive",
+        ("pass", "", "sensitive", "paper;broms"): "pass/sensitive (stands under broms)",
+        ("pass", "", "sensitive", "paper;broms;width_capped"): "pass/sensitive (stands under broms and width_capped)",
+    }
+    words = {"verdict": VERDICTS, "reason": REASONS, "robustness": GRADES, "stands_under": STANDINGS}
+    rows = [row for times, row in enumerate(expected, 1) for _ in range(times)]
+    said = dict(zip(words, zip(*rows, strict=True), strict=True))
+    codes = {name: [-1 if word is None else words[name].index(word) for word in said[name]] for name in words}
+    columns = {name: np.array(column, dtype=np.int32) for name, column in codes.items()}
+    assert verdict_counts(Judged(columns, words)) == {key: times for times, key in enumerate(expected.values(), 1)}
 
 
 def test_a_missing_value_is_null_never_nan(block, judged):

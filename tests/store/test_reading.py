@@ -84,6 +84,12 @@ def test_one_row(out):
         assert same_bits(FinishedRows(out).row(number), whole.slice(number, 1))
     with pytest.raises(IndexError, match="has 441 designs, numbered from 0; there is no 441"):
         FinishedRows(out).row(441)
+    changed = out / part_of(out, 2).name
+    changed.write_bytes(changed.read_bytes().replace(b"parquet-cpp", b"parquet-cPP"))  # to Parquet it is intact
+    with pytest.raises(DamagedError, match=f"{changed.name}: {reading.CHANGED}"):
+        FinishedRows(out).row(part_of(out, 2).first)
+    with pytest.raises(DamagedError):
+        list(FinishedRows(out).tables())
     (out / part_of(out, 1).name).unlink()
     with pytest.raises(IndexError, match="design 110 has not been computed yet"):
         FinishedRows(out).row(110)
