@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -410,8 +410,9 @@ class _Words:
             at_most = name == "impact_speed_m_s"
             value = (min if at_most else max)(row[name] for row in one.rows)
             built = f" ({self.mass(one.rows[0])}, {self.depth(one)})" if name == HEIGHT else ""
-            words = f"{BY_NAME[name].path} {self.value(name, value)} or {'less' if at_most else 'more'}{built}"
-            changes.append(words)
+            size = shown_unit(BY_NAME[name].unit, self.units).size if self.units == "us" else 1.0
+            held = size * within(value / size, math.floor if at_most else math.ceil)
+            changes.append(f"{BY_NAME[name].path} {self.value(name, held)} or {'less' if at_most else 'more'}{built}")
         either = "; or ".join(changes)
         return f"{text} It would qualify with {either}." if changes else text
 
@@ -419,6 +420,12 @@ class _Words:
 def depth_text(depth: float) -> str:
     """Return a depth in three decimals [m, ft], rounded up, so that it is never less than what passes."""
     return f"{math.ceil(depth * 1000.0 - 1e-6) / 1000.0:.3f}"
+
+
+def within(value: float, rounded: Callable[[float], int]) -> float:
+    """Return a value in four digits, rounded up or down, to the side on which it still qualifies."""
+    step = 10.0 ** (math.floor(math.log10(value)) - 3)
+    return rounded(value / step + (1e-6 if rounded is math.floor else -1e-6)) * step
 
 
 def percent(share: float) -> str:
