@@ -62,6 +62,8 @@ HEADS = {
     "bed_offset_m": ("bed", "m"),
 }
 """Name and unit above the column of an input."""
+WITHOUT_MARGIN = "What each design just withstands, without a margin"
+"""What the answers of `capacity` are."""
 WITHSTOOD = {
     WORDS[ALWAYS]: "≥, ≤: passes throughout, up to the worst value tried",
     WORDS[NOT_MONOTONE]: "*: up to here everything passes; it passes again beyond values that fail, which counts for "
@@ -254,7 +256,8 @@ def reserve_lines(result: Reserves, units: str = "si") -> list[str]:
     screen = reserve_screen(result, units)
     lines = screen.lines(WRITTEN)
     lines += [*volume_lines(lines[0]), *wrapped(screen.signs)]
-    return [*lines, *grade_lines(screen.rows), *foot_lines(result.sweep.model, reasons_in(result.arrow), units)]
+    lines += [*grade_lines(screen.rows), *foot_lines(result.sweep.model, reasons_in(result.arrow), units)]
+    return [*wrapped([f"{WITHOUT_MARGIN}; need --most speed asks with one:"]), *lines]
 
 
 def reserve_screen(result: Reserves, units: str = "si") -> Screen:

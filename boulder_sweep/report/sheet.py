@@ -198,11 +198,15 @@ def _outcome(row: Mapping[str, Any], name: str, unit: str) -> Cell:
 def _build(rows: ResultRows, row: Mapping[str, Any], design: Design) -> tuple[tuple[str, Cell], ...]:
     """Return what the drawing does not say of the boulder, and what it takes to build in the soil that needs most."""
     built = zip(("excavation", "backfill"), TO_BUILD[1:], strict=True)
-    mass = row.get(BOULDER_MASS) or float(rows.mass().flat[0])
-    lines: list[tuple[str, Cell]] = [
-        ("mass", Measure(float(mass), "kg")),
-        ("density of rock", Measure(row["boulder_density_kg_m3"], "kg/m^3")),
-    ]
+    mass, density = row.get(BOULDER_MASS) or float(rows.mass().flat[0]), float(row["boulder_density_kg_m3"])
+    rock = "".join(kind["name"] for kind in rows.settings.get("derived", {}).get("rock", ())) or "rock"
+    words, lines = "", list[tuple[str, Cell]]()
+    if rows.settings.get("taken_at", {}).get("boulder_density_kg_m3", "").endswith("low"):
+        words = ", low end"
+        largest = max(case.get("boulder_density_kg_m3", density) for case in rows.settings.get("judged_at", ()))
+        lines = [("mass, high end", Measure(float(mass) * largest / density, "kg"))]
+    lines = [(f"mass{words}", Measure(float(mass), "kg")), *lines]
+    lines.append((f"density of {rock}{words}", Measure(density, "kg/m^3")))
     if _is_taped(row):
         lines.append(("fills of its box", f"{row['solidity']:.0%}"))
         lines.append(("drawn: worst of its shapes", row["shape"].replace("_", " ")))

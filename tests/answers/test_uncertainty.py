@@ -102,9 +102,10 @@ def test_depth_for_a_probability() -> None:
 def test_no_answer_has_less_than_the_probability_that_is_asked_for(probability: float) -> None:
     heights = "boulder.height=[3.2, 3.4, 3.6] m"
     uncertain = [f"vehicle.{key}={{mean: {mean}, cov: 10 %}}" for key, mean in (("speed", "30 mph"), ("mass", "7 t"))]
-    found = need(load("configs/uncertain_site.yaml", [heights, *uncertain]), probability=probability)
-    assert (found.frame.found == "found").all()
-    assert (found.frame.p_pass >= probability).all()
+    found = need(load("configs/uncertain_site.yaml", [heights, *uncertain]), probability=probability).frame
+    answered = found[found.passes_at.notna()]
+    assert len(answered) > 1
+    assert (answered.p_pass >= probability).all()
 
 
 def test_files(tmp_path: Path) -> None:
