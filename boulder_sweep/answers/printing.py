@@ -284,6 +284,19 @@ def _format_withstood(key: Key, column: str, found: str, units: str) -> Cell:
     return cell
 
 
+def withstood(result: Reserves, number: int, units: str = "si") -> str:
+    """Return what the design of a row withstands, as a sentence."""
+    from boulder_sweep.answers.reserves import RESERVES
+
+    row, said = rows_of(result.arrow.slice(number, 1), units)[0], list[str]()
+    for (key, column, word, _), what in zip(RESERVES, ("speed", "truck", "friction angle"), strict=True):
+        answer = answer_cell(key, column, f"{word}_found", units)(row).rstrip("*")
+        known = row[column] is not None
+        unit = head_of(key.name, units)[1]
+        said.append(f"a {what} of {answer} {unit}".replace(" deg", "°") if known else f"no {what} that was tried")
+    return f"It withstands {', '.join(said[:-1])} and {said[-1]}, each alone and without a margin."
+
+
 def answer_cell(key: Key, column: str, found: str, units: str) -> Cell:
     """Return a formatter for an answer to a question, from the columns of its value and of what was found."""
     size = 1.0 if units == "si" else shown_unit(key.field.unit, units).size

@@ -185,7 +185,7 @@ def _tables(finished: Exportable, units: str) -> Iterator[tuple[list[ShownColumn
 
 
 def _without_tried(table: pa.Table, answers: Need) -> pa.Table:
-    """Return answers without the values tried last in rows that have no answer, and the outcome at these, but errors."""
+    """Return answers; where there is none, without the value tried last and its outcome, unless that is an error."""
     import pyarrow.compute as pc
 
     names, key = table.column_names, answers.key.name

@@ -202,7 +202,7 @@ def assembled(
         chosen=data["chosen"],
         thinned=kept.words if kept is not None else None,
         mapped=mapped,
-        said=rows is None or sheet is None or not mapped or _is_listed(rows, sheet, answers.get("si")),
+        said=not mapped or rows is None or not rows.axes or sheet is None or _is_listed(rows, sheet, answers.get("si")),
         facts=facts,
         notes=[*notes],
         heading=heading,

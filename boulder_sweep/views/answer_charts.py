@@ -171,7 +171,8 @@ def _shown(sweep: Sweep, frame: pd.DataFrame, searched: Sequence[str]) -> ChartR
 def _across(axes: Axes, frame: pd.DataFrame, across: str, units: str) -> None:
     """Name the axis of what is across; whole numbers have no ticks between them."""
     values = frame[across].to_numpy(dtype=float) / size_of(across, units)
-    axes.xaxis.get_major_locator().set_params(integer=bool(np.allclose(values, np.rint(values), rtol=0.0, atol=1e-6)))
+    if np.allclose(values, np.rint(values), rtol=0.0, atol=1e-6):
+        axes.locator_params("x", integer=True)
     axes.set_xlabel(label(across, units))
 
 
