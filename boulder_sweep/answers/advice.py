@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -159,7 +159,7 @@ class _Words:
         given = need.sweep.plan.given
         several = [name for name, one in given.items() if name in BY_NAME and one.values.min() < one.values.max()]
         by_mass = need.key.name == BOULDER_MASS
-        self.told_apart = [name for name in SIDES if name in several or name == need.key.name or by_mass]
+        self.told_apart = [name for name in SIDES if name in several or name == need.key.name or by_mass] or [*SIDES]
         self.rocks = "boulder_density_kg_m3" in several
         self.conditions = [name for name in several if name not in OF_A_DESIGN]
         self.kind = "designs" if found.of_run else "boulders"
@@ -178,10 +178,12 @@ class _Words:
         return self.quantity("m", metres)
 
     def mass(self, row: Mapping[str, Any]) -> str:
-        """Return the mass of the boulder of a row: tonnes, or pounds."""
+        """Return the mass of the boulder of a row, tonnes or pounds; of one taken at its low end that it is no less."""
+        taken = (self.need.sweep.taken_at.get(name, "") for name in ("boulder_density_kg_m3", BOULDER_MASS))
+        least = "at least " * any(how.endswith("low") for how in taken)
         if self.units == "us":
-            return self.quantity("kg", row[BOULDER_MASS], ",.0f")
-        return f"{row[BOULDER_MASS] / 1000:.1f}{NO_BREAK_SPACE}t"
+            return least + self.quantity("kg", row[BOULDER_MASS], ",.0f")
+        return f"{least}{row[BOULDER_MASS] / 1000:.1f}{NO_BREAK_SPACE}t"
 
     def depth(self, design: Design) -> str:
         """Return the depth of a design."""
@@ -196,13 +198,13 @@ class _Words:
         """Return what is excavated for a design."""
         return self.quantity("m^3", design.excavated_m3, ".1f")
 
-    def boulder(self, row: Mapping[str, Any]) -> str:
-        """Return what tells a boulder from the others of the file."""
+    def boulder(self, row: Mapping[str, Any], rock: str = "") -> str:
+        """Return what tells a boulder from the others of the file, after its kind of rock."""
         if self.told_apart == [HEIGHT]:
-            named = f"{self.length(row[HEIGHT])} boulder"
+            named = f"{self.length(row[HEIGHT])} {rock}boulder"
         else:
             sides = (f"{self.length(row[name])} {ALONG[name]}" for name in self.told_apart)
-            named = f"boulder {self.label(row)}{listed(tuple(sides))}".strip()
+            named = f"{rock}boulder {self.label(row)}{listed(tuple(sides))}".strip()
         rock = self.value("boulder_density_kg_m3", row["boulder_density_kg_m3"])
         return f"the {named} of {rock}" if self.rocks else f"the {named}"
 
@@ -280,7 +282,8 @@ class _Words:
     def recommendation(self, design: Design) -> str:
         """Return what to build, and why it is this one."""
         row, margin = design.rows[0], self.need.least_margin
-        build = f"ury {self.boulder(row)} ({self.mass(row)}) {self.depth(design)}: it passes"
+        rock = "".join(f"{kind['name']} " for kind in self.need.sweep.derived.get("rock", ()))
+        build = f"ury {self.boulder(row, rock)} ({self.mass(row)}) {self.depth(design)}: it passes"
         build += self.everywhere() + self.taken()
         if design.chance is not None:
             chance = design.chance_robust if self.need.robust and design.chance_robust is not None else design.chance
@@ -289,10 +292,10 @@ class _Words:
             holds += f" and {percent(margin)} to spare" if margin else ""
         else:
             holds = f" with {percent(design.margin)} to spare{self.opinions(design)}"
-        begin = "B"
-        if not_graded := self.not_graded(design):
-            begin = f"{not_graded} {'B' if design.stands else 'By the margin alone, b'}"
-        return f"{begin}{build}{holds}.{self.why(design)}"
+        begin, open_ = "B", self.not_graded(design)
+        if open_ and not design.stands:
+            begin, open_ = f"{open_} By the margin alone, b", ""
+        return f"{begin}{build}{holds}.{self.why(design)}{open_ and ' '}{open_}"
 
     def why(self, design: Design) -> str:
         """Return why it is this boulder, as a sentence that follows another."""
@@ -326,7 +329,8 @@ class _Words:
         if not outside:
             return f"Not graded: {NOT_ASKED}."
         some = f" in {len(rows)} of {len(design.rows)} cases" if len(rows) < len(design.rows) else ""
-        return f"Not graded{some}: no study of second opinions covers {listed(tuple(outside))}."
+        says = "Its grade is open" if design.stands else "Not graded"
+        return f"{says}{some}: no study of second opinions covers {' or '.join(outside)}."
 
     def others(self, design: Design) -> list[str]:
         """Return the designs that are better in something else."""
@@ -409,8 +413,9 @@ class _Words:
             at_most = name == "impact_speed_m_s"
             value = (min if at_most else max)(row[name] for row in one.rows)
             built = f" ({self.mass(one.rows[0])}, {self.depth(one)})" if name == HEIGHT else ""
-            words = f"{BY_NAME[name].path} {self.value(name, value)} or {'less' if at_most else 'more'}{built}"
-            changes.append(words)
+            size = shown_unit(BY_NAME[name].unit, self.units).size if self.units == "us" else 1.0
+            held = size * within(value / size, math.floor if at_most else math.ceil)
+            changes.append(f"{BY_NAME[name].path} {self.value(name, held)} or {'less' if at_most else 'more'}{built}")
         either = "; or ".join(changes)
         return f"{text} It would qualify with {either}." if changes else text
 
@@ -418,6 +423,12 @@ class _Words:
 def depth_text(depth: float) -> str:
     """Return a depth in three decimals [m, ft], rounded up, so that it is never less than what passes."""
     return f"{math.ceil(depth * 1000.0 - 1e-6) / 1000.0:.3f}"
+
+
+def within(value: float, rounded: Callable[[float], int]) -> float:
+    """Return a value in four digits, rounded up or down, to the side on which it still qualifies."""
+    step = 10.0 ** (math.floor(math.log10(value)) - 3)
+    return rounded(value / step + (1e-6 if rounded is math.floor else -1e-6)) * step
 
 
 def percent(share: float) -> str:

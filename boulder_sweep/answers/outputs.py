@@ -376,6 +376,7 @@ def asked_sweep(identity: Mapping[str, Any], table: pa.Table) -> Sweep:
         model=model_of(settings, Control(**identity["control"])),
         units=units_in(settings),
         taken_at=settings.get("taken_at", {}),
+        derived=settings.get("derived", {}),
         depth_sought=given.get(EMBEDMENT[1]) == TO_BE_FOUND,
         allowed=allowed_in(settings),
     )

@@ -62,6 +62,8 @@ HEADS = {
     "bed_offset_m": ("bed", "m"),
 }
 """Name and unit above the column of an input."""
+WITHOUT_MARGIN = "What each design just withstands, without a margin"
+"""What the answers of `capacity` are."""
 WITHSTOOD = {
     WORDS[ALWAYS]: "≥, ≤: passes throughout, up to the worst value tried",
     WORDS[NOT_MONOTONE]: "*: up to here everything passes; it passes again beyond values that fail, which counts for "
@@ -255,7 +257,8 @@ def reserve_lines(result: Reserves, units: str = "si") -> list[str]:
     screen = reserve_screen(result, units)
     lines = screen.lines(WRITTEN)
     lines += [*volume_lines(lines[0]), *wrapped(screen.signs)]
-    return [*lines, *grade_lines(screen.rows), *foot_lines(result.sweep.model, reasons_in(result.arrow), units)]
+    lines += [*grade_lines(screen.rows), *foot_lines(result.sweep.model, reasons_in(result.arrow), units)]
+    return [*wrapped([f"{WITHOUT_MARGIN}; need --most speed asks with one:"]), *lines]
 
 
 def reserve_screen(result: Reserves, units: str = "si") -> Screen:
@@ -280,6 +283,19 @@ def _format_withstood(key: Key, column: str, found: str, units: str) -> Cell:
         return f"{answer(row)}{away}"
 
     return cell
+
+
+def withstood(result: Reserves, number: int, units: str = "si") -> str:
+    """Return what the design of a row withstands, as a sentence."""
+    from boulder_sweep.answers.reserves import RESERVES
+
+    row, said = rows_of(result.arrow.slice(number, 1), units)[0], list[str]()
+    for (key, column, word, _), what in zip(RESERVES, ("speed", "truck", "friction angle"), strict=True):
+        answer = answer_cell(key, column, f"{word}_found", units)(row).rstrip("*")
+        known = row[column] is not None
+        unit = head_of(key.name, units)[1]
+        said.append(f"a {what} of {answer} {unit}".replace(" deg", "°") if known else f"no {what} that was tried")
+    return f"It withstands {', '.join(said[:-1])} and {said[-1]}, each alone and without a margin."
 
 
 def answer_cell(key: Key, column: str, found: str, units: str) -> Cell:

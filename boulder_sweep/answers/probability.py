@@ -45,9 +45,7 @@ if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
 
 DRAWN = 4096
-"""Samples at each value."""
-HALF_WIDTH = 0.005
-"""Largest half-width of the interval of the probability reported at the answer."""
+"""Samples at each value, in the search as at the answer: what is reported is what qualified."""
 FEW = 256
 """Points by which shapes are compared."""
 AT_ONCE = 1 << 18
@@ -87,14 +85,14 @@ class Sampling:
         return codes
 
     def chances(self, draws: Draws, inputs: InputRows) -> Chances:
-        """Return the probabilities of all rows with inputs set, from the points and more where needed."""
+        """Return the probabilities of all rows with inputs set, from the points by which the search decides."""
         count, points = len(next(iter(inputs.values()))), Points(len(self.spread.names), self.seed)
 
         def sampled(draws: Draws) -> Estimates:
             def event(index: np.ndarray, z: np.ndarray) -> np.ndarray:
                 return draws.drawn(index, z, **rows_at(inputs, index))[1]
 
-            return chance(event, count, points, half_width=HALF_WIDTH, first=DRAWN // SCRAMBLINGS)
+            return chance(event, count, points, half_width=1.0, first=DRAWN // SCRAMBLINGS)
 
         if not self.judges.robust:
             return Chances(sampled(draws), None)

@@ -369,7 +369,7 @@ class _Boulders:
             judged = judges.final.graded(judged, block)
         else:
             chances = self.sampling.chances(self.sampling.draws(given), inputs)
-            if (chances.asked.high < self.sampling.probability).any():
+            if (chances.asked.estimate < self.sampling.probability).any():
                 return None
             judged = ungraded(judged)
             columns += chance_columns(chances)

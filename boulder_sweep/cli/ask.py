@@ -29,7 +29,7 @@ from boulder_sweep.cli.options import (
     units_option,
     with_or_without,
 )
-from boulder_sweep.cli.output import say, show, working
+from boulder_sweep.cli.output import say, say_written, show, working
 from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
 from boulder_sweep.text import counted
 
@@ -155,8 +155,10 @@ def need(
         say(f"{counted(len(result), 'row')}: {counts}; {counted(result.simulated, 'simulation')}")
     if out is not None:
         result.write(out)
+        say_written(quiet, out)
     if picture is not None:
         result.plot(picture, units=units)
+        say_written(quiet, picture)
     return EXIT_SOME_ROWS_FAILED if result.errors else EXIT_DONE
 
 
@@ -241,10 +243,10 @@ def uncertainty(
         drawn = sum(result.arrow["p_pass_designs"].to_pylist())
         say(f"{counted(len(result), 'row')}; {counted(drawn, 'design')} drawn for the chances; seed {question['seed']}")
     if out is not None:
-        for file in result.write(out):
-            say(f"written  {file}")
+        say_written(quiet, *result.write(out))
     if picture is not None:
         result.plot(picture, design, units=units)
+        say_written(quiet, picture)
     return 0
 
 
@@ -295,5 +297,6 @@ def capacity(
     show(*([json.dumps(result.to_dict())] if as_json else reserve_lines(result, units=units)))
     if out is not None:
         result.write(out)
+        say_written(quiet, out)
     errors = result.arrow["verdict"].to_pylist().count("error")
     return EXIT_SOME_ROWS_FAILED if errors else EXIT_DONE

@@ -66,6 +66,13 @@ def say(text: str) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())
 
 
+def say_written(quiet: bool, *files: object) -> None:
+    """Name files that were written on stderr, unless quiet; None is one that was not asked for."""
+    for file in files:
+        if file is not None and not quiet:
+            say(f"written  {file}")
+
+
 def _columns() -> int | None:
     """Return the width of the terminal that stderr is; None for a file or a pipe, where lines stay whole."""
     return shutil.get_terminal_size().columns if sys.stderr.isatty() else None

@@ -25,7 +25,7 @@ from boulder_sweep.cli.options import (
     units_option,
     with_or_without,
 )
-from boulder_sweep.cli.output import say, show, working, wrap
+from boulder_sweep.cli.output import say, say_written, show, working, wrap
 from boulder_sweep.errors import EXIT_SOME_ROWS_FAILED
 from boulder_sweep.locations import Location, location_of
 
@@ -150,9 +150,7 @@ def simulate(
     if animate is not None:
         with working(quiet, f"drawing {animate}", "frames") as progress:
             result.animate(animate, progress)
-    for file in (plot, trajectory, energy, animate):
-        if file is not None and not quiet:
-            say(f"written  {file}")
+    say_written(quiet, plot, trajectory, energy, animate)
     return EXIT_SOME_ROWS_FAILED if row["verdict"] == "error" else 0
 
 
@@ -255,6 +253,6 @@ def build_line(history: Trajectory, units: str = "si") -> str:
 
     mass, above, *volumes = _to_build(history).values()
     weight = f"{mass / 1e3:.1f} t" if units == "si" else quantity_text("kg", units, mass, digits=",.0f")
-    dig, fill = (quantity_text("m^3", units, volume, digits=".1f") for volume in volumes)
+    dig, fill = (quantity_text("m^3", units, volume, digits=".1f").replace("^3", "³") for volume in volumes)
     height = quantity_text("m", units, above, digits=".3g")
     return f"  to build: {weight}, {height} above ground; dig {dig}, fill {fill}"

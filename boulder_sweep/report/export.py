@@ -17,13 +17,22 @@ import numpy as np
 
 from boulder_sweep.answers.advice import advice
 from boulder_sweep.answers.need import Need
-from boulder_sweep.answers.outputs import NEED, AnswerFile, kind_of, result_of
-from boulder_sweep.answers.printing import MARK, Screen, designs_screen, title, wrapped, yard_lines
+from boulder_sweep.answers.outputs import CAPACITY, NEED, AnswerFile, kind_of, result_of
+from boulder_sweep.answers.printing import (
+    MARK,
+    WIDTH,
+    WITHOUT_MARGIN,
+    Screen,
+    designs_screen,
+    title,
+    wrapped,
+    yard_lines,
+)
 from boulder_sweep.columns import BOULDER_MASS, BY_NAME, DESIGN_ID
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.quantities import NEEDED, QUANTITIES, quantities_by
 from boulder_sweep.locations import Location, location_of, replacing
-from boulder_sweep.settings.sweep import units_in
+from boulder_sweep.settings.sweep import SECTION, Heading, units_in
 from boulder_sweep.settings.units import (
     ShownColumn,
     check_system,
@@ -34,7 +43,7 @@ from boulder_sweep.settings.units import (
 )
 from boulder_sweep.store.folder import check_target
 from boulder_sweep.store.reading import FinishedRows
-from boulder_sweep.text import install, printable, why
+from boulder_sweep.text import NO_BREAK_SPACE, install, printable, why
 from boulder_sweep.views.wording import NOT_A_TEST
 
 if TYPE_CHECKING:
@@ -47,7 +56,7 @@ MOST_SHEET_ROWS = 1_048_575
 """Most rows of a spreadsheet, without the header."""
 PIECE = 10_000
 """Rows that become cells at once."""
-LEAST_WIDTH, ABOUT_WIDTHS = 14, (44, 12, 90)
+LEAST_WIDTH, ABOUT_WIDTHS, LINE_POINTS = 14, (44, 12, 90), 15
 """Widths of columns, in characters."""
 CREATED = datetime(1980, 1, 1)
 """Date in every spreadsheet, so that the same rows give the same file."""
@@ -176,16 +185,17 @@ def _tables(finished: Exportable, units: str) -> Iterator[tuple[list[ShownColumn
 
 
 def _without_tried(table: pa.Table, answers: Need) -> pa.Table:
-    """Return answers without the values tried last in rows that have no answer, and the outcome at these."""
+    """Return answers; where there is none, without the value tried last and its outcome, unless that is an error."""
     import pyarrow.compute as pc
 
     names, key = table.column_names, answers.key.name
-    tried = {key, *answers.derived, *names[names.index("passes_within") :]} - {"verdict", "reason"}
+    tried = {key, *answers.derived, *names[names.index("passes_within") :]}
     tried -= set() if key.startswith("boulder_") else {BOULDER_MASS}
     passes = table["passes_at"].is_valid()
+    told = pc.or_(passes, pc.equal(table["verdict"].cast("string"), "error"))  # why a row cannot be computed
     for name in tried & {*names}:
-        index = names.index(name)
-        table = table.set_column(index, table.field(index), pc.if_else(passes, table[name], None))
+        index, where = names.index(name), told if name in ("verdict", "reason") else passes
+        table = table.set_column(index, table.field(index), pc.if_else(where, table[name], None))
     return table
 
 
@@ -299,7 +309,8 @@ def _sheets(location: Location, target: BinaryIO, finished: Exportable, units: s
     with TemporaryDirectory() as place:  # the library leaves files behind where it fails
         book = Workbook(whole, {"constant_memory": True, "tmpdir": place, "use_zip64": True, **plain})
         book.set_properties({"created": CREATED})
-        _write_answer(book, *_answer(location, finished, units))
+        heading = finished.identity["settings"].get(SECTION, {})
+        _write_answer(book, Heading(**heading).given(), *_answer(location, finished, units))
         designs = book.add_worksheet("designs")
         designs.freeze_panes(1, 1)
         designs.write_row(0, 0, _cells(names))
@@ -333,14 +344,12 @@ def _ordered(finished: Exportable, units: str) -> list[ShownColumn]:
             if len(some) < 2:
                 some.update(values.unique()[:2].to_pylist())
     kind = kind_of(finished)
-    # In rows without an answer, verdict and reason are of the last value tried.
-    first = [begin for begin in ANSWERS if kind != NEED or begin not in ("verdict", "reason")]
 
     def place(column: ShownColumn) -> int:
         if column.name == DESIGN_ID.name or not kind:
             return -1  # a time history stays as it is
-        ranks = (rank for rank, begin in enumerate(first) if column.name.startswith(begin))
-        return next(ranks, len(first) + (len(held[column.name]) < 2))
+        ranks = (rank for rank, begin in enumerate(ANSWERS) if column.name.startswith(begin))
+        return next(ranks, len(ANSWERS) + (len(held[column.name]) < 2))
 
     return sorted(columns, key=place)
 
@@ -353,7 +362,7 @@ def _answer(location: Location, finished: Exportable, units: str) -> tuple[list[
     if isinstance(finished, AnswerFile):
         if not finished.kind:
             return [], Screen([], [])
-        answers, said = finished.answers(), list[str]()
+        answers, said = finished.answers(), [WITHOUT_MARGIN] if finished.kind == CAPACITY else []
         if isinstance(answers, Need):
             said = [*(advice(answers, units) or [title(answers)]), *yard_lines(answers)]
         return said, SCREENS[finished.kind](answers, units)
@@ -365,18 +374,24 @@ def _answer(location: Location, finished: Exportable, units: str) -> tuple[list[
     return [*advice(answer.need, units), *counts], designs_screen(answer.need, units)
 
 
-def _write_answer(book: Any, sentences: list[str], shown: Screen) -> None:
-    """Write the first sheet: sentences, and below them a table with numbers as they are shown, one row in bold."""
+def _write_answer(book: Any, heading: Mapping[str, str], sentences: list[str], shown: Screen) -> None:
+    """Write the first sheet: for whom, a sentence to a cell, and a table with numbers as shown, one row in bold."""
     if not sentences and not shown.columns:
         return
-    sheet, top = book.add_worksheet("answer"), 0
+    sheet = book.add_worksheet("answer")
     style = cache(lambda kind, bold: book.add_format({"num_format": kind, "bold": bold, "align": "right"}))
-    for top, line in enumerate(_cells(wrapped(sentences)), 2):
-        sheet.write_row(top - 2, 0, [line])
     lines = [*zip(*(head for head, _ in shown.columns), strict=True)]
     lines += [tuple(cell(row) for _, cell in shown.columns) for row in shown.rows]
-    for number, texts in enumerate(zip(*lines, strict=True)):
-        sheet.set_column(number, number, 2 + max(map(len, texts)))
+    widths = [2 + max(map(len, texts)) for texts in zip(*lines, strict=True)]
+    widths += [LEAST_WIDTH] * -((sum(widths) - WIDTH) // LEAST_WIDTH)
+    for number, width in enumerate(widths):
+        sheet.set_column(number, number, width)
+    wraps = book.add_format({"text_wrap": True, "valign": "top"})
+    texts = [*(f"{name.replace('_', ' ')}: {text}" for name, text in heading.items()), *sentences]
+    for number, text in enumerate(_cells(text.replace(NO_BREAK_SPACE, " ") for text in texts)):
+        sheet.set_row(number, LINE_POINTS * len(wrapped([text])))
+        sheet.merge_range(number, 0, number, len(widths) - 1, text, wraps)
+    top = len(texts) + bool(texts)
     for number, line in enumerate(lines):
         for place, text in enumerate(line):
             value, kind = _number(text)

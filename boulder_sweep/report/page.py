@@ -202,7 +202,7 @@ def assembled(
         chosen=data["chosen"],
         thinned=kept.words if kept is not None else None,
         mapped=mapped,
-        said=rows is None or sheet is None or not mapped or _is_listed(rows, sheet, answers.get("si")),
+        said=not mapped or rows is None or sheet is None or _is_listed(rows, sheet, answers.get("si")),
         facts=facts,
         notes=[*notes],
         heading=heading,
@@ -226,7 +226,9 @@ def assembled(
 
 
 def _is_listed(rows: ResultRows, sheet: Sheet, answers: Screen | None) -> bool:
-    """Whether every row of a result is in a table, so that a map of them says nothing on paper."""
+    """Whether the designs are a list, or every row is in a table, so that a map of them says nothing on paper."""
+    if rows.settings["order"] == "table":
+        return True
     if answers is not None:
         return answers.has_each and not answers.part
     return "si" in sheet.cases and len(sheet.cases["si"].rows) == len(rows.codes)

@@ -13,8 +13,10 @@ import numpy as np
 from boulder_kernels.rules import ISLAND_RATIO, ISLAND_SLIDE
 from boulder_sweep.answers.advice import advice, question
 from boulder_sweep.answers.need import Need
-from boulder_sweep.answers.printing import Screen, cases_screen
+from boulder_sweep.answers.outputs import AnswerFile
+from boulder_sweep.answers.printing import Screen, cases_screen, withstood
 from boulder_sweep.answers.recommendation import Design
+from boulder_sweep.answers.reserves import Reserves
 from boulder_sweep.columns import BOULDER_MASS, SHAPES, TO_BUILD
 from boulder_sweep.judge.robustness import meaning_of
 from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
@@ -23,6 +25,7 @@ from boulder_sweep.report.figures import Sketch, sketch_of
 from boulder_sweep.report.rows import DEPTH, ResultRows, inputs_of
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import ProfilePoint
+from boulder_sweep.settings.soil_readings import log_title
 from boulder_sweep.settings.units import SYSTEMS, quantity_text
 from boulder_sweep.stones.taped import taped_profiles
 from boulder_sweep.views.wording import ground_words
@@ -51,6 +54,8 @@ DRAWN = (
     "asked of every design that was drawn at random; the share of robust passes stands among the checks",
 )
 """Grade and note of a design with a probability of a robust pass."""
+WITHSTANDS = "Which speed, which truck and which soil does the boulder withstand?"
+"""What `sweep capacity` asks."""
 Cell = str | Measure
 
 
@@ -111,7 +116,7 @@ def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
     means = meaning_of(worst) or "" if grade != "open" or worst["stands_under"] else OPEN_IN_WORDS
     opinion = f"{grade or ''}{some}", means
     return Sheet(
-        words={system: _words(answer, design, named or several, settings, system) for system in SYSTEMS},
+        words={system: _words(rows, answer, design, named or several, system) for system in SYSTEMS},
         qualifies=qualifies,
         title=answer.named.title,
         sketch=sketch_of(inputs_of(row), settings, units, _profile(row)),
@@ -124,17 +129,22 @@ def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
     )
 
 
-def _words(answer: Answer, design: Design, names: Sequence[str], settings: Mapping[str, Any], units: str) -> Words:
+def _words(rows: ResultRows, answer: Answer, design: Design, names: Sequence[str], units: str) -> Words:
     """Return the sentences; the names are inputs that tell cases apart."""
     found, said, asked = answer.need.recommendation, advice(answer.need, units), question(answer.need, units)
-    ground = ground_words(settings, units) or "dry, level, the same at every depth, without cohesion"
+    ground = ground_words(rows.settings, units) or "dry, level, the same at every depth, without cohesion"
+    derived, first = rows.settings.get("derived", {}), tuple[str, ...]()
+    ground += "".join(f", from {log_title(soil)}" for soil in derived.get("soil", ()) if "log" in soil)
+    ground += "".join(f". Boulders: from {boulders['file']}" for boulders in derived.get("table", ()))
+    if isinstance(rows.finished, AnswerFile) and isinstance(reserves := rows.finished.answers(), Reserves):
+        asked, first = WITHSTANDS, (withstood(reserves, answer.named.number, units),)
     case = ", ".join(_named(name, answer.row[name], units) for name in names)
     governs = f"in the worst of {len(design.rows):,} cases: {case}" if case and len(design.rows) > 1 else ""
     if found is None:  # the worst answer, or why there is none
         said = ["".join(p if isinstance(p, str) else _measured(p, units) for p in answer.sentences[0])]
     if found is None or found.design is None:
-        return Words(asked, tuple(said), (), "", ground, governs)
-    return Words(asked, (said[0],), tuple(said[1:-1]), said[-1], ground, governs)
+        return Words(asked, (*first, *said), (), "", ground, governs)
+    return Words(asked, (*first, said[0]), tuple(said[1:-1]), said[-1], ground, governs)
 
 
 def _measured(part: Measure, units: str) -> str:
@@ -198,11 +208,15 @@ def _outcome(row: Mapping[str, Any], name: str, unit: str) -> Cell:
 def _build(rows: ResultRows, row: Mapping[str, Any], design: Design) -> tuple[tuple[str, Cell], ...]:
     """Return what the drawing does not say of the boulder, and what it takes to build in the soil that needs most."""
     built = zip(("excavation", "backfill"), TO_BUILD[1:], strict=True)
-    mass = row.get(BOULDER_MASS) or float(rows.mass().flat[0])
-    lines: list[tuple[str, Cell]] = [
-        ("mass", Measure(float(mass), "kg")),
-        ("density of rock", Measure(row["boulder_density_kg_m3"], "kg/m^3")),
-    ]
+    mass, density = row.get(BOULDER_MASS) or float(rows.mass().flat[0]), float(row["boulder_density_kg_m3"])
+    rock = "".join(kind["name"] for kind in rows.settings.get("derived", {}).get("rock", ())) or "rock"
+    words, lines = "", list[tuple[str, Cell]]()
+    if rows.settings.get("taken_at", {}).get("boulder_density_kg_m3", "").endswith("low"):
+        words = ", low end"
+        largest = max(case.get("boulder_density_kg_m3", density) for case in rows.settings.get("judged_at", ()))
+        lines = [("mass, high end", Measure(float(mass) * largest / density, "kg"))]
+    lines = [(f"mass{words}", Measure(float(mass), "kg")), *lines]
+    lines.append((f"density of {rock}{words}", Measure(density, "kg/m^3")))
     if _is_taped(row):
         lines.append(("fills of its box", f"{row['solidity']:.0%}"))
         lines.append(("drawn: worst of its shapes", row["shape"].replace("_", " ")))

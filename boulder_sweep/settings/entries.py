@@ -190,7 +190,7 @@ class Entries:
         boulder = self.root.get("boulder")
         if isinstance(boulder, Mapping) and "rock" in boulder.entries:
             with self.reporting("boulder.rock", ["boulder.density"]):
-                _unfold_rock(boulder)
+                self.derived |= {"rock": ({"name": _unfold_rock(boulder)},)}
         if isinstance(boulder, Mapping) and "scan" in boulder.entries:
             self.given.add("boulder.scan")
             folder = self._folder_of(boulder.entries["scan"].position)
@@ -546,8 +546,8 @@ def _unfold_scan(boulder: Mapping, folder: Path) -> tuple[Scan, list[str]]:
     return said, scan.surface_cautions
 
 
-def _unfold_rock(boulder: Mapping) -> None:
-    """Give a boulder the density of its kind of rock: a triangular distribution over the published range."""
+def _unfold_rock(boulder: Mapping) -> str:
+    """Give a boulder the density of its kind of rock, a triangular distribution over the published range; name it."""
     entry = boulder.entries["rock"]
     if "density" in boulder.entries:
         raise wrong(boulder.entries["density"].position, "density follows from boulder.rock; remove one of them")
@@ -555,6 +555,7 @@ def _unfold_rock(boulder: Mapping) -> None:
     texts = (f"{value:g} kg/m^3" for value in ROCKS[word])
     spread = {"distribution": "triangular", **dict(zip(("low", "mode", "high"), texts, strict=True))}
     boulder.entries["density"] = Entry("density", entry.position, block_of(entry.position, spread))
+    return word
 
 
 def _read_scan_words(node: Node) -> dict[str, str]:

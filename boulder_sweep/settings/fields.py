@@ -310,7 +310,7 @@ def default_text(field: Field, units: str = "si") -> str:
     if value is None or isinstance(value, str):
         return value or ""
     unit, size = shown_unit(field.unit, units) if units == "us" else (field.unit, 1.0)
-    return describe(value, unit) if size == 1.0 else f"{value / size:.5g} {unit}"
+    return describe(value, unit) if size == 1.0 else f"{value / size:.4g} {unit}"
 
 
 CATEGORIES: dict[str, tuple[tuple[str, str], tuple[int, ...]]] = {

@@ -331,7 +331,7 @@ def _build(name: str, heading: Heading, units: str, entries: Entries, overrides:
         heading=heading,
         units=units,
         depth_sought=entries.depth_sought,
-        derived=entries.derived,
+        derived=entries.derived | ({"table": ({"file": entries.table.file},)} if entries.table else {}),
         allowed=entries.allowed,
     )
     positions = {field.path: entries.position_of(field.path) for field in fields.INPUTS}

@@ -346,9 +346,9 @@ class Distribution:
     def words(self, unit: str, size: float = 1.0) -> str:
         """Return kind and spread in words, in a unit of which one is `size` in the unit of the column."""
         unit = "" if unit == "1" else f" {unit}"
-        sd, mode = (None if value is None else f"{value / size:.6g}{unit}" for value in (self.sd, self.mode))
-        spread = f"sd {sd}" if self.cov is None else f"cov {100.0 * self.cov:g} %"
-        ends = f"{self.low / size:g} to {self.high / size:g}{unit}"
+        sd, mode = (None if value is None else f"{value / size:.4g}{unit}" for value in (self.sd, self.mode))
+        spread = f"sd {sd}" if self.cov is None else f"cov {100.0 * self.cov:.4g} %"
+        ends = f"{self.low / size:.4g} to {self.high / size:.4g}{unit}"
         return {
             "uniform": f"uniform, {ends}",
             "triangular": f"triangular, {ends}, most likely {mode}",

@@ -277,6 +277,8 @@ def _inconsistencies(settings: dict[str, Any]) -> Iterator[str]:
         for soil in settings.get("derived", {}).get("soil", ()):
             if "log" in soil:
                 _ = max(map(strength, shown_readings(soil))) + soil.get("foot_m", 0.0)
+        for key, name in (("rock", "name"), ("table", "file")):
+            " ".join(one[name] for one in settings.get("derived", {}).get(key, ()))
         ends = [point["height"] for point in settings["model"].get("profile", ())]
         if ends and not (ends == sorted({*ends}) and (ends[0], ends[-1]) == (0.0, 1.0)):
             yield "model.profile is no outline from the foot to the top"

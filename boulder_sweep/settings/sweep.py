@@ -185,7 +185,8 @@ class Sweep:
     heading : Heading
         Project, client, author and date for the heading of a report.
     derived : dict of str to Any
-        What inputs were worked out of, by the key of the file: the run-up that gives a speed.
+        What inputs were worked out of, by the key of the file: the run-up that gives a speed, the kind of rock that
+        gives a density.
     units : str
         In which results are shown, ``si`` or ``us``; rows do not depend on it.
     depth_sought : bool

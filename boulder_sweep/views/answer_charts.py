@@ -62,10 +62,8 @@ ACROSS = (
 )
 CURVES = ("friction_angle_deg", "subgrade_reaction_MN_m3", "boulder_width_m", "impact_speed_m_s")
 """What is across and what tells curves apart: the first of each that varies."""
-COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
-"""Colours of as many curves as can be told apart with their bands."""
-SET_COLOURS = (*COLOURS, SKY, AMBER, BLACK)
-"""Colours of the curves of named soils or vehicles; with more curves the dashes differ."""
+COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK)
+"""Colours of as many curves as there are of values; of more named soils or vehicles the dashes differ."""
 ANSWERS = {
     "withstands_speed_m_s": ("largest impact speed", "m/s"),
     "withstands_mass_kg": ("largest mass of the truck", "kg"),
@@ -86,9 +84,11 @@ def draw_design_chart(need: Need, path: str | Path, *, units: str = "si") -> Non
         raise PictureError("there is nothing to draw: nothing passes in the range that was searched")
     with figure(path, 7.2, 4.8) as fig:
         axes = fig.subplots()
-        for words, rows, style in _styled(frame, over, sets, units):
-            _curve(axes, need, rows.sort_values(across), across, style, words, units)
-        axes.set_xlabel(label(across, units))
+        passing = frame if over is None else frame[frame[over].isin(frame[over][frame[need.key.answer].notna()])]
+        for words, rows, style in _styled(passing, over, sets, units):
+            if len(rows):
+                _curve(axes, need, rows.sort_values(across), across, style, words, units)
+        _across(axes, frame, across, units)
         axes.set_ylabel(_answer_label(need, units))
         _mark(axes, need, across, held, units)
         axes.legend(loc="best")
@@ -121,9 +121,9 @@ def draw_answers(answers: Reserves | Uncertainty, path: str | Path, *, units: st
                 axes.plot(x, rows[name].to_numpy(dtype=float) / size, marker="o", label=curve or None, **line)
                 if f"{name}_low" in rows:
                     axes.fill_between(x, rows[f"{name}_low"], rows[f"{name}_high"], color=colour, alpha=0.15, lw=0)
+            _across(axes, frame, across, units)
             if listed:
-                axes.xaxis.get_major_locator().set_params(integer=True)
-            axes.set_xlabel("design" if listed else label(across, units))
+                axes.set_xlabel("design")
             axes.set_ylabel(f"{words} [{printed}]" if printed else words)
         if over is not None:
             panels[0].legend(loc="best")
@@ -168,13 +168,21 @@ def _shown(sweep: Sweep, frame: pd.DataFrame, searched: Sequence[str]) -> ChartR
     return ChartRows(frame, sets, across, over, held)
 
 
+def _across(axes: Axes, frame: pd.DataFrame, across: str, units: str) -> None:
+    """Name the axis of what is across; whole numbers have no ticks between them."""
+    values = frame[across].to_numpy(dtype=float) / size_of(across, units)
+    if np.allclose(values, np.rint(values), rtol=0.0, atol=1e-6):
+        axes.locator_params("x", integer=True)
+    axes.set_xlabel(label(across, units))
+
+
 def _styled(
     frame: pd.DataFrame, over: str | None, sets: Mapping[str, Sequence[str]], units: str
 ) -> Iterator[tuple[str, pd.DataFrame, tuple[str, Any]]]:
     """Yield the words, the rows, and colour and dashes of each curve."""
     for index, (words, rows) in enumerate(_curves(frame, over, sets, units)):
-        dashes = DASHES[index // len(SET_COLOURS) % len(DASHES)]
-        yield words, rows, (SET_COLOURS[index % len(SET_COLOURS)], dashes)
+        dashes = DASHES[index // len(COLOURS) % len(DASHES)]
+        yield words, rows, (COLOURS[index % len(COLOURS)], dashes)
 
 
 def _curves(

@@ -241,6 +241,18 @@ def test_each_change_that_is_named_would_do_and_less_would_not() -> None:
             assert not holds(replace(found, sweep=changed(sweep, **{name: value - step})), own).all()
 
 
+@pytest.mark.parametrize("units", ["si", "us"])
+def test_a_change_that_is_named_would_do_as_it_is_printed(units: str) -> None:
+    given = ["boulder.height=2.8 m", "soil.friction_angle=36 deg"]
+    words = said(need(load(CONFIGS / "site.yaml", given)), units)
+    named = re.findall(r"([a-z_.]+) ([\d.]+) ?(°|[a-z/]+) or (?:less|more)", words)
+    assert [path for path, *_ in named] == ["vehicle.speed", "soil.friction_angle", "boulder.height"]
+    for path, value, unit in named:
+        found = need(load(CONFIGS / "site.yaml", [*given, f"{path}={value} {unit.replace('°', 'deg')}"]))
+        assert found.recommendation is not None
+        assert found.recommendation.design is not None, (path, value, unit)
+
+
 def test_a_boulder_that_passes_at_no_depth_names_the_speed_that_it_holds() -> None:
     found = need(CONFIGS / "abg.yaml")
     assert "passes at no depth; 1.446 m deep: overturns. It would qualify with vehicle.speed 3.62 m/s or" in said(found)

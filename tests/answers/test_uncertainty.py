@@ -25,7 +25,7 @@ from boulder_sweep.errors import PictureError, QuestionError
 from boulder_sweep.judge.judged import ERROR, FAIL, OVERRIDE, PASS, UNDECIDED, not_computed
 from boulder_sweep.judge.quantiles import values_of
 from boulder_sweep.runner.pool import Pool
-from boulder_sweep.settings import Sweep, load_text
+from boulder_sweep.settings import Sweep, load, load_text
 from boulder_sweep.settings.model import Distribution
 from tests.answers.designs import bare_need, site
 
@@ -96,6 +96,16 @@ def test_depth_for_a_probability() -> None:
     assert there.p_pass == pytest.approx(0.95, abs=0.006)
     certain = bare_need(site(**UNCERTAIN | {"friction": "38 deg"})).frame.passes_at[0]
     assert row.passes_at > certain
+
+
+@pytest.mark.parametrize("probability", [0.6, 0.95])
+def test_no_answer_has_less_than_the_probability_that_is_asked_for(probability: float) -> None:
+    heights = "boulder.height=[3.2, 3.4, 3.6] m"
+    uncertain = [f"vehicle.{key}={{mean: {mean}, cov: 10 %}}" for key, mean in (("speed", "30 mph"), ("mass", "7 t"))]
+    found = need(load("configs/uncertain_site.yaml", [heights, *uncertain]), probability=probability).frame
+    answered = found[found.passes_at.notna()]
+    assert len(answered) > 1
+    assert (answered.p_pass >= probability).all()
 
 
 def test_files(tmp_path: Path) -> None:

@@ -324,7 +324,7 @@ function summed(cells) {
   const [total, places] = [all.length, cells.length].map((n) => n.toLocaleString("en-US"));
   const first = `${passes(passing, `of the ${total} designs shown `)}.`;
   if (all.length === cells.length) return first;
-  return `${first} Designs lie on each other: the map has ${places} ${cells.length === 1 ? "place" : "places"}, each shown as the worst of its designs, which a click or Enter simulates.`;
+  return `${first} Designs lie on each other: the map has ${places} ${cells.length === 1 ? "place" : "places"}, each shown as the worst of its designs.`;
 }
 
 /**
