@@ -64,7 +64,7 @@ NARROWEST, LEANS = 0.55, 0.06
 FILLS = (0.45, 0.94)
 """Solidity of taped boulders."""
 TAPED_SHARE = 3
-"""One shape in so many is that of taped boulders."""
+"""One shape in so many is taped."""
 
 
 class GradeCounts(NamedTuple):

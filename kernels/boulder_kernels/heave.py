@@ -829,7 +829,7 @@ def forces(
         put(work, NEAR, n, on_near)
         put_levers(n, e.faces, on_far, on_near, work, f)
     far, near = summed(work, FAR, f.pieces), summed(work, NEAR, f.pieces)
-    # The faces slip along themselves, each with one speed all over, that of where it is pressed on.
+    # The faces slip along themselves, each with the speed of the point where it is pressed on.
     along, at = v_b * sin + w_b * cos, levers_of(far, near, work, f)
     F_far = -f.friction * far * slipping(along - omega_b * at.far, f)
     F_near = -f.friction * near * slipping(along - omega_b * at.near, f)

@@ -153,7 +153,7 @@ class Potential(NamedTuple):
     """Potential energy of soil, base and weight (Eq 136), and how it changes along x_b and along y_b."""
 
     u: float
-    """The energy [J]."""
+    """What is stored, and raised against the weight [J]."""
     Q_x: float
     Q_y: float
     """Minus its slopes [N]."""
