@@ -443,8 +443,9 @@ def _shown_part(need: Need) -> pa.Table:
 def _every_answer(need: Need, units: str) -> list[str]:
     """Return a table with a line for each answer."""
     rows = rows_of(_shown_part(need), units)
-    found = need.recommendation
-    mark = [_marker(need, units)] if found is not None and found.design is not None and found.boulders > 1 else []
+    best = need.recommendation  # whose boulder is told by its sides unless one of them is asked for
+    is_marked = best is not None and best.design is not None and best.boulders > 1 and need.key.name in EMBEDMENT
+    mark = [_marker(need, units)] if is_marked else []
     lines = table_lines([*mark, *_need_columns(need, units)], rows[:MOST_IN_ALL])
     if len(rows) > MOST_IN_ALL:
         lines.append(f"(the first {MOST_IN_ALL:,} of {len(rows):,} answers; -o writes them all)")

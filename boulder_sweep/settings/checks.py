@@ -287,10 +287,11 @@ def _on_list(sweep: Sweep, table: DesignList) -> Iterator[Problem]:
     """Yield what is to be remarked of the rows of a list, where they stand: of values alike, at the farthest off."""
     for name, values in table.columns.items():
         field = BY_NAME[name]
+        unit = "" if field.unit == "1" else field.unit  # which the name of the column gives
         far = is_unusual(values, field) if sweep.is_held(name) else np.zeros(values.shape, dtype=bool)
         if far.any():  # of single values and axes the file has been refused
             rows = counted(int(far.sum()), "design")
-            words = f"{_far_words(values[far], field, field.unit)}: {rows} not computed (error, unusual), the first is"
+            words = f"{_far_words(values[far], field, unit)}: {rows} not computed (error, unusual), the first is"
             words += f" design {far.argmax()}; {_allowing([*sweep.allowed, field.path])}"
             yield Problem(table.position(int(far.argmax())), words, field.path)
         off = np.flatnonzero(_outside(values, field) & ~far)
@@ -299,7 +300,7 @@ def _on_list(sweep: Sweep, table: DesignList) -> Iterator[Problem]:
             if len(some):
                 row = int(some[np.abs(values[some] - low).argmax()])
                 more = f" ({len(some) - 1} more like it)" if len(some) > 1 else ""
-                words = f"{table.called(row)}: {_unusual(name, values[row : row + 1], field.unit)}{more}"
+                words = f"{table.called(row)}: {_unusual(name, values[row : row + 1], unit)}{more}"
                 yield Problem(table.position(row), words, field.path)
     heavy = np.flatnonzero(sweep.fills > MOST_SOLIDITY)
     for row in heavy[:MAX_ALIKE].tolist():
@@ -307,11 +308,11 @@ def _on_list(sweep: Sweep, table: DesignList) -> Iterator[Problem]:
         words += f"{MOST_SOLIDITY:.0%} a size or the mass is wrong; not computed (error)"
         words += f" ({len(heavy)} boulders like it)" if len(heavy) > MAX_ALIKE else ""
         yield Problem(table.position(row), words, "boulder.mass")
-    ids = [(name, label.codes) for name, label in table.labels.items() if name[-2:] == "id"]
-    for name, codes in ids if all(BY_NAME[name].section == "boulder" for name in table.columns) else ():
-        again = np.setdiff1d(np.arange(len(codes)), np.unique(codes, return_index=True)[1])
-        if len(again):  # which one boulder does in a list of soils or vehicles, too
-            yield Problem(table.position(int(again[0])), f"{table.called(int(again[0]))} stands twice", name)
+    ids = [(name, one) for name, one in table.labels.items() if name.lower().endswith("id")]
+    for name, one in ids if all(BY_NAME[name].section == "boulder" for name in table.columns) else ():
+        again = np.setdiff1d(np.arange(len(table)), np.unique(one.codes, return_index=True)[1])
+        if twice := [row for row in again.tolist() if one.words[one.codes[row]]]:  # which it may with several soils
+            yield Problem(table.position(twice[0]), f"{one.words[one.codes[twice[0]]]} stands twice", name)
 
 
 def _on_mass(sweep: Sweep) -> str:

@@ -65,7 +65,7 @@ _AGS = {
     "ISPT": {"depth": "ISPT_TOP", "n": "ISPT_NVAL", "energy_ratio": "ISPT_ERAT"},
     "SCPT": {"depth": "SCPT_DPTH", CONE: "SCPT_RES"},
 }
-_AGS_WATER = {"ISPT": "ISPT_WAT", "SCPG": "SCPG_WAT", "WSTG": "WSTG_DPTH", "WSTK": "WSTK_DEP"}
+_AGS_WATER = {"ISPT": "ISPT_WAT", "SCPG": "SCPG_WAT", "WSTG": "WSTG_DPTH"}
 """Depths of ground water by the group [m]: at a test, under a cone, and as struck."""
 _WHOLE_MM = 450.0
 """Penetration of a whole test by AGS, with the seating drive."""

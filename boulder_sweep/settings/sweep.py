@@ -142,8 +142,8 @@ class DesignList:
 
     def called(self, row: int) -> str:
         """Return what the list calls the boulder of a row, ``stone_id 16``, else its number from 1 up."""
-        own = [f"{name} {label.words[label.codes[row]]}" for name, label in self.labels.items() if name[-2:] == "id"]
-        return own[0] if own else f"row {row + 1}"
+        own = [(name, one) for name, one in self.labels.items() if name.lower().endswith(("id", "name"))]
+        return f"{own[0][0]} {own[0][1].words[own[0][1].codes[row]]}" if own else f"row {row + 1}"
 
 
 @dataclass(frozen=True, eq=False)
