@@ -258,7 +258,7 @@ def reserve_lines(result: Reserves, units: str = "si") -> list[str]:
     lines = screen.lines(WRITTEN)
     lines += [*volume_lines(lines[0]), *wrapped(screen.signs)]
     lines += [*grade_lines(screen.rows), *foot_lines(result.sweep.model, reasons_in(result.arrow), units)]
-    return [*wrapped([f"{WITHOUT_MARGIN}; need --most speed asks with one:"]), *lines]
+    return [*wrapped([f"{WITHOUT_MARGIN} (need --most speed has one):"]), *lines]
 
 
 def reserve_screen(result: Reserves, units: str = "si") -> Screen:

@@ -144,12 +144,14 @@ def test_a_sensitive_boulder_is_recommended_as_such_only() -> None:
     ],
     ids=["car", "loose"],
 )
-def test_what_no_study_covers_is_said_first_though_it_stands_under_the_second_opinion(changes: dict, why: str) -> None:
+def test_what_no_study_covers_is_said_after_the_design_that_stands_under_the_second_opinion(
+    changes: dict, why: str
+) -> None:
     found = need(load(CONFIGS / "site.yaml", [f"{key}={value}" for key, value in changes.items()]))
     assert design_of(found).grade == "open"
     words = said(found)
-    assert words.startswith("Not graded: no study of second opinions covers ")
-    assert why in words.partition(" Bury the ")[0]
+    assert words.startswith("Bury the ")
+    assert why in words.partition(" Its grade is open: no study of second opinions covers ")[2]
     flags = words.partition("No crash test covers it: ")[2]
     assert why in flags
     assert all(BY_FLAG[name].meaning in flags for name in design_of(found).flags)
@@ -186,7 +188,7 @@ def test_what_second_opinions_do_not_know_is_asked_by_the_margin_alone() -> None
     found = need(printed)
     assert (found.robust, found.least_margin, design_of(found).grade) == (False, 0.25, "open")
     assert said(found).startswith("Not graded: second opinions know rock of given density and corrected")
-    assert "By the margin alone, bury the boulder (23.0 t)" in said(found)
+    assert "By the margin alone, bury the boulder 1.9" in said(found)
     with pytest.raises(QuestionError, match="second opinions know rock"):
         need(printed, robust=True)
 
@@ -319,6 +321,16 @@ vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*
     assert design.sizes[DEPTH] == found.frame.least_embedment_depth_m.max()
     assert chances["weak"] == found.frame.p_pass[found.frame.soil == "weak"].iloc[0]
     assert chances["firm"] > chances["weak"]
+
+
+@pytest.mark.parametrize(("at", "mass"), [("p5", "at least 24.0 t"), ("mean", "25.0 t")])
+def test_a_boulder_of_uncertain_density_has_its_rock_and_its_least_mass(at: str, mass: str) -> None:
+    text = TRUCKS.replace("density: 2600 kg/m^3}", "rock: granite}", 1)
+    assert f"Bury the 3.4 m granite boulder ({mass}) " in said(need(at_values(load_text(text, Path("g.yaml")), at)))
+
+
+def test_a_boulder_that_nothing_else_tells_apart_is_named_by_its_size() -> None:
+    assert "Bury the boulder 1.65 m long, 1.68 m wide and 3.4 m high (24.5 t) " in said(need(site(height="3.4 m")))
 
 
 def test_numbers_are_read_in_the_units_asked_for() -> None:

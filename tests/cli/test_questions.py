@@ -96,7 +96,8 @@ def test_the_lightest_boulder_says_at_which_ends_it_lies(sweep):
 
 
 def test_json_and_parquet_agree(sweep, tmp_path):
-    code, out, _ = sweep("need", CONFIG, "--json", "-o", tmp_path / "depths.parquet", "--plot", tmp_path / "d.png")
+    code, out, err = sweep("need", CONFIG, "--json", "-o", tmp_path / "depths.parquet", "--plot", tmp_path / "d.png")
+    assert err.endswith(f"written  {tmp_path / 'depths.parquet'}\nwritten  {tmp_path / 'd.png'}\n")
     found = json.loads(out)
     frame = pd.read_parquet(tmp_path / "depths.parquet")
     assert code == 0
@@ -222,7 +223,8 @@ def test_lines_json_and_parquet(sweep, tmp_path):
     assert code == 0
     assert all(len(line) <= 80 for line in out.splitlines())
     assert "simulated" in out
-    code, out, _ = sweep("capacity", CONFIG, *SHALLOW, "--json", "-o", tmp_path / "w.parquet")
+    code, out, err = sweep("capacity", CONFIG, *SHALLOW, "--json", "-o", tmp_path / "w.parquet")
+    assert err.endswith(f"written  {tmp_path / 'w.parquet'}\n")
     rows = json.loads(out)["rows"]
     frame = pd.read_parquet(tmp_path / "w.parquet")
     assert code == 0

@@ -6,6 +6,7 @@ import json
 import math
 import random
 import re
+import shutil
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from boulder_sweep.report import write_report, writing
 from boulder_sweep.report.answers import Measure, answer_of, screens
 from boulder_sweep.report.rows import read_rows
 from boulder_sweep.report.sheet import Sheet, sheet_of
+from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.sweep import Heading
 from tests.answers.designs import UNCERTAIN_FRICTION, bare_need, site
 from tests.report.conftest import OTHER_VALUES, places, put
@@ -51,9 +53,20 @@ def needs() -> dict[str, Need]:
 @pytest.fixture(scope="module")
 def files(needs: dict[str, Need], tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("sheets")
-    for name, found in needs.items():
+    for name, found in (needs | {"list": boulder_sweep.need(listed(folder))}).items():
         found.write(folder / f"{name}.parquet")
-    return {name: folder / f"{name}.parquet" for name in needs}
+    return {name: folder / f"{name}.parquet" for name in (*needs, "list")}
+
+
+def listed(folder: Path) -> Sweep:
+    """Return a list of granite boulders in the soil of a log."""
+    (folder / "list.csv").write_text("boulder_length_m,boulder_width_m,boulder_height_m\n" + "1.7,3,3.6\n1.7,3.2,3.8\n")
+    configs = Path(__file__).parents[2] / "configs"
+    shutil.copy(configs / "borehole_log.csv", folder)
+    text = (configs / "borehole_log.yaml").read_text()
+    text = re.sub(r"(?m)^boulder:.*\n(?: .*\n)*", "table: list.csv\nboulder: {rock: granite}\n", text)
+    (folder / "list.yaml").write_text(text)
+    return load(folder / "list.yaml")
 
 
 def sheet(file: Path, units: str = "si") -> Sheet:
@@ -169,7 +182,7 @@ def test_what_does_not_qualify_is_not_recommended(files: dict[str, Path]) -> Non
         assert "does not pass" in found.words["si"].recommendation[0]
 
 
-@pytest.mark.parametrize(("name", "printed"), [("depth", False), ("soils", True), ("grid", True)])
+@pytest.mark.parametrize(("name", "printed"), [("depth", False), ("soils", True), ("grid", True), ("list", False)])
 def test_a_map_is_printed_only_where_no_table_says_the_same(
     files: dict[str, Path], result: Path, name: str, printed: bool, tmp_path: Path, opened: Any
 ) -> None:
@@ -177,6 +190,27 @@ def test_a_map_is_printed_only_where_no_table_says_the_same(
     assert page.is_visible("#figure-sweep-map")
     page.emulate_media(media="print")
     assert page.is_visible("#figure-sweep-map") == printed
+
+
+def test_a_sheet_of_capacity_says_what_is_withstood_before_what_passes(tmp_path: Path) -> None:
+    boulder_sweep.capacity(site(height="3.4 m", site="embedment_depth: 2.3 m")).write(tmp_path / "capacity.parquet")
+    words = sheet(tmp_path / "capacity.parquet").words["us"]
+    assert words.question == "Which speed, which truck and which soil does the boulder withstand?"
+    assert re.match(r"It withstands a speed of [\d.]+ mph, a truck of \d+ lb and a friction ", words.recommendation[0])
+    assert words.recommendation[1].startswith("Bury the boulder 5.413")
+
+
+def test_the_first_page_names_where_soil_and_boulders_come_from(files: dict[str, Path]) -> None:
+    assert (
+        sheet(files["list"]).words["si"].ground.endswith(", from borehole_log.csv, hole BH-2. Boulders: from list.csv")
+    )
+
+
+def test_the_first_page_has_both_ends_of_a_mass_that_is_uncertain(files: dict[str, Path]) -> None:
+    built = dict(sheet(files["list"]).build)
+    low, high = (built[f"mass, {end} end"] for end in ("low", "high"))
+    assert low.value < high.value
+    assert "density of granite, low end" in built
 
 
 def test_a_spreadsheet_says_what_is_recommended(needs: dict[str, Need], files: dict[str, Path], tmp_path: Path) -> None:

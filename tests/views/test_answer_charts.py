@@ -97,6 +97,21 @@ def test_digits_of_a_probability(chance: float, text: str) -> None:
     assert chance_text(chance) == text
 
 
+def test_every_curve_with_an_answer_is_in_the_legend_and_whole_numbers_have_whole_ticks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[Figure] = []
+    monkeypatch.setattr("boulder_sweep.views.pictures.save", lambda fig, target: drawn.append(fig))
+    sweep = site(height="[10, 11, 12] ft", friction="[20, 36, 37, 38, 39, 40] deg")
+    found = need(sweep, margin=0, robust=False, prefer=None)
+    found.plot(tmp_path / "chart.png", units="us")
+    axes = drawn[0].axes[0]
+    answered = sorted(set(found.frame.friction_angle_deg[found.frame.passes_at.notna()]))
+    assert len(answered) == 5
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == [f"φ′ = {angle:g}°" for angle in answered]
+    assert all(tick == round(tick) for tick in axes.get_xticks())
+
+
 @pytest.mark.parametrize(
     ("probability", "words"), [("95 %", "passes with a probability of at least 95 %"), (None, "depth that passes")]
 )
