@@ -137,7 +137,8 @@ def answer_sheet(file, target, units="si"):
     blank = next((k for k, line in enumerate(lines) if not any(cell.value for cell in line)), -1)
     above, below, *rows = lines[blank + 1 :]
     heads = [f"{one.value or ''} {other.value or ''}".strip() for one, other in zip(above, below, strict=True)]
-    return [line[0].value for line in lines[: max(blank, 0)]], heads, rows
+    count = max(k for k, head in enumerate(heads) if head) + 1  # sentences may be wider
+    return [line[0].value for line in lines[: max(blank, 0)]], heads[:count], [row[:count] for row in rows]
 
 
 @pytest.mark.parametrize("units", ["si", "us"])

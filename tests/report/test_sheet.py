@@ -193,11 +193,11 @@ def test_a_map_is_printed_only_where_no_table_says_the_same(
 
 
 def test_a_sheet_of_capacity_says_what_is_withstood_before_what_passes(tmp_path: Path) -> None:
-    boulder_sweep.capacity(site(height="3.4 m", site="embedment_depth: 2.3 m")).write(tmp_path / "capacity.parquet")
+    boulder_sweep.capacity(site(height="3.4 m", site="embedment_depth: 2.6 m")).write(tmp_path / "capacity.parquet")
     words = sheet(tmp_path / "capacity.parquet").words["us"]
     assert words.question == "Which speed, which truck and which soil does the boulder withstand?"
     assert re.match(r"It withstands a speed of [\d.]+ mph, a truck of \d+ lb and a friction ", words.recommendation[0])
-    assert words.recommendation[1].startswith("Bury the boulder 5.413")
+    assert words.recommendation[1].startswith("Bury the boulder 5.413\u00a0ft long, ")
 
 
 def test_the_first_page_names_where_soil_and_boulders_come_from(files: dict[str, Path]) -> None:
