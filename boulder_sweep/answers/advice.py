@@ -179,8 +179,9 @@ class _Words:
 
     def mass(self, row: Mapping[str, Any]) -> str:
         """Return the mass of the boulder of a row, tonnes or pounds; of one taken at its low end that it is no less."""
-        taken = (self.need.sweep.taken_at.get(name, "") for name in ("boulder_density_kg_m3", BOULDER_MASS))
-        least = "at least " * any(how.endswith("low") for how in taken)
+        sweep = self.need.sweep
+        uncertain = BOULDER_MASS if BOULDER_MASS in sweep.plan.given else "boulder_density_kg_m3"
+        least = "at least " * sweep.taken_at.get(uncertain, "").endswith("low")
         if self.units == "us":
             return least + self.quantity("kg", row[BOULDER_MASS], ",.0f")
         return f"{least}{row[BOULDER_MASS] / 1000:.1f}{NO_BREAK_SPACE}t"

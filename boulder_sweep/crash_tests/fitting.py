@@ -306,7 +306,7 @@ def _far_out(name: str, value: float) -> str:
     if admitted.low <= value <= admitted.high and not is_unusual(np.array([value]), field)[0]:
         return ""
     unit = {"N/m": "kN/m", "N*s/m": "kN*s/m"}.get(field.unit, field.unit)
-    ends = range_words(usual.low, usual.high, field.unit, unit, ".4g")
+    ends = range_words(usual.low, usual.high, field.unit, unit, digits=4)
     return f"{range_words(value, value, field.unit, unit)} is far outside what vehicles have, {ends}"
 
 

@@ -18,16 +18,7 @@ import numpy as np
 from boulder_sweep.answers.advice import advice
 from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.outputs import CAPACITY, NEED, AnswerFile, kind_of, result_of
-from boulder_sweep.answers.printing import (
-    MARK,
-    WIDTH,
-    WITHOUT_MARGIN,
-    Screen,
-    designs_screen,
-    title,
-    wrapped,
-    yard_lines,
-)
+from boulder_sweep.answers.printing import MARK, WITHOUT_MARGIN, Screen, designs_screen, title, wrapped, yard_lines
 from boulder_sweep.columns import BOULDER_MASS, BY_NAME, DESIGN_ID
 from boulder_sweep.errors import ReportError
 from boulder_sweep.judge.quantities import NEEDED, QUANTITIES, quantities_by
@@ -56,7 +47,7 @@ MOST_SHEET_ROWS = 1_048_575
 """Most rows of a spreadsheet, without the header."""
 PIECE = 10_000
 """Rows that become cells at once."""
-LEAST_WIDTH, ABOUT_WIDTHS, LINE_POINTS = 14, (44, 12, 90), 15
+LEAST_WIDTH, ABOUT_WIDTHS, ANSWER_WIDTH, LINE_POINTS = 14, (44, 12, 90), 80, 15
 """Widths of columns, in characters."""
 CREATED = datetime(1980, 1, 1)
 """Date in every spreadsheet, so that the same rows give the same file."""
@@ -383,7 +374,7 @@ def _write_answer(book: Any, heading: Mapping[str, str], sentences: list[str], s
     lines = [*zip(*(head for head, _ in shown.columns), strict=True)]
     lines += [tuple(cell(row) for _, cell in shown.columns) for row in shown.rows]
     widths = [2 + max(map(len, texts)) for texts in zip(*lines, strict=True)]
-    widths += [LEAST_WIDTH] * -((sum(widths) - WIDTH) // LEAST_WIDTH)
+    widths += [LEAST_WIDTH] * -((sum(widths) - ANSWER_WIDTH) // LEAST_WIDTH)
     for number, width in enumerate(widths):
         sheet.set_column(number, number, width)
     wraps = book.add_format({"text_wrap": True, "valign": "top"})

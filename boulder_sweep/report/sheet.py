@@ -134,7 +134,8 @@ def _words(rows: ResultRows, answer: Answer, design: Design, names: Sequence[str
     found, said, asked = answer.need.recommendation, advice(answer.need, units), question(answer.need, units)
     ground = ground_words(rows.settings, units) or "dry, level, the same at every depth, without cohesion"
     derived, first = rows.settings.get("derived", {}), tuple[str, ...]()
-    ground += "".join(f", from {log_title(soil)}" for soil in derived.get("soil", ()) if "log" in soil)
+    logs = dict.fromkeys(log_title(soil) for soil in derived.get("soil", ()) if "log" in soil)
+    ground += "".join(f", from {title}" for title in logs)
     ground += "".join(f". Boulders: from {boulders['file']}" for boulders in derived.get("table", ()))
     if isinstance(rows.finished, AnswerFile) and isinstance(reserves := rows.finished.answers(), Reserves):
         asked, first = WITHSTANDS, (withstood(reserves, answer.named.number, units),)
@@ -210,13 +211,13 @@ def _build(rows: ResultRows, row: Mapping[str, Any], design: Design) -> tuple[tu
     built = zip(("excavation", "backfill"), TO_BUILD[1:], strict=True)
     mass, density = row.get(BOULDER_MASS) or float(rows.mass().flat[0]), float(row["boulder_density_kg_m3"])
     rock = "".join(kind["name"] for kind in rows.settings.get("derived", {}).get("rock", ())) or "rock"
-    words, lines = "", list[tuple[str, Cell]]()
-    if rows.settings.get("taken_at", {}).get("boulder_density_kg_m3", "").endswith("low"):
-        words = ", low end"
-        largest = max(case.get("boulder_density_kg_m3", density) for case in rows.settings.get("judged_at", ()))
-        lines = [("mass, high end", Measure(float(mass) * largest / density, "kg"))]
-    lines = [(f"mass{words}", Measure(float(mass), "kg")), *lines]
-    lines.append((f"density of {rock}{words}", Measure(density, "kg/m^3")))
+    low = ", low end" * rows.settings.get("taken_at", {}).get("boulder_density_kg_m3", "").endswith("low")
+    of_mass = "" if BOULDER_MASS in rows.settings["inputs"] else low
+    lines: list[tuple[str, Cell]] = [(f"mass{of_mass}", Measure(float(mass), "kg"))]
+    judged = [case.get("boulder_density_kg_m3") for case in rows.settings.get("judged_at", ()) if of_mass]
+    if high := max((other for other in judged if isinstance(other, float)), default=0.0):
+        lines.append(("mass, high end", Measure(float(mass) * high / density, "kg")))
+    lines.append((f"density of {rock}{low}", Measure(density, "kg/m^3")))
     if _is_taped(row):
         lines.append(("fills of its box", f"{row['solidity']:.0%}"))
         lines.append(("drawn: worst of its shapes", row["shape"].replace("_", " ")))

@@ -114,7 +114,7 @@ def _far_words(values: np.ndarray, field: Field, written: str = "") -> str:
     """Return how far values are from usual, in the unit in which they were written, if any."""
     assert field.usual is not None
     low, high = float(values.min()), float(values.max())
-    usual = range_words(field.usual.low, field.usual.high, field.unit, written, ".4g")
+    usual = range_words(field.usual.low, field.usual.high, field.unit, written, digits=4)
     remark = field.usual.remark.partition("; a bare number")[0] if written else field.usual.remark
     far = f"less than 1/{fields.FAR:g} of" if high < field.usual.low else f"more than {fields.FAR:g} times"
     if low < field.usual.low < high:
@@ -407,7 +407,7 @@ def _unusual(name: str, values: np.ndarray, written: str = "") -> str:
         return ""
     low, high = float(values.min()), float(values.max())
     given = range_words(low, high, unit, written)
-    ends = range_words(usual.low, usual.high, unit, written, ".4g")
+    ends = range_words(usual.low, usual.high, unit, written, digits=4)
     remark = usual.remark.partition("; a bare number")[0] if written else usual.remark
     return f"{given} is outside the usual range of {ends} ({remark}); {_outcome(name, low, high)}"
 

@@ -305,12 +305,12 @@ def named(word: str, among: Sequence[Field] = INPUTS) -> Field:
 
 
 def default_text(field: Field, units: str = "si") -> str:
-    """Return the default of an entry with its unit, to five digits in US units; empty where there is none."""
+    """Return the default of an entry with its unit, to four digits in US units; empty where there is none."""
     value = field.shown_default
     if value is None or isinstance(value, str):
         return value or ""
     unit, size = shown_unit(field.unit, units) if units == "us" else (field.unit, 1.0)
-    return describe(value, unit) if size == 1.0 else f"{value / size:.4g} {unit}"
+    return describe(value / size, unit, digits=6 if size == 1.0 else 4)
 
 
 CATEGORIES: dict[str, tuple[tuple[str, str], tuple[int, ...]]] = {

@@ -16,6 +16,7 @@ import numpy as np
 
 from boulder_sweep.columns import RATINGS
 from boulder_sweep.settings.problems import Position
+from boulder_sweep.settings.units import rounded
 from boulder_sweep.stones.rock import ROCKS, is_flat
 
 PRESETS = ("as_printed", "corrected")
@@ -346,9 +347,9 @@ class Distribution:
     def words(self, unit: str, size: float = 1.0) -> str:
         """Return kind and spread in words, in a unit of which one is `size` in the unit of the column."""
         unit = "" if unit == "1" else f" {unit}"
-        sd, mode = (None if value is None else f"{value / size:.4g}{unit}" for value in (self.sd, self.mode))
-        spread = f"sd {sd}" if self.cov is None else f"cov {100.0 * self.cov:.4g} %"
-        ends = f"{self.low / size:.4g} to {self.high / size:.4g}{unit}"
+        sd, mode = (None if value is None else f"{rounded(value / size)}{unit}" for value in (self.sd, self.mode))
+        spread = f"sd {sd}" if self.cov is None else f"cov {rounded(100.0 * self.cov)} %"
+        ends = f"{rounded(self.low / size)} to {rounded(self.high / size)}{unit}"
         return {
             "uniform": f"uniform, {ends}",
             "triangular": f"triangular, {ends}, most likely {mode}",

@@ -542,14 +542,19 @@ def _shown_setting(value: Any, size: float, units: str) -> Any:
     return float(in_unit(np.array(value), size)) if isinstance(value, float) and size != 1.0 else value
 
 
-def describe(value: float, unit: str, written: str = "", digits: str = ".6g") -> str:
+def rounded(value: float, digits: int = 4) -> str:
+    """Return a number in a few digits, without an exponent where it has at most six."""
+    return f"{float(f'{value:.{digits}g}'):g}"
+
+
+def describe(value: float, unit: str, written: str = "", digits: int = 6) -> str:
     """Return a value of a unit of the table, for messages: in the unit in which it was written, if any."""
     if written:
         value, unit = value / float(factor(written, unit)), written
-    return f"{value:{digits}}" if unit == "1" else f"{value:{digits}} {unit}"
+    return rounded(value, digits) if unit == "1" else f"{rounded(value, digits)} {unit}"
 
 
-def range_words(low: float, high: float, unit: str, written: str = "", digits: str = ".6g") -> str:
+def range_words(low: float, high: float, unit: str, written: str = "", digits: int = 6) -> str:
     """Return a range, or the one value that both its ends are; other arguments: see `describe`."""
     ends = describe(low, unit, written, digits), describe(high, unit, written, digits)
     return ends[1] if low == high else f"{ends[0].split()[0]} to {ends[1]}"

@@ -60,7 +60,8 @@ def files(needs: dict[str, Need], tmp_path_factory: pytest.TempPathFactory) -> d
 
 def listed(folder: Path) -> Sweep:
     """Return a list of granite boulders in the soil of a log."""
-    (folder / "list.csv").write_text("boulder_length_m,boulder_width_m,boulder_height_m\n" + "1.7,3,3.6\n1.7,3.2,3.8\n")
+    rows = "".join(f"1.7,3,{3.4 + row / 50}\n" for row in range(17))  # more than a table shows
+    (folder / "list.csv").write_text(f"boulder_length_m,boulder_width_m,boulder_height_m\n{rows}")
     configs = Path(__file__).parents[2] / "configs"
     shutil.copy(configs / "borehole_log.csv", folder)
     text = (configs / "borehole_log.yaml").read_text()
