@@ -158,7 +158,7 @@ def test_a_change_is_moved_to_where_a_predicate_changes_that_is_nearly_the_same(
     roughly, begins = rng.integers(200, 800, 300), np.empty(300, dtype=np.int64)
     begins[:] = roughly + rng.integers(-1, 2, 300) * 2 ** rng.integers(0, 7, 300)
     begins[:4] = 5000, -5000, -5000, 5000  # never holds, always, and the same downwards
-    roughly[4:6], begins[4:6] = (255, 746), (1, 1000)  # the 255th place from where it was, the first of its range
+    roughly[4:6], begins[4:6] = (256, 745), (1, 1000)  # the 256th place from where it was, the first of its range
 
     def predicate(at: np.ndarray) -> Predicate:
         return lambda rows, places: np.where((places >= at[rows]) ^ (first[rows] > last[rows]), HOLDS, FAILS)

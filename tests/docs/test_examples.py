@@ -19,7 +19,7 @@ SAID = {
     "wet_backfill": r"pass +\d+",
     "clayey_terrace": r"PASS, 16\.8° of 20°",
     "embankment": r"2\.3 +3 +12\.76",
-    "quarry_stone": r"\(23\.0 t\)\s+2\.609 m deep",
+    "quarry_stone": r"\(23\.0 t\)\s+2\.609 m\s+deep",
     "uncertain_site": r"2\.322",
 }
 """What the commands print of the answer."""
