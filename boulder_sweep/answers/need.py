@@ -7,6 +7,7 @@ run`` would judge them. If that disagrees, the row is searched again with the ac
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -45,6 +46,9 @@ if TYPE_CHECKING:
 
     from boulder_sweep.settings import Sweep
     from boulder_sweep.settings.loader import Settings
+
+WORTH_A_THREAD = 2048
+"""Rows for which another thread is worth starting."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -249,7 +253,8 @@ def _answered(
     judges, key = asked.judges, asked.key
     judges.final.asked().warm_up()
     done = _Progress(progress, asked)
-    pieces = list(ranges(asked.count, asked.rows_at_once))
+    shared = max(-(-asked.count // (jobs or os.cpu_count() or 1)), WORTH_A_THREAD)
+    pieces = list(ranges(asked.count, min(asked.rows_at_once, shared)))
     tables, simulated = [], 0
     for table, count in Pool(jobs)(call(_table_of, asked, start, stop) for start, stop in pieces):
         tables.append(table)

@@ -219,7 +219,7 @@ class Question(ValueSearch):
         The search range is empty, too narrow or not admitted, or it reaches below the readings of the soil that count.
     """
 
-    rows_at_once = 4096
+    rows_at_once = 8192
     """Rows of a block; small enough that an interruption takes effect soon."""
     tried: Callable[[int], None] | None = None
     """Called with how many values have been tried, by the threads that try them; for questions with slow rows."""
