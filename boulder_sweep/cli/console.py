@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.columns import BY_NAME, VERDICTS, WAY_OUT
 from boulder_sweep.settings.fields import TO_BE_FOUND
-from boulder_sweep.settings.model import FOOT_WORDS, RESISTANCES
+from boulder_sweep.settings.model import FOOT_WORDS
 from boulder_sweep.settings.units import ShownColumn, shown_column, shown_settings, shown_unit
 from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.text import counted, duration_text, size_text
@@ -72,7 +72,6 @@ def summary_lines(name: str, summary: Summary) -> list[str]:
         "",
         *robustness_lines(summary.reasons),
         *foot_lines(summary.boulder, summary.reasons),
-        *firmness_lines(summary.firmness),
         *accuracy_lines(summary.accuracy),
         f"table  {summary.out} ({counted(summary.parts, 'file')}, {size_text(summary.bytes)})",
         f"open   boulder_sweep.read({str(summary.out)!r})",
@@ -110,26 +109,6 @@ def foot_lines(boulder: Mapping[str, Any], reasons: Mapping[str, int]) -> list[s
 
 def _indent(text: str, indent: str) -> list[str]:
     return textwrap.wrap(text, 80, initial_indent=indent, subsequent_indent=indent)
-
-
-def firmness_lines(firmness: Mapping[str, Any]) -> list[str]:
-    """Return how firm the passes are, from a sample of the designs; nothing where none of it passes."""
-    lost = firmness["lost"]
-    if not lost:
-        return []
-    laws = ", ".join(f"{law} {share:.0%}" for law, share in lost.items() if law in RESISTANCES)
-    shares = ", ".join(
-        (
-            f"the other reading of the paper {lost['reading']:.0%}",
-            f"1 deg less friction angle {lost['friction_angle']:.0%}",
-            f"5 % more speed {lost['speed']:.0%}",
-            f"another soil model without friction: {laws}",
-        )
-    )
-    sample = f"{firmness['passes']:,} passes of a sample of {counted(firmness['designs'], 'design')}"
-    lines = textwrap.wrap(f"firm?  of {sample} fail by {shares}", 80, subsequent_indent="       ")
-    shares = ", ".join(f"{name} {count / firmness['passes']:.0%}" for name, count in firmness["flags"].items() if name)
-    return [*lines, *_indent(f"flags: {shares}", "       ")] if shares else lines
 
 
 def accuracy_lines(accuracy: Mapping[str, Any]) -> list[str]:

@@ -39,7 +39,7 @@ _DECIDING_SOURCES = (
 )
 """Modules, in addition to the kernels, whose code determines the rows: of settings and stones what others import."""
 _JSON = {"format", "settings", "readings", "control", "accuracy", "versions"} | {
-    *("rows", "ranges", "range", "verdicts", "firmness"),  # of parts only
+    *("rows", "ranges", "range", "verdicts"),  # of parts only
 }
 """Entries of the metadata that are JSON."""
 _OWN = tuple(f"{PREFIX}{name}".encode() for name in ("range", "verdicts"))
@@ -221,8 +221,8 @@ def file_metadata(identity_: Mapping[str, Any], **more: Any) -> dict[bytes, byte
     identity_
         See `identity`.
     more
-        Of a part: ``rows`` of its table, the number of its ``ranges``, and ``firmness``, see
-        `boulder_sweep.judge.firmness`. Of answers: the command that would ``repeat`` them.
+        Of a part: ``rows`` of its table and the number of its ``ranges``. Of answers: the command that would ``repeat``
+        them.
     """
     return {
         f"{PREFIX}{key}".encode(): (value if isinstance(value, str) else canonical(value)).encode(
