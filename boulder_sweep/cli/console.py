@@ -72,7 +72,7 @@ def summary_lines(name: str, summary: Summary) -> list[str]:
         "",
         *robustness_lines(summary.reasons),
         *foot_lines(summary.boulder, summary.reasons),
-        *accuracy_lines(summary.accuracy),
+        accuracy_line(summary.accuracy),
         f"table  {summary.out} ({counted(summary.parts, 'file')}, {size_text(summary.bytes)})",
         f"open   boulder_sweep.read({str(summary.out)!r})",
         f"       pandas.read_parquet({str(summary.out)!r})",
@@ -111,25 +111,14 @@ def _indent(text: str, indent: str) -> list[str]:
     return textwrap.wrap(text, 80, initial_indent=indent, subsequent_indent=indent)
 
 
-def accuracy_lines(accuracy: Mapping[str, Any]) -> list[str]:
-    """Return the accuracy of a sweep; nothing if its table does not record it."""
-    if not accuracy:
-        return []
+def accuracy_line(accuracy: Mapping[str, Any]) -> str:
+    """Return the accuracy of a sweep."""
     steps = f"step {1e3 * accuracy['step_s']:g} ms"
     if accuracy["reported_step_s"] != accuracy["step_s"]:
         steps += f" and {1e3 * accuracy['reported_step_s']:g} ms"
     if accuracy["yield_located"]:
         steps += ", yield located"
-    line = f"steps  {accuracy['asked']}: {steps}, verdicts {accuracy['verdicts']}"
-    if "pilot_designs" not in accuracy:
-        return [line]
-    sample = counted(accuracy["pilot_designs"], "design")
-    error = accuracy["estimated_error_p99_9_deg"]
-    of_pilot = f"of a pilot of {sample}"
-    reached = (
-        f"unknown for more than 0.1 % {of_pilot}" if error is None else f"at most {error:g} deg in 99.9 % {of_pilot}"
-    )
-    return [line, f"       estimated error {reached}{'' if accuracy['met'] else ': no step does better'}"]
+    return f"steps  {accuracy['asked']}: {steps}, verdicts {accuracy['verdicts']}"
 
 
 def dry_run_lines(sweep: Sweep, out: Location, effort: Estimate, objection: str) -> list[str]:

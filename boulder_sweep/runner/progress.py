@@ -165,7 +165,7 @@ class Summary:
     parts, bytes
         Files of the table and their size.
     accuracy
-        The accuracy requested, the step chosen for it, and the error estimated by a pilot.
+        The accuracy requested, and its steps.
     notes
         What the user should know: damaged parts that were computed again, a heading that stays.
     boulder

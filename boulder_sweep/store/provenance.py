@@ -80,7 +80,7 @@ def identity(
     control
         How the motion is integrated: step, horizon, limit, soil elements.
     accuracy
-        The accuracy requested, the step chosen for it, and the error estimated by a pilot.
+        The accuracy requested, and its steps.
 
     Returns
     -------

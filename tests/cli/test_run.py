@@ -161,7 +161,7 @@ def interrupted(signum):
 def test_the_command_to_go_on_repeats_every_option(sweep, grid, monkeypatch):
     monkeypatch.setattr("boulder_sweep.runner.run.run", interrupted(2))
     words = ["-o", "my out", "--jobs", "2", "--backend", "dask", "--set", "vehicle.speed=20 mph"]
-    words += ["--accuracy", "0.01 deg", "--second-opinion"]
+    words += ["--accuracy", "fine", "--second-opinion"]
     code, _, err = sweep("run", grid, *words)
     assert code == 130
     assert shlex.split(err.partition("Resume with:\n  ")[2]) == ["sweep", "run", "grid.yaml", *words, "--resume"]
