@@ -88,17 +88,22 @@ class Key:
 
 
 def key_of(word: str, *, most: bool = False) -> Key:
-    """Return the input that a path, key or column names; ``mass`` is the boulder's.
+    """Return the input that a path, key or column names.
 
     Raises
     ------
     QuestionError
-        The word names no input or several.
+        The word names no input, several, or the mass of the boulder.
     """
     try:
         field = BOULDER_MASS if word == BOULDER_MASS.key else named(word)
     except UnknownNameError as problem:
         raise QuestionError(str(problem)) from None
+    if field is BOULDER_MASS:
+        raise QuestionError(
+            "the mass of a boulder is not searched: give its sides as ranges, and `sweep need` names the lightest "
+            "boulder that qualifies (vehicle.mass is the truck's)"
+        )
     return Key(field, most)
 
 

@@ -29,6 +29,7 @@ from boulder_sweep.answers.search import (
     steady,
 )
 from boulder_sweep.answers.trials import (
+    DEPTH,
     NO_FACE,
     SHARE,
     UNASKED_M,
@@ -60,7 +61,6 @@ SHALLOW, SLIDES_M = 0.45, 0.1
 that pass, in stretches of 1 % of the value and less."""
 FINE_CELLS = 400
 """Pieces into which the range of such a boulder is cut."""
-DEPTH = EMBEDMENT[1]
 COARSE_DEPTHS, FINE_DEPTHS, DEPTH_ROUNDS = 7, 5, 5
 """Number of depths, where it is to be found: on the first lattice, on each finer one, and of finer ones, each half as
 wide as the one before: in the end they are 1/128 of the range apart, some 10 mm."""
