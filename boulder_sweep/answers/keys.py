@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_sweep.answers.spread import narrowed
 from boulder_sweep.answers.trials import LEAST_RATIO
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings import fields
@@ -165,8 +164,7 @@ def range_of(sweep: Sweep, key: Key, given: Mapping[str, np.ndarray], between: E
     """Return the search range of the input, row by row.
 
     Where the input is an axis of the grid, the axis is the range; for the largest speed or mass of the vehicle it
-    begins as `MILDEST` says all the same. Ends that the user gave take precedence. If the input has a distribution,
-    its mean is searched, where the distribution is within the admitted range.
+    begins as `MILDEST` says all the same. Ends that the user gave take precedence.
 
     Returns
     -------
@@ -176,16 +174,8 @@ def range_of(sweep: Sweep, key: Key, given: Mapping[str, np.ndarray], between: E
     Raises
     ------
     QuestionError
-        The range is empty, or the distribution of the input cannot take the means of the range.
+        The range is empty.
     """
-    low, high = _whole_range(sweep, key, given, between)
-    return narrowed(sweep, key.name, low, high, least=key.step, given=between is not None)
-
-
-def _whole_range(
-    sweep: Sweep, key: Key, given: Mapping[str, np.ndarray], between: Ends
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the search range, whatever the distribution of the input; arguments: see `range_of`."""
     one = np.ones(len(next(iter(given.values()))))
     if between is not None:
         try:

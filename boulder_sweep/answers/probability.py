@@ -26,8 +26,10 @@ from boulder_sweep.answers.trials import (
     rows_at,
     ungraded,
 )
+from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.judged import OVERRIDE
 from boulder_sweep.runner.pool import Pool
+from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
@@ -95,16 +97,21 @@ class ProbabilityQuestion(Question):
     Raises
     ------
     QuestionError
-        `Question` refuses, no input has a distribution, or the distribution of the input asked for cannot move with
-        its mean.
+        `Question` refuses, no input has a distribution, or the one that is asked for has.
     """
 
     rows_at_once = 4
     cells = 6
 
     def __init__(self, sweep: Sweep, key: Key, between: Ends, judges: Judges, probability: float, seed: int) -> None:
+        for name in EMBEDMENT if key.name in EMBEDMENT else (key.name,):
+            if name in sweep.distributions:
+                raise QuestionError(
+                    f"{key.field.path} is asked for, and {BY_NAME[name].path} has a distribution: give it one value "
+                    f"(--set {BY_NAME[name].path}=VALUE), in the place of which the answer is tried"
+                )
         super().__init__(sweep, key, between, judges)
-        self.sampling = Sampling(Spread(sweep, key.name), judges, probability, seed)
+        self.sampling = Sampling(Spread(sweep), judges, probability, seed)
 
     def trial(self, rows: InputRows, *, roughly: bool = False) -> Trial:
         """Return the object that tries values in some rows, roughly by few points."""
