@@ -13,7 +13,6 @@ from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.fields import BOULDER_MASS, UnknownNameError, named
 from boulder_sweep.settings.problems import Position, SettingsError
-from boulder_sweep.settings.soil_readings import covered_depth
 from boulder_sweep.settings.tree import Scalar
 from boulder_sweep.settings.values import NumberError, outside, read_quantity, read_single, refuse_bare
 
@@ -239,23 +238,6 @@ def refuse_narrow(sweep: Sweep, key: Key, pieces: Iterable[Mapping[str, np.ndarr
             most, widest = held[row], (low[row], high[row])
     if between is not None and most == 1:
         raise _unsearchable(key, *widest, "only one multiple")
-
-
-def refuse_deep(sweep: Sweep, foot_m: float, ranged: str) -> None:
-    """Refuse a search whose deepest foot is below readings of the soil that were left out, by a `QuestionError`.
-
-    `ranged` is what the file must give so that deeper readings count.
-    """
-    covered = covered_depth(sweep.derived)
-    if foot_m < covered:
-        return
-    remedy = f"they count where the file gives {ranged}"
-    if sweep.table is not None:
-        remedy = "search less deep (--between); or they count where the table has a design with such a foot"
-    raise QuestionError(
-        f"the search goes down to a foot at {foot_m:.4g} m, and the readings of the soil below {covered:.4g} m were "
-        f"left out, since no foot in the file is so deep; {remedy}"
-    )
 
 
 def reach_of(key: Key, given: Mapping[str, np.ndarray]) -> np.ndarray | float:

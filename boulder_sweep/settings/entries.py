@@ -1,7 +1,7 @@
 """Read the entries of a file block by block; after a mistake reading goes on with the next entry.
 
 Entries that are more than a number have readers of their own: words, readings of the paper, soil representation,
-accuracy, second opinions, layers, and the shape of the boulder, by a profile or by a scan.
+second opinions, layers, and the shape of the boulder, by a profile or by a scan.
 """
 
 from __future__ import annotations

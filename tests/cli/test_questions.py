@@ -331,6 +331,8 @@ def test_every_command_is_run_and_leads_on(sweep, tmp_path, monkeypatch, words):
         assert len(options) == len(set(options))
         assert not {"--robust", "--any"} <= set(options)
         assert sorted(command) != sorted(["need", "my site.yaml", *words[1:]])
+        if any("count: " in word for word in command):  # of more boulders the depth is asked
+            assert {"--least", "--between"}.isdisjoint(command)
         for option, value in pairwise(words):
             if option in KEPT:
                 assert command[command.index(option) + 1] == value
@@ -339,6 +341,22 @@ def test_every_command_is_run_and_leads_on(sweep, tmp_path, monkeypatch, words):
         code, answer, err = sweep(*command, "-q")
         assert (code, err) == (0, "")
         assert re.search(r"\b[Bb]ury\s+the\s", answer)
+
+
+@pytest.mark.parametrize(
+    ("depths", "more"),
+    [
+        ("embedment_ratio=[0.4, 0.5]", True),
+        ("embedment_ratio=[0.2, 0.5]", True),
+        ("embedment_depth=[1.5 m, 1.6 m]", True),
+        ("embedment_ratio=[0.3, 0.8]", False),
+        ("embedment_ratio=0.5", False),
+    ],
+)
+def test_a_narrow_range_of_depths_is_widened(sweep, depths, more):
+    _, out, _ = sweep("need", CONFIGS / "site.yaml", "-q", *LOW, "--set", f"site.{depths}")
+    (command,) = (one for one in suggested(out) if any("count: " in word for word in one))
+    assert ("site.embedment_ratio=[0.35, 0.75]" in command) == more
 
 
 def test_a_probability_is_kept(sweep, tmp_path, monkeypatch):
