@@ -23,7 +23,7 @@ from boulder_sweep.settings.sweep import SHOWN
 
 PREFIX = "boulder_sweep."
 """Prefix of this package's entries in the metadata of a file."""
-FORMAT = 3
+FORMAT = 4
 """Version of the format of tables and answers: one more whenever a column or entry comes, goes or changes meaning."""
 _PACKAGES = ("boulder-sweep", "numpy", "numba", "llvmlite", "pyarrow")
 _PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
