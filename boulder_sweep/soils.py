@@ -71,10 +71,10 @@ def layer_coefficients(table: Any, law: str) -> np.ndarray:
     return np.stack([coefficients(plain(table)._replace(phi=phi.copy()), law) for phi in angles], axis=-1)
 
 
-def ground_of(law: str, ground: Ground, turned: float = 0.0) -> kernels.Ground:
+def ground_of(law: str, ground: Ground) -> kernels.Ground:
     """Return the soil as it lies as the kernels take it; parameters: see `with_soil`."""
     layers = np.array([astuple(layer) for layer in ground.layers]).reshape(-1, 5)
-    layers[:, 2] = np.radians(layers[:, 2]) + turned
+    layers[:, 2] = np.radians(layers[:, 2])
     water = np.inf if ground.water_table_m is None else ground.water_table_m
     return kernels.Ground(
         RESISTANCES.index(law), float(np.radians(ground.slope_deg)), float(water), float(ground.cohesion_kPa), layers
@@ -95,7 +95,7 @@ def profile_of(shape: Shape) -> np.ndarray:
     return np.array([] if shape.is_box else [astuple(point) for point in shape.points]).reshape(-1, 4)
 
 
-def with_soil(table: DesignTable, law: str, ground: Ground, turned: float = 0.0, shape: Shape | None = None) -> Any:
+def with_soil(table: DesignTable, law: str, ground: Ground, shape: Shape | None = None) -> Any:
     """Return n designs with the ultimate resistance of a law in the soil as it lies.
 
     Parameters
@@ -106,8 +106,6 @@ def with_soil(table: DesignTable, law: str, ground: Ground, turned: float = 0.0,
         A name of `boulder_sweep.settings.model.RESISTANCES`.
     ground
         The rest.
-    turned
-        Change of the friction angles of the deeper layers [rad].
     shape
         Shape of the boulders; boxes by default.
 
@@ -122,8 +120,7 @@ def with_soil(table: DesignTable, law: str, ground: Ground, turned: float = 0.0,
     profile, n = profile_of(shape), table.d.size
     table = table._replace(K_epsilon=table.K_epsilon.copy())
     layers, outlines = np.empty((n, layers_count(law, ground, shape), 6)), np.empty((n, len(profile), 4))
-    lies = ground_of(law, ground, turned)
-    kernels.put_soil(table, lies, not ground.is_proportional, SLICES, profile, layers, outlines)
+    kernels.put_soil(table, ground_of(law, ground), not ground.is_proportional, SLICES, profile, layers, outlines)
     is_uniform = shape.is_box and ground.is_proportional
     return table if is_uniform else PiecewiseTable(*table, layers, outlines)
 

@@ -7,12 +7,10 @@ import shlex
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
-from boulder_sweep.answers.lightest import DEPTH, HEIGHT, RATIO
+from boulder_sweep.answers.keys import sweep_ranges
 from boulder_sweep.answers.recommendation import OF_A_DESIGN, Design, Nearest, Recommendation
 from boulder_sweep.answers.search import FAULTY, WORDS
-from boulder_sweep.answers.trials import USUALLY
+from boulder_sweep.answers.trials import DEPTH, HEIGHT, RATIO, USUALLY
 from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.designs import SIDES
 from boulder_sweep.judge.robustness import MEANINGS, can_be_asked
@@ -35,6 +33,8 @@ BEST = {"mass": "the lightest", "depth": "the shallowest", "excavation": "the on
 """What the recommended design is, by preference."""
 MOST_NAMED = 6
 """Most boulders that are named one by one because they will not do."""
+SIZES = 7
+"""Values of a side that are suggested where no boulder of the file qualifies."""
 ROUNDED = 0.01
 """Share by which rounding may make a side smaller than the usual one."""
 
@@ -112,28 +112,25 @@ def next_questions(need: Need, again: Again, units: str = "si") -> list[tuple[st
         questions.append(("with less to spare", less))
     wider = _wider(need, units)
     if wider:
-        command = again.asking(("--least", "mass"), *wider, without=("--most", "--between"))
-        questions.append(("the lightest boulder that does", command))
-    elif need.key.name == BOULDER_MASS and (need.least_margin or need.robust):
-        bare = again.asking(("--margin", "0"), ("--any",), without=("--robust",))
-        questions.append(("the lightest boulder that passes at all", bare))
+        questions.append(("the lightest of more boulders", again.asking(*wider, without=("--least", "--between"))))
     return questions
 
 
 def _wider(need: Need, units: str) -> list[tuple[str, ...]]:
-    """Return options that widen the ranges of a file in which a boulder is looked for; none if they are as wide."""
+    """Return options by which a file has more boulders and depths; none if they are as many as are usual."""
     given = need.sweep.plan.given
     options: list[tuple[str, ...]] = []
     if need.sweep.table is not None or not need.sweep.model.shape.is_box or BOULDER_MASS in given:
         return []
-    ratio = np.array(USUALLY) if need.sweep.depth_sought else given[RATIO].values if RATIO in given else np.zeros(1)
-    if ratio.min() > USUALLY[0] or ratio.max() < USUALLY[1]:
+    ranges = sweep_ranges(need.sweep)
+    low, high = ranges.get(RATIO, USUALLY)
+    if DEPTH in ranges or low > USUALLY[0] or high < USUALLY[1]:
         options.append(("--set", f"site.embedment_ratio=[{USUALLY[0]:g}, {USUALLY[1]:g}]"))
     for name in SIDES[1:]:
         usual, values = BY_NAME[name].usual, given[name].values
         if usual is not None and values.max() < usual.high * (1.0 - ROUNDED):
-            ends = (quantity_text("m", units, _down(end, units)) for end in (values.min(), usual.high))
-            options.append(("--set", f"{BY_NAME[name].path}=[{', '.join(ends)}]"))
+            ends = tuple(quantity_text("m", units, _down(end, units)) for end in (values.min(), usual.high))
+            options.append(("--set", f"{BY_NAME[name].path}={{from: {ends[0]}, to: {ends[1]}, count: {SIZES}}}"))
     return options
 
 
@@ -158,8 +155,7 @@ class _Words:
         self.need, self.found, self.units = need, found, units
         given = need.sweep.plan.given
         several = [name for name, one in given.items() if name in BY_NAME and one.values.min() < one.values.max()]
-        by_mass = need.key.name == BOULDER_MASS
-        self.told_apart = [name for name in SIDES if name in several or name == need.key.name or by_mass] or [*SIDES]
+        self.told_apart = [name for name in SIDES if name in several or name == need.key.name] or [*SIDES]
         self.rocks = "boulder_density_kg_m3" in several
         self.conditions = [name for name in several if name not in OF_A_DESIGN]
         self.kind = "designs" if found.of_run else "boulders"
@@ -253,8 +249,6 @@ class _Words:
         if found.of_run:
             which = f"Which of {found.boulders:,} boulders and depths" if found.boulders > 1 else "Does the boulder"
             return f"{which} {'stops' if found.boulders > 1 else 'stop'} {stops}?"
-        if need.key.name == BOULDER_MASS:
-            return f"Which is the lightest boulder that stops {stops}?"
         if need.key.name not in EMBEDMENT:
             return f"How {ALONG.get(need.key.name, 'dense')} must the boulder be to stop {stops}?"
         if found.boulders == 1:
@@ -301,7 +295,7 @@ class _Words:
     def why(self, design: Design) -> str:
         """Return why it is this boulder, as a sentence that follows another."""
         found, best = self.found, BEST[self.found.prefer]
-        if self.need.key.name == BOULDER_MASS or found.boulders == 1:
+        if found.boulders == 1:
             return ""
         if found.qualified == 1:
             return f" No other of the {found.boulders:,} {self.kind} qualifies."

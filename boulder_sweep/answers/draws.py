@@ -55,7 +55,7 @@ class Draws:
         z
             Standard normal numbers, shape (m, d).
         **inputs
-            Inputs to set, shape (m,) each; for uncertain ones, their means.
+            Inputs to set, shape (m,) each.
         """
         return self.drawn(index, z, **inputs)[0]
 

@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_sweep.answers.spread import narrowed
 from boulder_sweep.answers.trials import LEAST_RATIO
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.fields import BOULDER_MASS, UnknownNameError, named
 from boulder_sweep.settings.problems import Position, SettingsError
-from boulder_sweep.settings.soil_readings import covered_depth
 from boulder_sweep.settings.tree import Scalar
 from boulder_sweep.settings.values import NumberError, outside, read_quantity, read_single, refuse_bare
 
@@ -88,17 +86,22 @@ class Key:
 
 
 def key_of(word: str, *, most: bool = False) -> Key:
-    """Return the input that a path, key or column names; ``mass`` is the boulder's.
+    """Return the input that a path, key or column names.
 
     Raises
     ------
     QuestionError
-        The word names no input or several.
+        The word names no input, several, or the mass of the boulder.
     """
     try:
         field = BOULDER_MASS if word == BOULDER_MASS.key else named(word)
     except UnknownNameError as problem:
         raise QuestionError(str(problem)) from None
+    if field is BOULDER_MASS:
+        raise QuestionError(
+            "the mass of a boulder is not searched: give its sides as ranges, and `sweep need` names the lightest "
+            "boulder that qualifies (vehicle.mass is the truck's)"
+        )
     return Key(field, most)
 
 
@@ -160,8 +163,7 @@ def range_of(sweep: Sweep, key: Key, given: Mapping[str, np.ndarray], between: E
     """Return the search range of the input, row by row.
 
     Where the input is an axis of the grid, the axis is the range; for the largest speed or mass of the vehicle it
-    begins as `MILDEST` says all the same. Ends that the user gave take precedence. If the input has a distribution,
-    its mean is searched, where the distribution is within the admitted range.
+    begins as `MILDEST` says all the same. Ends that the user gave take precedence.
 
     Returns
     -------
@@ -171,16 +173,8 @@ def range_of(sweep: Sweep, key: Key, given: Mapping[str, np.ndarray], between: E
     Raises
     ------
     QuestionError
-        The range is empty, or the distribution of the input cannot take the means of the range.
+        The range is empty.
     """
-    low, high = _whole_range(sweep, key, given, between)
-    return narrowed(sweep, key.name, low, high, least=key.step, given=between is not None)
-
-
-def _whole_range(
-    sweep: Sweep, key: Key, given: Mapping[str, np.ndarray], between: Ends
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the search range, whatever the distribution of the input; arguments: see `range_of`."""
     one = np.ones(len(next(iter(given.values()))))
     if between is not None:
         try:
@@ -244,23 +238,6 @@ def refuse_narrow(sweep: Sweep, key: Key, pieces: Iterable[Mapping[str, np.ndarr
             most, widest = held[row], (low[row], high[row])
     if between is not None and most == 1:
         raise _unsearchable(key, *widest, "only one multiple")
-
-
-def refuse_deep(sweep: Sweep, foot_m: float, ranged: str) -> None:
-    """Refuse a search whose deepest foot is below readings of the soil that were left out, by a `QuestionError`.
-
-    `ranged` is what the file must give so that deeper readings count.
-    """
-    covered = covered_depth(sweep.derived)
-    if foot_m < covered:
-        return
-    remedy = f"they count where the file gives {ranged}"
-    if sweep.table is not None:
-        remedy = "search less deep (--between); or they count where the table has a design with such a foot"
-    raise QuestionError(
-        f"the search goes down to a foot at {foot_m:.4g} m, and the readings of the soil below {covered:.4g} m were "
-        f"left out, since no foot in the file is so deep; {remedy}"
-    )
 
 
 def reach_of(key: Key, given: Mapping[str, np.ndarray]) -> np.ndarray | float:

@@ -16,7 +16,6 @@ from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.answers.keys import BOULDER_MASS, Ends, Key, key_of, margin_asked, share
-from boulder_sweep.answers.lightest import LightestQuestion
 from boulder_sweep.answers.questions import Question
 from boulder_sweep.answers.recommendation import PREFERENCES, Recommendation, recommended
 from boulder_sweep.answers.result import (
@@ -70,7 +69,7 @@ class Need(Result):
     robust : bool
         Whether only a pass counts that stands under every second opinion with the margin.
     recommendation : Recommendation or None
-        The design to build, and why; None where the question is not about a least size, mass or embedment, or none was
+        The design to build, and why; None where the question is not about a least size or embedment, or none was
         wanted. The file of the answers has it, too.
     """
 
@@ -86,8 +85,6 @@ class Need(Result):
         """Input columns that follow from others or from the answer."""
         given = self.sweep.plan.given
         derived = tuple(name for name in ("embedment_depth_m", "impact_height_m") if name not in given)
-        if self.key.name == BOULDER_MASS.name:
-            return (*derived, *SIDES, *EMBEDMENT)
         return (*derived, *EMBEDMENT) if self.key.name in EMBEDMENT else derived
 
     @property
@@ -207,17 +204,12 @@ def need(
         raise QuestionError(f"--prefer {prefer}: must be {', '.join(PREFERENCES)}")
     word = most or least or "embedment_depth"
     key = key_of(word, most=bool(most))
-    if between is not None and key.name == BOULDER_MASS.name:
-        raise QuestionError(
-            "--least mass takes no --between; the sides and the embedment in the file are its bounds, in whole "
-            "millimetres"
-        )
     if key.name == "friction_angle_deg" and sweep.partial_factor != 1.0:
         raise QuestionError(
             "the friction angle is asked for, and partial_factor would not be applied to the answer; remove it from "
             "the file, then multiply the tangent of the answer by it"
         )
-    if BOULDER_MASS.name in sweep.plan.given and key.name in (BOULDER_MASS.name, *SIDES, "boulder_density_kg_m3"):
+    if BOULDER_MASS.name in sweep.plan.given and key.name in (*SIDES, "boulder_density_kg_m3"):
         raise QuestionError(
             f"{key.field.path} cannot be searched while the file has boulder.mass, which holds for one boulder; "
             "remove it from the file and give boulder.density"
@@ -243,7 +235,7 @@ def need(
 
 
 def _answered(
-    asked: Question | LightestQuestion,
+    asked: Question,
     chance: float | None,
     prefer: str | None,
     jobs: int | None,
@@ -282,13 +274,13 @@ class _Progress:
         The question.
     """
 
-    def __init__(self, report: ProgressCallback | None, asked: Question | LightestQuestion):
+    def __init__(self, report: ProgressCallback | None, asked: Question):
         self._report, self._rows = report, asked.count
         self._done, self._rows_done, self._total = 0, 0, self._rows
         self._lock = Lock()  # values are tried by several threads
         if report is None:
             return
-        if isinstance(asked, Question) and (values := asked.values_to_try()):
+        if values := asked.values_to_try():
             self._total = values
             asked.tried = self._tried
         report(0, self._total)
@@ -309,22 +301,16 @@ class _Progress:
             self._report(done, self._total)
 
 
-def _question(
-    sweep: Sweep, key: Key, between: Ends, judges: Judges, probability: float | None, seed: int
-) -> Question | LightestQuestion:
+def _question(sweep: Sweep, key: Key, between: Ends, judges: Judges, probability: float | None, seed: int) -> Question:
     """Return the question of the kind that is asked."""
     if probability is None:
-        if key.name == BOULDER_MASS.name:
-            return LightestQuestion(sweep, key, judges)
         return Question(sweep, key, between, judges)
-    from boulder_sweep.answers.probability import LikelyLightestQuestion, ProbabilityQuestion  # imports scipy.stats
+    from boulder_sweep.answers.probability import ProbabilityQuestion  # imports scipy.stats
 
-    if key.name == BOULDER_MASS.name:
-        return LikelyLightestQuestion(sweep, key, judges, probability, seed)
     return ProbabilityQuestion(sweep, key, between, judges, probability, seed)
 
 
-def _table_of(asked: Question | LightestQuestion, start: int, stop: int) -> tuple[pa.Table, int]:
+def _table_of(asked: Question, start: int, stop: int) -> tuple[pa.Table, int]:
     """Answer some rows; the table and the designs simulated.
 
     The table has the inputs, the answer and its bracket, and the outcome at the answer.

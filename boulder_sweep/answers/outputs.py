@@ -14,13 +14,12 @@ import pyarrow as pa
 
 from boulder_kernels import Control
 from boulder_sweep.answers.keys import key_of
-from boulder_sweep.answers.lightest import DEPTH
 from boulder_sweep.answers.need import RECOMMENDATION, Need
 from boulder_sweep.answers.recommendation import ANSWER, Recommendation
 from boulder_sweep.answers.trials import Open
-from boulder_sweep.columns import BOULDER_MASS, COLUMNS, DESIGN_ID, GRADES, RATINGS, VERDICTS
 from boulder_sweep.columns import BY_NAME as COLUMN_OF
-from boulder_sweep.designs import SIDES, Label
+from boulder_sweep.columns import COLUMNS, DESIGN_ID, GRADES, RATINGS, VERDICTS
+from boulder_sweep.designs import Label
 from boulder_sweep.errors import BoulderSweepError, OlderRulesWarning
 from boulder_sweep.impact.recomputing import model_of
 from boulder_sweep.locations import Location
@@ -188,8 +187,7 @@ class AnswerFile:
         answers = self.answers() if self.kind == NEED else None
         if not isinstance(answers, Need):
             return int(self.identity["settings"]["n_designs"])
-        name = answers.key.name
-        return Open(answers.sweep, (*SIDES, DEPTH) if name == BOULDER_MASS else (name,)).count
+        return Open(answers.sweep, (answers.key.name,)).count
 
     def answers(self) -> Need | Reserves | Uncertainty:
         """Return the answers as the command had them.
@@ -208,8 +206,7 @@ class AnswerFile:
             return self._chances(sweep)
         asked = self.question
         sense, _, name = asked["asked"].partition("_")
-        word = BY_NAME[name].key if name == BOULDER_MASS else name
-        key = key_of(word, most=sense == "most")
+        key = key_of(name, most=sense == "most")
         chance, robust = asked.get("probability"), asked.get("robust", False)
         return Need(sweep, self.table, key, asked["margin"], 0, chance, robust, self._recommendation())
 

@@ -79,8 +79,6 @@ MOST_IN_ALL = 1000
 MARK = "→"
 """What stands before the boulder that is recommended."""
 WRITTEN = "-o writes them all"
-NEAR_M = 1.5e-3
-"""How near to an end of a range a side or depth is at it: both are whole millimetres [m]."""
 NOTES = {
     "always": "≤, ≥: passes throughout the searched range, up to this end of it",
     "never": "never: passes nowhere in the searched range",
@@ -411,8 +409,6 @@ def need_lines(
     remarks = [*yard_lines(need), *_errors(need)]
     remarks += undecided_lines(need.arrow) if need.probability is not None else []
     remarks += caution_lines(need.sweep.model, reasons_in(need.arrow), units)
-    if need.key.name == BOULDER_MASS.name:
-        remarks += _edges(need, units)
     if notes:
         remarks += [*volume_lines("\n".join(shown)), *_legend(need), *_grades(need), *_outside(need)]
         remarks.append(FOOT_WORDS[need.sweep.model.foot])
@@ -464,8 +460,7 @@ def need_screen(need: Need, units: str = "si") -> Screen:
     """
     found, rows = need.recommendation, rows_of(_shown_part(need), units)
     shown = Screen(_need_columns(need, units), rows)
-    alone = need.key.name != BOULDER_MASS.name and not need.seeks_depth
-    if found is not None and found.conditions > 1 and need.sweep.table is None and alone:
+    if found is not None and found.conditions > 1 and need.sweep.table is None and not need.seeks_depth:
         shown = _by_boulder(need, rows, units)
     lines, count = [*shown.rows], len(shown.rows)
     if is_yard(need):
@@ -645,52 +640,19 @@ def _outside(need: Need) -> list[str]:
     return flag_lines(need.arrow.filter(need.arrow["passes_at"].is_valid())["validity"].to_pylist())
 
 
-def _edges(need: Need, units: str) -> list[str]:
-    """Return at which ends of the ranges in the file the lightest boulders lie."""
-    from boulder_sweep.answers.keys import sweep_ranges  # loads the kernels
-    from boulder_sweep.answers.trials import USUALLY
-
-    passing = need.arrow.filter(need.arrow["passes_at"].is_valid())
-    if not len(passing):
-        return []
-    value = {name: passing[name].to_numpy() for name in (*SIDES, DEPTH, "bumper_height_m")}
-    bounds = sweep_ranges(need.sweep) | ({RATIO: USUALLY} if need.sweep.depth_sought else {})
-    unit, metre = shown_unit("m", units)
-    distances = {}
-    for name in (*SIDES, DEPTH, RATIO):
-        low, high = bounds.get(name, (0.0, 0.0))
-        for which, end in (("least", low), ("largest", high)) if low < high else ():
-            if name == RATIO:
-                distances[f"d/H is the {which}, {end:g}"] = value[DEPTH] - end * value[HEIGHT]
-            else:
-                distances[f"{HEADS[name][0]} is the {which}, {end / metre:.4g} {unit}"] = value[name] - end
-    overlap = value[HEIGHT] - value["bumper_height_m"] - value[DEPTH]
-    distances["the depth is the largest that overlaps the bumper enough"] = overlap - need.sweep.criterion.min_overlap_m
-    counts = {words: int((abs(off) < NEAR_M).sum()) for words, off in distances.items()}
-    ends = {words: count for words, count in counts.items() if count}
-    if not ends:
-        return ["edges: the lightest boulders lie within the ranges of the file, at no end of one"]
-    listed = "; ".join(f"{words} ({count} of {len(passing)})" for words, count in ends.items())
-    return [f"edges: {listed}. Wider ranges in the file may hold a lighter boulder"]
-
-
 def _need_columns(need: Need, units: str) -> list[Column]:
     """Return the columns of a terminal table: varying inputs, the answer, and what follows from it."""
     key = need.key
     unit = key.field.unit if units == "si" else shown_unit(key.field.unit, units).unit
     hidden = (key.name, *need.derived, BOULDER_MASS.name)  # the mass has a column of its own
     columns = leading(need.sweep, need.arrow, [name for name in HEADS if name not in hidden], units)
-    if key.name == BOULDER_MASS.name:
-        columns.append((("mass", unit), answer_cell(key, key.answer, "found", units)))
-        columns += [(head_of(name, units), _where_it_passes(_length(name))) for name in (*SIDES, DEPTH)]
-    else:
-        columns.append((head_of(key.name, units), answer_cell(key, key.answer, "found", units)))
-        if need.seeks_depth:
-            columns.append((head_of(DEPTH, units), _where_it_passes(_length(DEPTH))))
-        if key.name == DEPTH:
-            columns.append((("ratio", "d/H"), _where_it_passes(lambda row: f"{row[DEPTH] / row[HEIGHT]:.3f}")))
-            columns.append((("above", unit), _where_it_passes(lambda row: f"{row[HEIGHT] - row[DEPTH]:.2f}")))
-        columns.append(_mass(units))
+    columns.append((head_of(key.name, units), answer_cell(key, key.answer, "found", units)))
+    if need.seeks_depth:
+        columns.append((head_of(DEPTH, units), _where_it_passes(_length(DEPTH))))
+    if key.name == DEPTH:
+        columns.append((("ratio", "d/H"), _where_it_passes(lambda row: f"{row[DEPTH] / row[HEIGHT]:.3f}")))
+        columns.append((("above", unit), _where_it_passes(lambda row: f"{row[HEIGHT] - row[DEPTH]:.2f}")))
+    columns.append(_mass(units))
     if "p_pass" in need.arrow.column_names:
         columns.append((("P(pass)", ""), _chance("p_pass")))
         if need.robust:

@@ -1,8 +1,4 @@
-"""Questions about the probability of passing, when inputs of soil or vehicle are uncertain.
-
-The least value at which designs drawn with it pass often enough, and the lightest boulder that does. The
-second search works as in `lightest`: a few points compare shapes, and all points the boulders around the answer.
-"""
+"""Questions about the probability of passing: the least value at which designs drawn with it pass often enough."""
 
 from __future__ import annotations
 
@@ -14,30 +10,26 @@ import numpy as np
 from boulder_sweep.answers.chance import SCRAMBLINGS, Chances, Estimates, Points, chance
 from boulder_sweep.answers.draws import WORST, Draws
 from boulder_sweep.answers.keys import Ends, Key, range_of
-from boulder_sweep.answers.lightest import DEPTH, RATIO, Boulders, LightestQuestion, Sides
 from boulder_sweep.answers.questions import (
     CHECKED_AT_ONCE,
-    Answers,
     Question,
     Trial,
 )
 from boulder_sweep.answers.search import BEYOND, FAILS, HOLDS, Search
 from boulder_sweep.answers.spread import Spread
 from boulder_sweep.answers.trials import (
+    DEPTH,
     InputRows,
     Judges,
-    Remembered,
     beyond_reach,
     ranges,
     rows_at,
-    uncertain_rows,
     ungraded,
 )
-from boulder_sweep.designs import SIDES
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.judged import OVERRIDE
 from boulder_sweep.runner.pool import Pool
-from boulder_sweep.settings.fields import BY_NAME
+from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT
 
 if TYPE_CHECKING:
     from boulder_sweep.designs import DesignBlock
@@ -47,7 +39,7 @@ if TYPE_CHECKING:
 DRAWN = 4096
 """Samples at each value, in the search as at the answer: what is reported is what qualified."""
 FEW = 256
-"""Points by which shapes are compared."""
+"""Points by which depths are compared."""
 AT_ONCE = 1 << 18
 """Designs drawn at once."""
 
@@ -105,16 +97,21 @@ class ProbabilityQuestion(Question):
     Raises
     ------
     QuestionError
-        `Question` refuses, no input has a distribution, or the distribution of the input asked for cannot move with
-        its mean.
+        `Question` refuses, no input has a distribution, or the one that is asked for has.
     """
 
     rows_at_once = 4
     cells = 6
 
     def __init__(self, sweep: Sweep, key: Key, between: Ends, judges: Judges, probability: float, seed: int) -> None:
+        for name in EMBEDMENT if key.name in EMBEDMENT else (key.name,):
+            if name in sweep.distributions:
+                raise QuestionError(
+                    f"{key.field.path} is asked for, and {BY_NAME[name].path} has a distribution: give it one value "
+                    f"(--set {BY_NAME[name].path}=VALUE), in the place of which the answer is tried"
+                )
         super().__init__(sweep, key, between, judges)
-        self.sampling = Sampling(Spread(sweep, key.name), judges, probability, seed)
+        self.sampling = Sampling(Spread(sweep), judges, probability, seed)
 
     def trial(self, rows: InputRows, *, roughly: bool = False) -> Trial:
         """Return the object that tries values in some rows, roughly by few points."""
@@ -175,60 +172,3 @@ class ProbabilityTrial(Trial):
         """Return what is tried of the designs of a block: the values, and the depths where they are searched, too."""
         depths = {DEPTH: block.columns[DEPTH].to_numpy()} if self.asked.seeks_depth else {}
         return {self.key.name: self.key.values(positions)} | depths
-
-
-class LikelyLightestQuestion(LightestQuestion):
-    """The least boulder mass that passes with a given probability.
-
-    Raises
-    ------
-    QuestionError
-        `LightestQuestion` refuses, no input has a distribution, or one that is searched for has.
-    """
-
-    rows_at_once = 1
-    neighbours = 256
-
-    def __init__(self, sweep: Sweep, key: Key, judges: Judges, probability: float, seed: int) -> None:
-        super().__init__(sweep, key, judges)
-        spread = Spread(sweep)
-        for name in (*SIDES, DEPTH, RATIO):
-            if name in spread.names:
-                path = BY_NAME[name].path
-                raise QuestionError(f"--least mass searches for {path}, which has a distribution; give it values")
-        self.sampling = Sampling(spread, judges, probability, seed)
-
-    def given(self, start: int, stop: int) -> InputRows:
-        """Return the other inputs of some rows, with the indices of named sets that have distributions."""
-        return uncertain_rows(self.open.sweep, super().given(start, stop), start, stop)
-
-    def trial(self, rows: InputRows, side: str, final: Remembered) -> Boulders:
-        """Return the object that tries boulders in some rows."""
-        return LikelyBoulders(self, rows, side, final)
-
-    def answered(self, start: int, stop: int) -> Answers:
-        """Answer the rows ``[start, stop)``, with the probability of passing of each answer."""
-        answers = super().answered(start, stop)
-        sizes = {name: answers.block.columns[name].to_numpy() for name in (*SIDES, DEPTH)}
-        chances = self.sampling.chances(self.sampling.draws(self.given(start, stop)), sizes)
-        simulated = answers.simulated + chances.points
-        return replace(answers, judged=ungraded(answers.judged), chances=chances, simulated=simulated)
-
-
-class LikelyBoulders(Boulders):
-    """Tries boulders for some rows: whether designs drawn with them pass often enough."""
-
-    def __init__(self, asked: LikelyLightestQuestion, rows: InputRows, side: str, final: Remembered) -> None:
-        super().__init__(asked, rows, side, final)
-        self.sampling, self.draws = asked.sampling, asked.sampling.draws(rows)
-
-    def codes(self, index: np.ndarray, positions: np.ndarray, others: Sides, *, quick: bool) -> np.ndarray:
-        """Return the predicate of `search`."""
-        block = self.block(index, positions, others)
-        reached = ~beyond_reach(block, self.judges.coarse(block))
-        points = self.sampling.few if quick else self.sampling.points
-        self.simulated += len(block) + len(points) * int(reached.sum())
-        sizes = {name: block.columns[name].to_numpy()[reached] for name in (*SIDES, DEPTH)}
-        codes = np.full(len(index), BEYOND, dtype=np.int8)
-        codes[reached] = self.sampling.codes(self.draws, index[reached], sizes, points)
-        return codes

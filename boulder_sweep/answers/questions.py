@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_sweep.answers.keys import Ends, Key, range_of, refuse_deep, refuse_narrow
+from boulder_sweep.answers.keys import Ends, Key, range_of, refuse_narrow
 from boulder_sweep.answers.search import (
     BEYOND,
     BLOCKED,
@@ -29,6 +29,7 @@ from boulder_sweep.answers.search import (
     steady,
 )
 from boulder_sweep.answers.trials import (
+    DEPTH,
     NO_FACE,
     SHARE,
     UNASKED_M,
@@ -46,6 +47,7 @@ from boulder_sweep.answers.trials import (
     uncertain_rows,
 )
 from boulder_sweep.designs import block_of
+from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.judged import ERROR, UNDECIDED, with_rows
 from boulder_sweep.settings.fields import EMBEDMENT
 from boulder_sweep.settings.soil_readings import covered_depth
@@ -60,7 +62,6 @@ SHALLOW, SLIDES_M = 0.45, 0.1
 that pass, in stretches of 1 % of the value and less."""
 FINE_CELLS = 400
 """Pieces into which the range of such a boulder is cut."""
-DEPTH = EMBEDMENT[1]
 COARSE_DEPTHS, FINE_DEPTHS, DEPTH_ROUNDS = 7, 5, 5
 """Number of depths, where it is to be found: on the first lattice, on each finer one, and of finer ones, each half as
 wide as the one before: in the end they are 1/128 of the range apart, some 10 mm."""
@@ -77,8 +78,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Brackets:
-    """Where n rows change from failing to passing.
+class Answers:
+    """Answers of n rows: where they change from failing to passing.
 
     Attributes
     ----------
@@ -88,20 +89,6 @@ class Brackets:
         Kind of answer, codes of `boulder_sweep.answers.search.WORDS`.
     fails, passes : ndarray, shape (n,)
         The bracket in the unit of the table; NaN where there is no such value.
-    """
-
-    block: DesignBlock
-    kind: np.ndarray
-    fails: np.ndarray
-    passes: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class Answers(Brackets):
-    """Answers of n rows, with their brackets.
-
-    Attributes
-    ----------
     judged : Judged
         Outcomes and verdicts of the designs.
     stretches : list of str or None, of length n
@@ -112,6 +99,10 @@ class Answers(Brackets):
         Probabilities at the answers, if one was asked for.
     """
 
+    block: DesignBlock
+    kind: np.ndarray
+    fails: np.ndarray
+    passes: np.ndarray
     judged: Judged
     stretches: list[str | None]
     simulated: int
@@ -236,7 +227,7 @@ class Question(ValueSearch):
 
     def _refuse_deep(self) -> None:
         """Refuse a range in which a foot is deeper than the readings of the soil that count, by a `QuestionError`."""
-        low, high, foot = math.inf, 0.0, 0.0
+        covered, low, high, foot = covered_depth(self.sweep.derived), math.inf, 0.0, 0.0
         for start, stop in ranges(self.count, CHECKED_AT_ONCE):
             rows = self.open.rows(start, stop)
             first, last = range_of(self.sweep, self.key, rows, self.between)
@@ -245,10 +236,18 @@ class Question(ValueSearch):
             columns = trial.with_values(np.arange(stop - start), last).columns
             low, high = min(low, float(first.min())), max(high, float(last.max()))
             foot = max(foot, float(columns["embedment_depth_m"].to_numpy().max()))
+        if foot < covered:
+            return
         field = self.key.field
         unit = "" if field.unit == "1" else f" {field.unit}"
         of = "embedment" if field.name in EMBEDMENT else field.key
-        refuse_deep(self.sweep, foot, f"{field.path}: [{low:.6g}, {high:.6g}]{unit}, in place of its {of}")
+        remedy = f"they count where the file gives {field.path}: [{low:.6g}, {high:.6g}]{unit}, in place of its {of}"
+        if self.sweep.table is not None:
+            remedy = "search less deep (--between); or they count where the table has a design with such a foot"
+        raise QuestionError(
+            f"the search goes down to a foot at {foot:.4g} m, and the readings of the soil below {covered:.4g} m were "
+            f"left out, since no foot in the file is so deep; {remedy}"
+        )
 
     @property
     def count(self) -> int:

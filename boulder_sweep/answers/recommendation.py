@@ -16,10 +16,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boulder_sweep.answers.keys import key_of, range_of, usual_ends
-from boulder_sweep.answers.lightest import DEPTH, HEIGHT, RATIO, LightestQuestion
 from boulder_sweep.answers.questions import Question, ValueSearch
 from boulder_sweep.answers.result import chance_columns, rows_table, to_build
-from boulder_sweep.answers.trials import InputRows, Judges, block_at, judges_of, rows_at, uncertain_rows, ungraded
+from boulder_sweep.answers.trials import (
+    DEPTH,
+    HEIGHT,
+    RATIO,
+    InputRows,
+    Judges,
+    block_at,
+    judges_of,
+    rows_at,
+    uncertain_rows,
+    ungraded,
+)
 from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.designs import SIDES
 from boulder_sweep.judge.quantities import EXCAVATED
@@ -243,10 +253,10 @@ class Recommendation:
         return cls(prefer, chosen, others, boulders, qualified, alike, conditions, nearest)
 
 
-def recommended(asked: Question | LightestQuestion, table: pa.Table, prefer: str) -> Recommendation | None:
+def recommended(asked: Question, table: pa.Table, prefer: str) -> Recommendation | None:
     """Return the design to build by the answers to a question, the least by `prefer`, a key of `PREFERENCES`.
 
-    None where the question is not about a least size, mass or embedment of boulders.
+    None where the question is not about a least size or embedment of boulders.
     """
     if asked.key.most or asked.key.name not in OF_A_DESIGN:
         return None
@@ -258,7 +268,7 @@ def recommended(asked: Question | LightestQuestion, table: pa.Table, prefer: str
         for name, design in found.items()
         if best is not None and design is not None and design.grade == best.grade and design.sizes != best.sizes
     }
-    if best is None and isinstance(asked, Question) and asked.key.name in EMBEDMENT and boulders.sampling is None:
+    if best is None and asked.key.name in EMBEDMENT and boulders.sampling is None:
         nearest = boulders.nearest(asked)
     alike = 0 if best is None else int((boulders.rank <= RANKS[best.grade]).sum())
     counts = (len(boulders.members), len(boulders.qualified), alike, max(map(len, boulders.members)))
@@ -268,7 +278,7 @@ def recommended(asked: Question | LightestQuestion, table: pa.Table, prefer: str
 class _Boulders:
     """The boulders of a question, each with its rows: one for every soil and vehicle."""
 
-    def __init__(self, asked: Question | LightestQuestion, table: pa.Table) -> None:
+    def __init__(self, asked: Question, table: pa.Table) -> None:
         self.asked, self.table = asked, table
         opened, count = asked.open, asked.count
         self.given = uncertain_rows(opened.sweep, opened.rows(0, count), 0, count)
@@ -295,15 +305,11 @@ class _Boulders:
     def _sizes(self, rows: np.ndarray) -> list[dict[str, float]]:
         """Return what to try of a boulder that has an answer in all its rows: the value that all of them need.
 
-        Of depths that were found beside it, and of the lightest boulders, which differ from row to row, each is tried.
+        Of depths that were found beside it, each is tried.
         """
-        if isinstance(self.asked, Question):
-            depths = [{DEPTH: depth} for depth in np.unique(self._column(DEPTH)[rows]).tolist()]
-            needed = {self.asked.key.name: float(self.passes[rows].max())}
-            return [needed | depth for depth in depths] if self.asked.seeks_depth else [needed]
-        names = (*SIDES, DEPTH)
-        sizes = np.unique(np.stack([self._column(name)[rows] for name in names]), axis=1)
-        return [dict(zip(names, column.tolist(), strict=True)) for column in sizes.T]
+        needed = {self.asked.key.name: float(self.passes[rows].max())}
+        depths = np.unique(self._column(DEPTH)[rows]).tolist()
+        return [needed | {DEPTH: depth} for depth in depths] if self.asked.seeks_depth else [needed]
 
     def _figures(self) -> tuple[dict[str, np.ndarray], np.ndarray]:
         """Return, for all that is to be tried, the columns of `PREFERENCES` and the rank of the worst grade."""

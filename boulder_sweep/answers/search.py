@@ -202,14 +202,6 @@ def settled(predicate: Predicate, result: Search, first: np.ndarray, last: np.nd
     return replace(result, fails=fails, holds=held_at, shown=shown)
 
 
-def contradicted(predicate: Predicate, result: Search) -> np.ndarray:
-    """Return the rows of a search of which another predicate does not confirm both ends of the bracket, shape (m,)."""
-    failing, holding = np.flatnonzero(result.has_fails), np.flatnonzero(result.has_holds)
-    ends = np.concatenate([failing, holding])
-    holds = predicate(ends, np.concatenate([result.fails[failing], result.holds[holding]])) == HOLDS
-    return np.unique(ends[holds != (np.arange(len(ends)) >= len(failing))])
-
-
 def searched_again(
     predicate: Predicate, result: Search, rows: np.ndarray, first: np.ndarray, last: np.ndarray, cells: int = CELLS
 ) -> Search:
@@ -230,42 +222,6 @@ def _replace_rows(result: Search, rows: np.ndarray, part: Search) -> Search:
     changes = {row: edges for row, edges in result.changes.items() if row not in again}
     changes |= {int(rows[row]): edges for row, edges in part.changes.items()}
     return Search(**arrays, changes=changes)
-
-
-def last_before(
-    predicate: Predicate, holds: np.ndarray, first: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find where the predicate begins to hold, backwards from positions at which it does.
-
-    Parameters
-    ----------
-    predicate
-        Evaluated at rows and positions.
-    holds : ndarray of int64, shape (n,)
-        Places at which it holds.
-    first : ndarray of int64, shape (n,)
-        Places before which there is nothing to try, at most `holds`.
-
-    Returns
-    -------
-    fails, holds : ndarray of int64, shape (n,)
-        Adjacent positions: the next position before at which it does not hold, or nearly the next if it changes often.
-    has_fails : ndarray of bool, shape (n,)
-        Whether there is such a position; else `holds` is `first`.
-    """
-    low, high = holds.copy(), holds.copy()
-    open_, stride = holds > first, 1
-    while open_.any():
-        rows = np.flatnonzero(open_)
-        positions = np.maximum(high[rows] - stride, first[rows])
-        held = predicate(rows, positions) == HOLDS
-        high[rows[held]], low[rows[~held]] = positions[held], positions[~held]
-        open_[rows] = held & (positions > first[rows])
-        stride *= 2
-    has_fails = low < high
-    rows = np.flatnonzero(has_fails)
-    low[rows], high[rows] = _bisect_changes(predicate, rows, low[rows], high[rows], np.ones(len(rows), dtype=bool))
-    return low, high, has_fails
 
 
 def _scan_positions(predicate: Predicate, between: Predicate, positions: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boulder_sweep.designs import REASONS, DesignBlock, Label, block_of, input_of, some
+from boulder_sweep.designs import REASONS, SIDES, DesignBlock, Label, block_of, input_of, some
 from boulder_sweep.judge.accuracy import Accuracy, accuracy_of, steps_of
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 from boulder_sweep.judge.judged import PASS, Judged, joined
@@ -21,6 +21,8 @@ from boulder_sweep.settings.sweep import DesignList
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
 
+HEIGHT = SIDES[2]
+RATIO, DEPTH = fields.EMBEDMENT
 OUT_OF_REACH = ("no_contact", "override")
 """Reasons for which there is nothing to search at a value: the truck goes over the boulder."""
 NO_FACE = (REASONS[1], REASONS[3])

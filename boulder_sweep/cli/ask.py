@@ -39,7 +39,7 @@ Examples:
   sweep need configs/site.yaml --prefer excavation --plot depths.png
   sweep need configs/site.yaml --margin 0 --any --table
   sweep need configs/site.yaml --least height -o heights.parquet
-  sweep need configs/uncertain_site.yaml --probability 0.95 --least mass
+  sweep need configs/uncertain_site.yaml --probability 0.95
   sweep need configs/site.yaml --most speed --between '5 m/s' '40 m/s'
 """
 REPEATED = (

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.columns import BY_NAME, VERDICTS, WAY_OUT
 from boulder_sweep.settings.fields import TO_BE_FOUND
-from boulder_sweep.settings.model import FOOT_WORDS, RESISTANCES
+from boulder_sweep.settings.model import FOOT_WORDS
 from boulder_sweep.settings.units import ShownColumn, shown_column, shown_settings, shown_unit
 from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.text import counted, duration_text, size_text
@@ -72,8 +72,7 @@ def summary_lines(name: str, summary: Summary) -> list[str]:
         "",
         *robustness_lines(summary.reasons),
         *foot_lines(summary.boulder, summary.reasons),
-        *firmness_lines(summary.firmness),
-        *accuracy_lines(summary.accuracy),
+        accuracy_line(summary.accuracy),
         f"table  {summary.out} ({counted(summary.parts, 'file')}, {size_text(summary.bytes)})",
         f"open   boulder_sweep.read({str(summary.out)!r})",
         f"       pandas.read_parquet({str(summary.out)!r})",
@@ -112,45 +111,14 @@ def _indent(text: str, indent: str) -> list[str]:
     return textwrap.wrap(text, 80, initial_indent=indent, subsequent_indent=indent)
 
 
-def firmness_lines(firmness: Mapping[str, Any]) -> list[str]:
-    """Return how firm the passes are, from a sample of the designs; nothing where none of it passes."""
-    lost = firmness["lost"]
-    if not lost:
-        return []
-    laws = ", ".join(f"{law} {share:.0%}" for law, share in lost.items() if law in RESISTANCES)
-    shares = ", ".join(
-        (
-            f"the other reading of the paper {lost['reading']:.0%}",
-            f"1 deg less friction angle {lost['friction_angle']:.0%}",
-            f"5 % more speed {lost['speed']:.0%}",
-            f"another soil model without friction: {laws}",
-        )
-    )
-    sample = f"{firmness['passes']:,} passes of a sample of {counted(firmness['designs'], 'design')}"
-    lines = textwrap.wrap(f"firm?  of {sample} fail by {shares}", 80, subsequent_indent="       ")
-    shares = ", ".join(f"{name} {count / firmness['passes']:.0%}" for name, count in firmness["flags"].items() if name)
-    return [*lines, *_indent(f"flags: {shares}", "       ")] if shares else lines
-
-
-def accuracy_lines(accuracy: Mapping[str, Any]) -> list[str]:
-    """Return the accuracy of a sweep; nothing if its table does not record it."""
-    if not accuracy:
-        return []
+def accuracy_line(accuracy: Mapping[str, Any]) -> str:
+    """Return the accuracy of a sweep."""
     steps = f"step {1e3 * accuracy['step_s']:g} ms"
     if accuracy["reported_step_s"] != accuracy["step_s"]:
         steps += f" and {1e3 * accuracy['reported_step_s']:g} ms"
     if accuracy["yield_located"]:
         steps += ", yield located"
-    line = f"steps  {accuracy['asked']}: {steps}, verdicts {accuracy['verdicts']}"
-    if "pilot_designs" not in accuracy:
-        return [line]
-    sample = counted(accuracy["pilot_designs"], "design")
-    error = accuracy["estimated_error_p99_9_deg"]
-    of_pilot = f"of a pilot of {sample}"
-    reached = (
-        f"unknown for more than 0.1 % {of_pilot}" if error is None else f"at most {error:g} deg in 99.9 % {of_pilot}"
-    )
-    return [line, f"       estimated error {reached}{'' if accuracy['met'] else ': no step does better'}"]
+    return f"steps  {accuracy['asked']}: {steps}, verdicts {accuracy['verdicts']}"
 
 
 def dry_run_lines(sweep: Sweep, out: Location, effort: Estimate, objection: str) -> list[str]:

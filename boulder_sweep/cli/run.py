@@ -12,7 +12,6 @@ import click
 from boulder_sweep.cli.options import (
     JOBS,
     OUTPUT,
-    Quantity,
     at_option,
     grid_argument,
     json_option,
@@ -54,7 +53,7 @@ Examples:
 @click.option("--resume", is_flag=True, help="Resume an interrupted run.")
 @click.option("--overwrite", is_flag=True, help="Replace the table of an earlier run.")
 @click.option("--dry-run", is_flag=True, help="Show designs, settings and cost; write nothing.")
-@click.option("--accuracy", type=Quantity("deg"), metavar="NAME", help="fast, balanced, fine, or '0.01 deg'.")
+@click.option("--accuracy", metavar="NAME", help="fast, balanced or fine.")
 @second_opinion_option
 @at_option
 @click.option(

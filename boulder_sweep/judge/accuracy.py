@@ -1,22 +1,18 @@
-"""From the requested accuracy to the control of the integrator: time steps by name, or by a pilot run on a sample."""
+"""From the requested accuracy to the control of the integrator."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
-from boulder_kernels import Control, Readings, Status, simulate_table
+from boulder_kernels import Control, Readings
 from boulder_kernels._jit import plain
 from boulder_kernels.control import EVENT_TOLERANCE
 from boulder_kernels.rules import AGREEING, FIRST_FACTOR
 from boulder_kernels.settling import proof_is_possible
 from boulder_kernels.table import finer_step, is_paired
-from boulder_sweep.judge.inputs import Designs, sampled_designs
 from boulder_sweep.soils import is_layered
 
 if TYPE_CHECKING:
@@ -38,12 +34,6 @@ STEPS = {"fast": Steps(0.012), "balanced": Steps(0.012), "fine": Steps(0.006, lo
 STEPS_PRINTED = {"fast": Steps(0.006), "balanced": Steps(0.006), "fine": Steps(0.003, locate_yield=True)}
 """Steps of each named accuracy for the restoring moment as printed: it jumps where the angular velocity passes zero,
 and a design close to that jump needs shorter steps to end on the right side of it."""
-LADDER = (
-    *(Steps(0.018), Steps(0.012)),
-    *(Steps(1e-3 * step, locate_yield=True) for step in (12, 9, 6, 4.5, 3, 2.25, 1.5, 1.125)),
-    *(Steps(1e-3 * step, locate_yield=True) for step in (0.75, 0.5625, 0.375, 0.1875)),
-)
-"""Steps a pilot run chooses from, cheapest first. Still longer steps save little because events dominate the cost."""
 ELEMENTS_AS_FAST = 16
 """Number of soil elements that cost about as much as the closed form."""
 DESIGNS_A_PIECE = 10_000
@@ -58,12 +48,6 @@ MOST_STEPS = 20_000
 """Steps to the horizon at which shortening ends, with the soil in closed form; fewer with many soil elements."""
 LONGEST_HORIZON = 10.0
 """A design without proof of its verdict at the horizon is simulated for up to this many horizons."""
-DESIGNS = 4096
-"""Designs of a pilot run, soil in closed form."""
-FEWEST_DESIGNS = 256
-"""Smallest number of designs, for any number of soil elements."""
-QUANTILE = 0.999
-"""Fraction of the designs whose estimated error must not exceed the requested accuracy."""
 
 
 @dataclass(frozen=True)
@@ -73,19 +57,12 @@ class Accuracy:
     Parameters
     ----------
     asked
-        ``fast``, ``balanced``, ``fine``, ``0.01 deg`` or ``step``.
+        ``fast``, ``balanced``, ``fine`` or ``step``.
     steps
         Steps of the integrator; where ``error_estimate``, a solution with a third of the step is reported.
     error_estimate
         Whether doubtful rows are solved a second time, and rows closer to a limit than their error again by finer
         steps; without, the error of a row is estimated from the steps of one solution, and such rows stay undecided.
-    achieved_deg
-        Quantile `QUANTILE` of the estimated error of the rotation over the designs of a pilot run [deg]; None unless
-        the requested accuracy is a number; infinite where the error of more designs is not known.
-    pilot_designs
-        Designs of the pilot run; 0 without one.
-    met
-        Whether the requested accuracy was achieved.
     paired
         Whether every row is solved twice for its error, see `boulder_kernels.table.is_paired`.
     """
@@ -93,15 +70,12 @@ class Accuracy:
     asked: str
     steps: Steps
     error_estimate: bool
-    achieved_deg: float | None = None
-    pilot_designs: int = 0
-    met: bool = True
     paired: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data, for the metadata of the table."""
         reported_s = finer_step(self.steps.step_s) if self.error_estimate else self.steps.step_s
-        data: dict[str, Any] = {
+        return {
             "asked": self.asked,
             "step_s": self.steps.step_s if self.paired else reported_s,
             "reported_step_s": reported_s,
@@ -110,11 +84,6 @@ class Accuracy:
             if self.error_estimate
             else "guarded by the error of one solution, neither confirmed nor refined",
         }
-        if self.achieved_deg is not None:
-            data["pilot_designs"] = self.pilot_designs
-            data["estimated_error_p99_9_deg"] = self.achieved_deg if math.isfinite(self.achieved_deg) else None
-            data["met"] = self.met
-        return data
 
 
 def steps_of(sweep: Sweep) -> dict[str, Steps]:
@@ -187,83 +156,13 @@ def reported_step_s(control: Control) -> float:
 
 
 def accuracy_of(sweep: Sweep) -> Accuracy:
-    """Return how accurately a sweep is computed.
-
-    If the accuracy is a number, a pilot run on a sample of the sweep chooses the step. The sample, and therefore the
-    step, depends only on the settings.
-
-    Parameters
-    ----------
-    sweep
-        The sweep, with a step, a named accuracy, or a tolerance [deg].
-    """
+    """Return how accurately a sweep is computed."""
     solver = sweep.solver
     if solver.step_s is not None:
         return Accuracy("step", Steps(solver.step_s), error_estimate=False)
-    if isinstance(solver.accuracy, float):
-        return pilot(sweep, solver.accuracy)
     name = str(solver.accuracy)
     accuracy = Accuracy(name, steps_of(sweep)[name], error_estimate=name != "fast")
     model = sweep.model
     layered = is_layered(model.resistance, model.ground, model.shape)
     paired = is_paired(readings_of(sweep), control_of(sweep, accuracy), layered=layered)
     return replace(accuracy, paired=accuracy.error_estimate and paired)
-
-
-@lru_cache(maxsize=8)
-def pilot(sweep: Sweep, wanted_deg: float) -> Accuracy:
-    """Choose the step of a sweep by a pilot run on a sample of its designs.
-
-    Parameters
-    ----------
-    sweep
-        The sweep.
-    wanted_deg
-        Tolerance of the rotation [deg], to be met by a fraction `QUANTILE` of the designs.
-
-    Returns
-    -------
-    Accuracy
-        The first steps of `LADDER` that meet it, or those that come closest if none does.
-    """
-    designs = sampled_designs(sweep, pilot_size(sweep.model.soil_elements))
-    readings = readings_of(sweep)
-    tried: list[tuple[float, int]] = []
-    for rung, steps in enumerate(LADDER):
-        control = control_of(sweep, Accuracy("", steps, error_estimate=True, paired=True))
-        # Rounded, so that a processor that differs in the last bits finds the same.
-        achieved = float(f"{estimated_error_deg(designs, readings, control):.3g}")
-        tried.append((achieved, rung))
-        if achieved <= wanted_deg:
-            break
-    achieved, rung = min(tried)
-    return Accuracy(
-        asked=f"{wanted_deg:g} deg",
-        steps=LADDER[rung],
-        error_estimate=True,
-        achieved_deg=achieved,
-        pilot_designs=designs.size,
-        met=achieved <= wanted_deg,
-        paired=True,
-    )
-
-
-def pilot_size(elements: int) -> int:
-    """Return the number of designs in a pilot run, by the number of soil elements (0: closed form)."""
-    return max(FEWEST_DESIGNS, DESIGNS * ELEMENTS_AS_FAST // max(elements, ELEMENTS_AS_FAST))
-
-
-def estimated_error_deg(designs: Designs, readings: Readings, control: Control) -> float:
-    """Quantile of the estimated errors of the rotation [deg]; 0 where no error could be estimated.
-
-    A boulder that overturns has no error of its largest rotation, but its other errors stand for one: the errors of the
-    displacements, over the embedment depth or half the height of the boulder, as `estimate_error` compares them.
-    """
-    outcomes = simulate_table(designs.table, readings, control)
-    arm = np.maximum(designs.table.d, 0.5 * designs.table.H)
-    limit = (outcomes.status == Status.LIMIT) & np.isfinite(outcomes.theta_error)
-    errors = np.where(limit, outcomes.x_error / arm, outcomes.theta_error)
-    counts = ~np.isnan(errors)
-    if not counts.any():
-        return 0.0
-    return math.degrees(float(np.quantile(errors[counts], QUANTILE, method="higher")))

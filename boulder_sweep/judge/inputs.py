@@ -245,15 +245,5 @@ def _spread(lengths: tuple[int, ...], count: int) -> np.ndarray:
 
 def sampled_designs(sweep: Sweep, count: int) -> Designs:
     """Return about this many designs of a sweep, without those that cannot be computed."""
-    return designs_of(*_sampled(sweep, count), sweep.model)
-
-
-def plain_designs(sweep: Sweep, count: int) -> Designs:
-    """Return the same designs in the soil that their inputs describe, by the paper's law, stones by their profile."""
-    return designs_of(*_sampled(sweep, count), Model(profile=sweep.model.profile, taper=sweep.model.taper))
-
-
-def _sampled(sweep: Sweep, count: int) -> tuple[DesignBlock, np.ndarray]:
-    """Return a block of about this many designs, and which of them can be computed."""
     block = sweep.plan.selection(sampled_rows(sweep, count))
-    return block, np.asarray(block.reasons.codes) == 0
+    return designs_of(block, np.asarray(block.reasons.codes) == 0, sweep.model)

@@ -157,9 +157,7 @@ def words_of(sweep: Sweep, units: str = "si") -> str:
     return f"uncertain inputs taken at {', '.join(parts)}{judged if sweep.cases else ''}"
 
 
-def values_of(
-    spread: Distribution, mean: np.ndarray, z: np.ndarray, ends: tuple[np.ndarray, np.ndarray] | None = None
-) -> np.ndarray:
+def values_of(spread: Distribution, mean: np.ndarray, z: np.ndarray) -> np.ndarray:
     """Return the quantiles of a distribution at standard normal numbers.
 
     Parameters
@@ -170,12 +168,10 @@ def values_of(
         Means, before truncation where that is possible, shape (n,).
     z
         Standard normal numbers, shape (n,).
-    ends
-        Ends in place of its own, shape (n,) each, of a distribution that has moved; see `moving`.
     """
     from scipy.special import betainccinv, betaincinv, ndtr
 
-    low, high = (np.broadcast_to(end, mean.shape) for end in ends or (spread.low, spread.high))
+    low, high = (np.broadcast_to(end, mean.shape) for end in (spread.low, spread.high))
     if spread.kind == "normal":
         return _truncated(mean, spread.deviation(mean), low, high, z)
     if spread.kind == "lognormal":

@@ -81,8 +81,7 @@ def need_sentences(rows: ResultRows, need: Need) -> tuple[list[Sentence], NamedD
     number = int(np.nanargmin(answers if need.key.most else -answers))
     where, row = f" in the worst of {n:,} combinations" if n > 1 else "", rows.row(number)
     held = f"P(pass) = {row['p_pass']:.1%}" if "p_pass" in row else f"margin {row['margin']:.1%}"
-    name = "boulder mass" if need.key.name == BOULDER_MASS else label_of(need.key.name)
-    lead = f"The {'largest' if need.key.most else 'least'} {name} that passes{where}: "
+    lead = f"The {'largest' if need.key.most else 'least'} {label_of(need.key.name)} that passes{where}: "
     worst = (lead, Measure(float(answers[number]), need.key.field.unit), f" (design {number:,}, {held}).")
     return [worst], NamedDesign("The answer that is worst", number)
 

@@ -530,8 +530,7 @@ def _yaml(settings: Mapping[str, Any], ground: Ground, system: str) -> dict[str,
     taper = Shape.of_model(settings["model"]).taper
     soil = model["soil"] if isinstance(model["soil"], str) else f"{{elements: {model['soil']}}}"
     readings = f"{{{reading_words(settings)}}}" if model["preset"] == "mixed" else model["preset"]
-    asked = solver["accuracy"] or (f"{solver['accuracy_deg']} deg" if solver["accuracy_deg"] is not None else None)
-    accuracy = f"step: {solver['step_s']} s" if asked is None else f"accuracy: {asked}"
+    accuracy = f"accuracy: {solver['accuracy']}" if solver["accuracy"] else f"step: {solver['step_s']} s"
     limits = [
         f"{entry.key}: {_quantity(criterion[entry.name], entry.unit, system) if entry.unit else criterion[entry.name]}"
         for entry in fields_of("criterion")

@@ -165,9 +165,7 @@ class Summary:
     parts, bytes
         Files of the table and their size.
     accuracy
-        The accuracy requested, the step chosen for it, and the error estimated by a pilot.
-    firmness
-        How many verdicts of a sample small changes of the inputs would change, see `boulder_sweep.judge.firmness`.
+        The accuracy requested, and its steps.
     notes
         What the user should know: damaged parts that were computed again, a heading that stays.
     boulder
@@ -186,7 +184,6 @@ class Summary:
     parts: int
     bytes: int
     accuracy: dict[str, Any]
-    firmness: dict[str, Any]
     notes: Sequence[str]
     boulder: dict[str, Any]
 

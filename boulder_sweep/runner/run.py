@@ -22,7 +22,6 @@ from typing import TYPE_CHECKING, Any
 from boulder_sweep.errors import BackendError, ClusterLostError, ComputationError, Interrupted, safe_words
 from boulder_sweep.judge.accuracy import accuracy_of
 from boulder_sweep.judge.evaluation import Evaluation, Simulate, by_kernels, evaluation_of
-from boulder_sweep.judge.firmness import firmness_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import Location, location_of, names_in
 from boulder_sweep.runner.pool import (
@@ -91,9 +90,10 @@ class _Plan:
         """Rows that are there."""
         return sum(part.stop - part.first for part in self.there.intact)
 
-    def metadata(self, firmness: dict[str, Any]) -> dict[bytes, bytes]:
-        """Return what all parts say."""
-        return file_metadata(self.identity, rows=self.ranges.rows, ranges=self.ranges.count, firmness=firmness)
+    @property
+    def metadata(self) -> dict[bytes, bytes]:
+        """What all parts say."""
+        return file_metadata(self.identity, rows=self.ranges.rows, ranges=self.ranges.count)
 
 
 def run(
@@ -174,8 +174,8 @@ def run(
             plan = signals.call(lambda: _planned(sweep, simulate))
             plan.there = signals.call(lambda: _there(plan, out, overwrite))
             whole.before = plan.rows_done
-            firmness = signals.call(lambda: _firmness(plan, out))
-            whole.compute(plan, plan.metadata(firmness), progress)
+            signals.call(lambda: _refuse_too_large(plan, out))
+            whole.compute(plan, progress)
             signals.call(lambda: _check_whole(out, plan, whole.written))
         except Interrupted as stop:
             raise Interrupted(stop.signum, whole.rows_safe, sweep.n_designs, again) from None
@@ -198,7 +198,6 @@ def run(
         parts=len(parts),
         bytes=sum(part.bytes for part in parts),
         accuracy=plan.identity["accuracy"],
-        firmness=firmness,
         notes=_notes(plan),
         boulder={name: model[name] for name in ("foot", "rock_assumed") if name in model},
     )
@@ -237,10 +236,10 @@ class _Run:
     def _rows_written(self) -> int:
         return sum(part.rows for part in self.written)
 
-    def compute(self, plan: _Plan, metadata: dict[bytes, bytes], progress: Report | None) -> None:
+    def compute(self, plan: _Plan, progress: Report | None) -> None:
         """Compute and write what is missing; raises as `run`."""
         size = max(int(BLOCK_S / seconds_per_row(plan.sweep, plan.evaluation)), 1)
-        work = Work(plan.evaluation, plan.sweep.block, metadata, str(self._out), size)
+        work = Work(plan.evaluation, plan.sweep.block, plan.metadata, str(self._out), size)
         thread = threading.Thread(target=self._work, args=(plan, work), name="run", daemon=True)
         thread.start()
         before, begun = plan.rows_done, time.monotonic()
@@ -391,17 +390,15 @@ def _same(plan: _Plan, out: Location) -> Contents:
     return found
 
 
-def _firmness(plan: _Plan, out: Location) -> dict[str, Any]:
-    """Return how firm the verdicts are; and check that the table will fit."""
-    firmness = firmness_of(plan.sweep)
+def _refuse_too_large(plan: _Plan, out: Location) -> None:
+    """Refuse a table that does not fit on its disk."""
     rows = plan.ranges.rows
     if plan.parts_missing and too_large(rows, "", (rows - plan.rows_done) * _MOST_BYTES_PER_ROW, out):
         plan.evaluation.warm_up()
-        cost = take_sample(plan.evaluation, plan.sweep, plan.metadata(firmness))
+        cost = take_sample(plan.evaluation, plan.sweep, plan.metadata)
         needed = time_and_disk(cost, rows - plan.rows_done, plan.parts_missing, 1)[1]
         if said := too_large(rows, "about", needed, out):
             raise failures.DoesNotFitError(said)
-    return firmness
 
 
 def _check_whole(out: Location, plan: _Plan, written: list[PartReport]) -> None:
@@ -459,7 +456,7 @@ def estimate(
         plan.there = _same(plan, location_of(out))
     plan.evaluation.warm_up()
     cores = available_cores()
-    cost = take_sample(plan.evaluation, sweep, plan.metadata(firmness_of(sweep)))
+    cost = take_sample(plan.evaluation, sweep, plan.metadata)
     missing = sweep.n_designs - plan.rows_done
     needed = time_and_disk(cost, missing, plan.parts_missing, min(jobs or cores, cores))
     return Estimate(sweep.n_designs, missing, *needed, jobs or cores, plan.there.damaged)

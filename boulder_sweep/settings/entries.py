@@ -1,7 +1,7 @@
 """Read the entries of a file block by block; after a mistake reading goes on with the next entry.
 
 Entries that are more than a number have readers of their own: words, readings of the paper, soil representation,
-accuracy, second opinions, layers, and the shape of the boulder, by a profile or by a scan.
+second opinions, layers, and the shape of the boulder, by a profile or by a scan.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from boulder_sweep.errors import ScanError
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.fields import Field
 from boulder_sweep.settings.model import (
-    ACCURACIES,
     CLOSED_FORM,
     NO_OPINION,
     PRESETS,
@@ -53,14 +52,12 @@ from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence, 
 from boulder_sweep.settings.units import SYSTEMS, UnitError, factor, system_of
 from boulder_sweep.settings.values import (
     Leaf,
-    NumberError,
     meant_by,
     quoted,
     read_block,
     read_count,
     read_input,
     read_single,
-    split_number,
 )
 from boulder_sweep.settings.vehicle import APPROACH, unfold_approaches
 from boulder_sweep.stones.rock import ROCKS
@@ -640,22 +637,6 @@ def _read_soil(node: Node) -> int:
     raise wrong(node.position, message)
 
 
-def _read_accuracy(node: Node) -> str | float:
-    """Read a name, or the error of the rotation that is admitted."""
-    field = fields.BY_NAME["accuracy"]
-    if isinstance(node, Scalar):
-        word = node.text.strip()
-        if word in ACCURACIES:
-            return word
-        try:
-            split_number(node.text, field.unit)
-        except NumberError:
-            choices, hint = ", ".join(ACCURACIES), did_you_mean(word, ACCURACIES)
-            message = f"{quoted(node)} is not {choices}, nor an angle such as 0.01 deg{hint}"
-            raise wrong(node.position, message) from None
-    return read_single(node, field)
-
-
 def _read_second_opinion(node: Node) -> tuple[str, ...]:
     """Read one law or a list of laws, in the order of the register; ``none`` for no second opinion."""
     if isinstance(node, Scalar) and node.text.strip().lower() == NO_OPINION:
@@ -681,7 +662,6 @@ _READERS: dict[str, Callable[[Node], Any]] = {
     "soil_elements": _read_soil,
     "layers": _read_layers,
     "profile": _read_profile,
-    "accuracy": _read_accuracy,
     "second_opinion": _read_second_opinion,
 }
 """Readers by name; an entry without one is a single number within its admitted range."""

@@ -650,12 +650,13 @@ class Model:
 class SolverSettings:
     """How finely and how long a design is simulated: by an accuracy, or by a step where that is None."""
 
-    accuracy: str | float | None = setting(
+    accuracy: str | None = setting(
         "solver.accuracy",
-        "deg",
-        "named accuracy, or the error of the rotation that is admitted",
+        "",
+        "how finely the motion is integrated",
         "balanced",
-        admitted=Bound(1e-9, 10.0, "error of the rotation that is admitted"),
+        choices=ACCURACIES,
+        kind="an accuracy",
     )
     step_s: float | None = setting(
         "solver.step",

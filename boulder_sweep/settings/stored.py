@@ -16,7 +16,6 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 from boulder_sweep.parquet import MOST_ROWS
 from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT, INPUTS, MAX_ELEMENTS, TO_BE_FOUND
 from boulder_sweep.settings.model import (
-    ACCURACIES,
     PRESETS,
     PRINTED,
     SECOND_OPINIONS,
@@ -28,6 +27,7 @@ from boulder_sweep.settings.model import (
     ProfilePoint,
     ReadingChoice,
     Scan,
+    SolverSettings,
 )
 from boulder_sweep.settings.problems import shorten
 from boulder_sweep.settings.soil_readings import shown_readings, strength
@@ -41,7 +41,6 @@ _ALWAYS = (
 """Inputs of which all settings have one."""
 _WORDS = {
     **{switch: {PRINTED, corrected} for switch, corrected in SWITCHES.items()},
-    "accuracy": {*ACCURACIES},
     "preset": {*PRESETS, "mixed"},
     "second_opinion": {*SECOND_OPINIONS},
     "impact_height_m": {IMPACT_HEIGHT_RULE},
@@ -103,14 +102,6 @@ class _Model:
     second_opinion: tuple[str, ...] = ()
 
 
-@dataclass
-class _Solver:
-    accuracy: str | None
-    step_s: float | None
-    horizon_s: float
-    accuracy_deg: float | None
-
-
 _Case = dict[str, float | tuple[float, ...] | _Long | dict[str, str]]
 
 
@@ -124,7 +115,7 @@ class _Settings:
     inputs: dict[str, float | str | tuple[float, ...] | _Long]
     model: _Model
     criterion: Criterion
-    solver: _Solver
+    solver: SolverSettings
     labels: dict[str, tuple[str, ...] | _Long] = field(default_factory=dict)
     distributions: dict[str, Distribution | _Sets] = field(default_factory=dict)
     correlation: float = 0.0

@@ -250,7 +250,7 @@ class Sweep:
                     rows |= is_unusual(values, BY_NAME[name])
             if rows.any():
                 given[UNUSUAL] = Source(rows.astype(np.float64), (0,))
-        # Pilot runs and estimates of the cost take some depth; `block` gives no design without its own.
+        # Estimates of the cost take some depth; `block` gives no design without its own.
         some_depth = {EMBEDMENT[0]: Source(np.array([_SOME_RATIO]))} if self.depth_sought else {}
         plan = DesignPlan(self.lengths, given | some_depth, labels, [case.plan for case in self.cases])
         plan.given = given
@@ -326,7 +326,6 @@ class Sweep:
         """
         inputs = self._inputs()
         inputs.setdefault("impact_height_m", IMPACT_HEIGHT_RULE)
-        accuracy = self.solver.accuracy
         more: dict[str, Any] = {}
         if self.distributions:
             spreads = {name: spread.to_dict() for name, spread in self.distributions.items()}
@@ -367,12 +366,7 @@ class Sweep:
                 **({} if ground.is_usual else {"ground": asdict(ground)}),
                 **({"second_opinion": list(opinions)} if (opinions := self.model.second_opinion) else {}),
             },
-            "solver": {
-                "accuracy": accuracy if isinstance(accuracy, str) else None,
-                "accuracy_deg": accuracy if isinstance(accuracy, float) else None,
-                "step_s": self.solver.step_s,
-                "horizon_s": self.solver.horizon_s,
-            },
+            "solver": asdict(self.solver),
             **({SECTION: given} if (given := self.heading.given()) else {}),
             **({UNITS: self.units} if self.units != SYSTEMS[0] else {}),
         }

@@ -23,7 +23,7 @@ from boulder_sweep.settings.sweep import SHOWN
 
 PREFIX = "boulder_sweep."
 """Prefix of this package's entries in the metadata of a file."""
-FORMAT = 3
+FORMAT = 4
 """Version of the format of tables and answers: one more whenever a column or entry comes, goes or changes meaning."""
 _PACKAGES = ("boulder-sweep", "numpy", "numba", "llvmlite", "pyarrow")
 _PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
@@ -39,7 +39,7 @@ _DECIDING_SOURCES = (
 )
 """Modules, in addition to the kernels, whose code determines the rows: of settings and stones what others import."""
 _JSON = {"format", "settings", "readings", "control", "accuracy", "versions"} | {
-    *("rows", "ranges", "range", "verdicts", "firmness"),  # of parts only
+    *("rows", "ranges", "range", "verdicts"),  # of parts only
 }
 """Entries of the metadata that are JSON."""
 _OWN = tuple(f"{PREFIX}{name}".encode() for name in ("range", "verdicts"))
@@ -80,7 +80,7 @@ def identity(
     control
         How the motion is integrated: step, horizon, limit, soil elements.
     accuracy
-        The accuracy requested, the step chosen for it, and the error estimated by a pilot.
+        The accuracy requested, and its steps.
 
     Returns
     -------
@@ -221,8 +221,8 @@ def file_metadata(identity_: Mapping[str, Any], **more: Any) -> dict[bytes, byte
     identity_
         See `identity`.
     more
-        Of a part: ``rows`` of its table, the number of its ``ranges``, and ``firmness``, see
-        `boulder_sweep.judge.firmness`. Of answers: the command that would ``repeat`` them.
+        Of a part: ``rows`` of its table and the number of its ``ranges``. Of answers: the command that would ``repeat``
+        them.
     """
     return {
         f"{PREFIX}{key}".encode(): (value if isinstance(value, str) else canonical(value)).encode(

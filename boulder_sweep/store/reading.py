@@ -168,7 +168,7 @@ def _table_of(folder: Location, part: PartFile, file: TableFile) -> Table:
             raise failures.OtherVersionError(
                 f"{folder} {other}. `sweep run` writes into another folder, or into this one once it is empty"
             )
-        rows, count, _ = (said.pop(key, None) for key in ("rows", "ranges", "firmness"))
+        rows, count = (said.pop(key, None) for key in ("rows", "ranges"))
         check_identity(said)
         if not (type(rows) is type(count) is int and 1 <= count <= rows <= _MOST_ROWS):
             raise ValueError(f"a table of {rows} rows in {count} parts")

@@ -28,10 +28,9 @@ FORMS = {
     "profile": "a list of points ([my boulder](stones.md#a-profile-or-a-taper))",
     "scan": "a file and a way to stand ([my boulder](stones.md#a-scan))",
     "second_opinion": "`none`, or a list of `broms` and `width_capped` ([how sure](confidence.md#second-opinion))",
-    "accuracy": "`fast`, `balanced`, `fine`, or an angle such as `0.01 deg` ([accuracy](accuracy.md))",
 }
 """What a setting may be, where it is neither a quantity nor one of some words."""
-PAGES = {"resistance": " ([soil models](site.md#soil-models))"}
+PAGES = {"resistance": " ([soil models](site.md#soil-models))", "accuracy": " ([accuracy](accuracy.md))"}
 """Where the words are explained."""
 EQUATIONS = Path(__file__).parents[1] / "equations.tsv"
 

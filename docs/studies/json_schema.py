@@ -30,7 +30,6 @@ from boulder_sweep.settings.fields import (
     Field,
 )
 from boulder_sweep.settings.model import (
-    ACCURACIES,
     CLOSED_FORM,
     NO_OPINION,
     PRESETS,
@@ -238,7 +237,6 @@ _FORMS: dict[str, Schema] = {
         },
     },
     "scan": _object({key: {"type": "string"} for key in SCAN_KEYS}, SCAN_KEYS[:3]),
-    "accuracy": {"anyOf": [_words(*ACCURACIES), _ref("solver.accuracy")]},
     "second_opinion": {
         "anyOf": [
             _words(NO_OPINION, *SECOND_OPINIONS),

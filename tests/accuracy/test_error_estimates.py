@@ -11,7 +11,7 @@ import pytest
 from boulder_kernels import DesignTable, OutcomeTable, Status, simulate_table
 from boulder_kernels.outcomes import NONE_NEEDED, PAIR, THETA_ERROR, X_ERROR, take_seconds
 from boulder_sweep.columns import OUTCOMES
-from boulder_sweep.judge.accuracy import LADDER, STEPS, STEPS_PRINTED, finer_step
+from boulder_sweep.judge.accuracy import STEPS, STEPS_PRINTED, Steps
 from boulder_sweep.judge.inputs import Designs, sampled_designs
 from boulder_sweep.judge.judged import UNDECIDED
 from boulder_sweep.judge.verdict import Limits, judge
@@ -22,8 +22,8 @@ from tests.accuracy.box import LIMIT, PRESETS, box_table, how
 from tests.judge.plain import plain_designs
 
 GRID = Path(__file__).parents[2] / "configs" / "m30_sizing.yaml"
-NUMBERS = tuple(steps for steps in LADDER if finer_step(steps.step_s) in (0.006, 0.003, 0.0005, 0.000125))
-"""Some steps that an accuracy given as a number may come to."""
+OTHERS = (Steps(0.018), *(Steps(1e-3 * step, locate_yield=True) for step in (9, 1.5, 0.375)))
+"""Steps of no named accuracy."""
 
 
 def grid_table(count: int) -> DesignTable:
@@ -31,12 +31,12 @@ def grid_table(count: int) -> DesignTable:
 
 
 def scores(table: DesignTable, preset: str) -> Iterator[tuple[str, FamilyScore]]:
-    """Yield the scores of the named accuracies, and of some that are given as a number."""
+    """Yield the scores of the named accuracies, and of other steps."""
     readings = PRESETS[preset]
     known, printed = reference(table, readings), preset == "as_printed"
     named = STEPS_PRINTED if printed else STEPS
-    for name, steps in (*named.items(), *(("a number", steps) for steps in NUMBERS)):
-        paired = printed or name == "a number"
+    for name, steps in (*named.items(), *(("other", steps) for steps in OTHERS)):
+        paired = printed or name == "other"
         yield name, compared(solved(table, steps, readings, estimate=name != "fast", paired=paired), known)
 
 

@@ -40,7 +40,7 @@ def test_a_hopeless_neighbour_does_not_matter() -> None:
     assert_same(OutcomeTable(*(c[keep] for c in one)), OutcomeTable(*(c[keep] for c in other)))
 
 
-@pytest.mark.parametrize("accuracy", ["fine", "0.001 deg"])
+@pytest.mark.parametrize("accuracy", ["balanced", "fine"])
 def test_workers_and_parts_do_not_matter(accuracy: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import pyarrow.parquet as pq
 

@@ -12,6 +12,7 @@ import pytest
 
 import boulder_sweep
 from boulder_sweep.answers.outputs import AnswerFile
+from boulder_sweep.answers.trials import depth_within
 from boulder_sweep.errors import QuestionError, ReportError
 from boulder_sweep.settings import SettingsError, load
 from boulder_sweep.settings.soil_readings import BELOW_FOOT
@@ -46,13 +47,14 @@ def test_no_other_depth_of_the_usual_range_gives_a_better_answer(asked):
     assert there[name] == found[name]
 
 
-def test_the_lightest_boulder_has_any_depth_of_the_usual_range():
-    sought, ranged = (
-        bare_need(site(**ONE, site=depth), "mass").arrow.to_pylist()[0]
-        for depth in (SOUGHT, "embedment_ratio: [0.35, 0.75]")
-    )
-    assert sought["least_boulder_mass_kg"] == ranged["least_boulder_mass_kg"]
-    assert sought["embedment_depth_m"] == ranged["embedment_depth_m"]
+@pytest.mark.parametrize("least", [0.0, 0.1, 0.25, 0.3])
+def test_the_deepest_that_is_tried_overlaps_enough_by_the_sums_of_the_verdict(least):
+    height = np.arange(1600, 4001) / 1000
+    depth = depth_within(0.1, 4.0, np.ones(len(height)), height, np.full(len(height), 0.5), least)
+    overlap = height - depth - 0.5
+    assert (overlap >= least).all()
+    assert (overlap > 0.0).all()
+    assert (overlap < least + 2.1e-3).all()
 
 
 def test_the_depth_itself_is_asked_for_as_of_any_file():

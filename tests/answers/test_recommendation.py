@@ -261,16 +261,6 @@ def test_a_boulder_that_passes_at_no_depth_names_the_speed_that_it_holds() -> No
     assert "passes at no depth; 1.446 m deep: overturns. It would qualify with vehicle.speed 3.62 m/s or" in said(found)
 
 
-def test_the_lightest_boulders_are_tried_in_every_soil() -> None:
-    sweep = load(CONFIGS / "site.yaml", ["site.embedment_ratio=[0.5, 0.75]", "boulder.width=[1.4 m, 1.7 m]"])
-    found = need(sweep, "mass")
-    design = design_of(found)
-    assert design.sizes["boulder_mass_kg"] == pytest.approx(found.frame.boulder_mass_kg.max())
-    assert holds(found, design.sizes).tolist() == [True, True]
-    assert "m long, " in said(found)
-    assert said(found).count("boulders") == 0
-
-
 @pytest.mark.parametrize("question", [{"most": "speed"}, {"least": "friction_angle"}, {"most": "embedment_depth"}])
 def test_a_question_about_soil_or_vehicle_names_no_boulder(question: dict) -> None:
     found = need(site(height="3.4 m"), **question)

@@ -77,21 +77,6 @@ def test_a_millimetre_less_is_too_little(answer: Need) -> None:
     assert any("P(pass)  P(robust)" in line for line in lines)
 
 
-@pytest.mark.nightly
-def test_the_least_mass_for_a_probability_of_a_robust_pass() -> None:
-    """Heavier than the least for any pass, and its chance is told."""
-    sweep = site(
-        length="1.5 m",
-        width="1.7 m",
-        height="{from: 2.8 m, to: 3.4 m, step: 0.1 m}",
-        site="embedment_ratio: 0.68",
-        friction="{mean: 39 deg, sd: 1 deg}",
-    )
-    any_, robust = (bare_need(sweep, "mass", probability=0.9, robust=robust).frame.iloc[0] for robust in (False, True))
-    assert robust.passes_at > any_.passes_at
-    assert 0.89 <= robust.p_robust <= robust.p_pass
-
-
 def test_without_second_opinions_nothing_is_said_of_them() -> None:
     sweep = site(**UNCERTAIN)
     sweep = replace(sweep, model=replace(sweep.model, second_opinion=()))

@@ -15,7 +15,6 @@ from boulder_sweep.answers.search import (
     NEVER,
     NOT_MONOTONE,
     Predicate,
-    last_before,
     search,
     settled,
     steady,
@@ -130,27 +129,6 @@ def test_an_answer_that_is_monotone_is_steady() -> None:
             assert np.array_equal(getattr(found, name), getattr(again, name))
 
 
-def test_the_last_before_is_that_of_a_loop() -> None:
-    """Random rows, some of which hold from their first place on."""
-    rng = np.random.default_rng(8)
-    first = rng.integers(-50, 50, 300)
-    holds = first + rng.integers(0, 600, 300)
-    begins = np.minimum(rng.integers(-100, 700, 300), holds)
-
-    def predicate(index: np.ndarray, places: np.ndarray) -> np.ndarray:
-        assert (places >= first[index]).all()
-        return np.where(places >= begins[index], HOLDS, FAILS)
-
-    fails, found, has_fails = last_before(predicate, holds, first)
-    for row in range(300):
-        place = holds[row]
-        while place > first[row] and place > begins[row]:
-            place -= 1
-        assert found[row] == place
-        assert has_fails[row] == (place > first[row])
-        assert fails[row] == place - 1 or not has_fails[row]
-
-
 def test_a_change_is_moved_to_where_a_predicate_changes_that_is_nearly_the_same() -> None:
     """Upwards and downwards, by little or much; what does not change up to an end of its range is left."""
     rng = np.random.default_rng(9)
@@ -188,14 +166,3 @@ def test_between_two_places_that_hold_only_the_other_predicate_is_asked() -> Non
     assert not [place for place in asked if place > 500 and place % 250]
     found = search(holds_from_500, *ends, between=stretches([(0, 686, HOLDS), (690, 1000, HOLDS)]))
     assert found.kind[0] == NOT_MONOTONE, "at 688 it fails"
-
-
-def test_before_a_gap_that_is_stepped_over_the_last_is_of_the_next_one() -> None:
-    """From 100 backwards by 1, 2, 4, ... the places 99, 97, 93, 85, 69 are tried."""
-    narrow = stretches([(69, 86, HOLDS), (89, 100, HOLDS)], [(0, 60, HOLDS), (90, 100, HOLDS)])
-    fails, holds, has_fails = last_before(narrow, np.array([100, 100]), np.array([0, 0]))
-    assert (fails.tolist(), holds.tolist(), has_fails.all()) == ([68, 89], [69, 90], True)
-    _, holds, has_fails = last_before(stretches([(5, 9, HOLDS)]), np.array([5]), np.array([5]))
-    assert (holds[0], has_fails[0]) == (5, False), "at the first place there is none before"
-    fails, holds, _ = last_before(stretches([(0, 40, BEYOND), (41, 99, HOLDS)]), np.array([99]), np.array([0]))
-    assert (fails[0], holds[0]) == (40, 41), "what cannot be tried does not hold"

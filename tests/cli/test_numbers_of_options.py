@@ -14,11 +14,10 @@ from boulder_sweep.cli.options import Quantity
 from boulder_sweep.settings import SettingsError, load_text
 from boulder_sweep.settings.fields import BY_PATH
 
-SITE, GRID = "configs/site.yaml", "configs/m30_sizing.yaml"
+SITE = "configs/site.yaml"
 BARE = {
     ("need", "--between"): (["need", SITE, "--between", "5", "9", "--units", "us"], "--between '5 ft' '9 ft'"),
     ("stone", "--mass"): (["stone", "rock.ply", "--mass", "18.2"], "--mass '18.2 kg' or --mass '18.2 lb'"),
-    ("run", "--accuracy"): (["run", GRID, "--accuracy", "0.01"], "--accuracy '0.01 deg'"),
     ("plot", "--at"): (["plot", "out.sweep", "--at", "width=1.8"], "--at width='1.8 m' or --at width='1.8 ft'"),
     ("fit-vehicle", "--mass"): (["fit-vehicle", "pulse.csv", "--mass", "6800"], "--mass '6800 lb'"),
     ("fit-vehicle", "--speed"): (
@@ -30,7 +29,7 @@ BARE = {
 PLAIN = {
     *("--set", "--at", "--least", "--most", "--across", "--up", "--facing", "--columns", "--rows", "--case", "--class"),
     *("--unit", "--scheduler", "--project", "--client", "--site", "--date", "--revision"),
-    *("--author", "--checked-by"),
+    *("--author", "--checked-by", "--accuracy"),
     *("--margin", "--probability", "--half-width", "--confidence"),
 }
 """Options that take words, or numbers without a dimension."""

@@ -28,7 +28,7 @@ def table_of(out):
 
 @pytest.mark.parametrize("shown", [(), ("--table",), ("--notes",), ("--table", "--notes", "--units", "us")])
 @pytest.mark.parametrize(
-    "words", [[], ["--least", "mass"], ["--most", "speed"], ["--margin", "10 %", "--any"], ["--margin", "90%"]]
+    "words", [[], ["--least", "height"], ["--most", "speed"], ["--margin", "10 %", "--any"], ["--margin", "90%"]]
 )
 def test_lines_fit_the_terminal(sweep, words, shown):
     code, out, err = sweep("need", CONFIG, *words, *shown)
@@ -81,18 +81,6 @@ def test_a_bare_number_above_one_is_per_cent_and_that_is_said(sweep, command):
     assert one[1].replace("--margin 25", "--margin '25 %'") == other[1]
     assert "note: --margin 25 is read as 25 %\n" in one[2]
     assert "is read as" not in other[2]
-
-
-def test_the_lightest_boulder_says_at_which_ends_it_lies(sweep):
-    one = (*BARE, "--set", "soil.friction_angle=40 deg")
-    wide = (*one, "--set", "boulder.width=[1.4, 1.9] m", "--set", "site.embedment_ratio=[0.45, 0.75]")
-    _, out, _ = sweep("need", CONFIG, "-q", "--least", "mass", *wide)
-    assert "edges: W is the least, 1.4 m (1 of 1); " in out
-    assert "H is" not in out
-    _, out, _ = sweep("need", CONFIG, "-q", "--least", "mass", *wide, "--units", "us")
-    assert "edges: W is the least, 4.593 ft (1 of 1); " in out
-    _, out, _ = sweep("need", CONFIG, "-q", "--least", "mass", *one, *SHALLOW, "--set", "boulder.height=3.4 m")
-    assert "at no end of one" in out.replace("\n  ", " ")
 
 
 def test_json_and_parquet_agree(sweep, tmp_path):
@@ -311,13 +299,8 @@ ASKED = {
     "nothing passes at any margin": ("abg",),
     "at the unfavourable ends": ("uncertain_site", "--at", "p10"),
     "a depth between": ("site", *LOW, "--between", "1.5 m", "1.8 m"),
-    "the mass, at the depth of the file": ("site", "--least", "mass", *SHALLOW),
     "the height, at the depth of the file": ("site", "--least", "height", "--units", "us", *SHALLOW),
-    "the mass in ranges that are wide, and a fast truck": (
-        *("site", "--least", "mass", "--set", "boulder.height=[3 m, 4 m]", "--set", "boulder.width=[1.68 m, 2.5 m]"),
-        *("--set", "site.embedment_ratio=[0.35, 0.75]", "--set", "vehicle.speed=45 mph", "--margin", "75 %"),
-        *("--set", "soil.friction_angle=40 deg"),
-    ),
+    "depths in a narrow range": ("site", *LOW, "--set", "site.embedment_ratio=[0.4, 0.5]"),
 }
 KEPT = ("--units", "--prefer", "--at", "--probability")
 
@@ -348,6 +331,8 @@ def test_every_command_is_run_and_leads_on(sweep, tmp_path, monkeypatch, words):
         assert len(options) == len(set(options))
         assert not {"--robust", "--any"} <= set(options)
         assert sorted(command) != sorted(["need", "my site.yaml", *words[1:]])
+        if any("count: " in word for word in command):  # of more boulders the depth is asked
+            assert {"--least", "--between"}.isdisjoint(command)
         for option, value in pairwise(words):
             if option in KEPT:
                 assert command[command.index(option) + 1] == value
@@ -356,6 +341,22 @@ def test_every_command_is_run_and_leads_on(sweep, tmp_path, monkeypatch, words):
         code, answer, err = sweep(*command, "-q")
         assert (code, err) == (0, "")
         assert re.search(r"\b[Bb]ury\s+the\s", answer)
+
+
+@pytest.mark.parametrize(
+    ("depths", "more"),
+    [
+        ("embedment_ratio=[0.4, 0.5]", True),
+        ("embedment_ratio=[0.2, 0.5]", True),
+        ("embedment_depth=[1.5 m, 1.6 m]", True),
+        ("embedment_ratio=[0.3, 0.8]", False),
+        ("embedment_ratio=0.5", False),
+    ],
+)
+def test_a_narrow_range_of_depths_is_widened(sweep, depths, more):
+    _, out, _ = sweep("need", CONFIGS / "site.yaml", "-q", *LOW, "--set", f"site.{depths}")
+    (command,) = (one for one in suggested(out) if any("count: " in word for word in one))
+    assert ("site.embedment_ratio=[0.35, 0.75]" in command) == more
 
 
 def test_a_probability_is_kept(sweep, tmp_path, monkeypatch):

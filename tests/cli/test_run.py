@@ -46,19 +46,9 @@ def test_designs_that_are_not_touched_are_counted(sweep, possible_grid):
     assert _counts(out)["error"] == 0
 
 
-def test_a_run_says_how_firm_its_verdicts_are(sweep, possible_grid):
+def test_a_run_says_that_a_pass_is_no_rating(sweep, possible_grid):
     _, out, _ = sweep("run", possible_grid, "--set", "boulder.height=[3.2, 3.6] m")
     assert "a simulation, not a rating by test" in out
-    words = " ".join(out.split())
-    assert "sample of 12 designs" in words
-    for change in (
-        "other reading of the paper",
-        "1 deg less friction angle",
-        "5 % more speed",
-        "broms",
-        "width_capped",
-    ):
-        assert change in words
 
 
 def test_a_run_says_what_is_robust_unless_second_opinions_are_left_out(sweep, possible_grid):
@@ -88,7 +78,6 @@ def test_json_is_one_object_on_stdout(sweep, possible_grid):
     assert found["name"] == "small grid"
     assert found["rows"] == 18
     assert sum(found["verdicts"].values()) == 18
-    assert found["firmness"]["designs"] == 18
     assert found["out"] == "out"
 
 
@@ -172,7 +161,7 @@ def interrupted(signum):
 def test_the_command_to_go_on_repeats_every_option(sweep, grid, monkeypatch):
     monkeypatch.setattr("boulder_sweep.runner.run.run", interrupted(2))
     words = ["-o", "my out", "--jobs", "2", "--backend", "dask", "--set", "vehicle.speed=20 mph"]
-    words += ["--accuracy", "0.01 deg", "--second-opinion"]
+    words += ["--accuracy", "fine", "--second-opinion"]
     code, _, err = sweep("run", grid, *words)
     assert code == 130
     assert shlex.split(err.partition("Resume with:\n  ")[2]) == ["sweep", "run", "grid.yaml", *words, "--resume"]

@@ -236,7 +236,7 @@ UNCERTAIN = {"friction": "{mean: [36, 40] deg, cov: 5 %}", "site": "embedment_de
 QUESTIONS: dict[str, Callable[[], Any]] = {
     "depth": lambda: bare_need(site(), margin=0.1),
     "ratio": lambda: bare_need(site(height="3.4 m", site="embedment_ratio: [0.5, 0.7]"), robust=True),
-    "mass": lambda: bare_need(site(height="[2.6, 3.6] m", friction="[38, 40] deg"), "mass"),
+    "height": lambda: bare_need(site(height="[2.6, 3.6] m", friction="[38, 40] deg"), "height"),
     "speed": lambda: bare_need(site(height="[3.0, 3.4] m"), most="speed"),
     "chance": lambda: bare_need(site(**UNCERTAIN, height="3.4 m"), probability=0.9),
     "capacity": lambda: capacity(site(height="[3.0, 3.4] m")),

@@ -311,11 +311,6 @@ def test_where_one_solution_overturns_and_the_other_does_not_nothing_is_decided(
     assert np.isnan(found["time_to_limit_s"][0])
 
 
-def test_the_pilot_counts_designs_that_overturn(tmp_path: Path) -> None:
-    sweep = sweep_of(tmp_path, "1e-4 deg")
-    assert accuracy_of(sweep).steps.step_s < 0.012
-
-
 LIMIT = math.radians(20.0)
 SLOWER = Control(STEPS["balanced"].step_s, 1.0, LIMIT, 0, error_estimate=True, longest_horizon=LONGEST_HORIZON)
 BALANCED = Evaluation(corrected(), SLOWER, Limits(LIMIT, "P1"))

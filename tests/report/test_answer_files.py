@@ -40,7 +40,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     found: dict[str, Any] = {
         "depth": bare_need(site(), margin="10 %"),
         "depth of a ratio": bare_need(site(site=RATIOS), robust=True),
-        "mass": bare_need(site(height="[2.6, 3.6] m", friction="[38, 40] deg"), "mass"),
+        "height": bare_need(site(height="[2.6, 3.6] m", friction="[38, 40] deg"), "height"),
         "speed": bare_need(site(height="[3.0, 3.4] m"), most="speed"),
         "chance": bare_need(site(**UNCERTAIN, height="3.4 m"), probability=0.9),
         "sets": bare_need(load_text(SETS, folder / "sets.yaml"), margin=0.1),
@@ -54,7 +54,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {name: folder / f"{name}.parquet" for name in found}
 
 
-NEEDS = ("depth", "depth of a ratio", "mass", "speed", "chance", "sets", "one", "nothing")
+NEEDS = ("depth", "depth of a ratio", "height", "speed", "chance", "sets", "one", "nothing")
 
 
 @pytest.mark.parametrize("name", NEEDS)
@@ -113,7 +113,7 @@ def _name(row: dict[str, Any]) -> str:
     return f"fail: {row['found']}" if row["passes_at"] is None else f"pass: {row['robustness']}"
 
 
-RARELY_OPENED = ("sets", "mass", "speed", "chance", "uncertainty", "nothing")
+RARELY_OPENED = ("sets", "height", "speed", "chance", "uncertainty", "nothing")
 
 
 @pytest.mark.parametrize(
@@ -222,7 +222,7 @@ def _slower() -> dict[str, Any]:
     return own | {"constants": own["constants"] | {"impact_speed_m_s": 11.176}}
 
 
-@pytest.mark.parametrize("other", ["mass", "capacity", "uncertainty"])
+@pytest.mark.parametrize("other", ["height", "capacity", "uncertainty"])
 def test_answers_to_two_questions_are_not_compared(files: dict[str, Path], other: str) -> None:
     with pytest.raises(ReportError, match="compare two results of one command and question"):
         compare(files["depth"], files[other])

@@ -37,8 +37,8 @@ def needs() -> dict[str, Need]:
     """Answers with a recommendation, and without one that qualifies."""
     return {
         "depth": boulder_sweep.need(site(height="[3.0, 3.4, 3.6] m")),
-        "mass": boulder_sweep.need(
-            site(height="[2.6, 3.6] m", friction="[38, 40] deg"), "mass", margin=0.1, robust=False
+        "height": boulder_sweep.need(
+            site(height="[2.6, 3.6] m", friction="[38, 40] deg"), "height", margin=0.1, robust=False
         ),
         "chance": boulder_sweep.need(site(height="3.4 m", **UNCERTAIN_FRICTION), probability=0.9),
         "nearest": boulder_sweep.need(site(height="3.0 m")),
@@ -75,7 +75,7 @@ def sheet(file: Path, units: str = "si") -> Sheet:
     return sheet_of(rows, answer_of(rows), units)
 
 
-NAMES = ("depth", "mass", "chance", "taken", "nearest", "never")
+NAMES = ("depth", "height", "chance", "taken", "nearest", "never")
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -117,7 +117,7 @@ def test_answers_without_a_recommendation_have_none_in_their_file(tmp_path: Path
             "depth",
             "Which of 3 boulders, buried how deep, stops a truck of 6,804\u00a0kg at 13.41\u00a0m/s in both soils, ",
         ),
-        ("mass", "Which is the lightest boulder that stops a truck of "),
+        ("height", "How high must the boulder be to stop a truck of "),
         ("chance", "How deep must the boulder be buried to stop a truck of "),
     ],
 )

@@ -21,7 +21,7 @@ HUGE = {
 
 @pytest.fixture(autouse=True)
 def nothing_may_be_computed(monkeypatch):
-    """Neither a pilot nor the sweep: each would compile the kernels first."""
+    """It would compile the kernels first."""
 
     def never(*_):
         raise AssertionError("too late")

@@ -94,7 +94,7 @@ def test_resolved_is_plain_data_with_units_in_its_names(load_it, example):
     assert resolved["model"]["calibrated_crush_m"] == 1.0
     assert resolved["model"]["readings"]["inertia"] == "box"
     assert resolved["model"]["soil"] == "closed_form"
-    assert resolved["solver"] == {"accuracy": "balanced", "accuracy_deg": None, "step_s": None, "horizon_s": 1.0}
+    assert resolved["solver"] == {"accuracy": "balanced", "step_s": None, "horizon_s": 1.0}
 
 
 def test_resolved_stands_for_long_axes_by_their_hash(load_with):
@@ -129,8 +129,6 @@ def test_readings(load_with, text, preset, corrected):
     ("override", "expected"),
     [
         ("solver.accuracy=fine", ("fine", None, 1.0)),
-        ("solver.accuracy=0.01 deg", (0.01, None, 1.0)),
-        ("solver.accuracy=1e-4", (1e-4, None, 1.0)),
         ("solver.step=4 ms", (None, 0.004, 1.0)),
         ("solver.horizon=250 ms", ("balanced", None, 0.25)),
     ],

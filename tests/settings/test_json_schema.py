@@ -71,7 +71,7 @@ def test_the_examples_of_the_tests_are_valid(example, minimal):
         ("friction_angle: 43.2", "friction_angle: {distribution: triangular, low: 34, mode: 39, high: 42}"),
         ("friction_angle: 43.2", "friction_angle: {distribution: lognormal, characteristic: 36 deg, cov: 0.08}"),
         ("vehicle:", "model: {readings: {preset: as_printed, inertia: box}, soil: {elements: 500}}\nvehicle:"),
-        ("vehicle:", "solver: {accuracy: 0.01 deg, horizon: 1 s}\nvehicle:"),
+        ("vehicle:", "solver: {accuracy: fine, horizon: 1 s}\nvehicle:"),
         ("vehicle:", "criterion:\nvehicle:"),
         ("vehicle:", "allow_unusual: all\nvehicle:"),
         ("vehicle:", "allow_unusual: [vehicle.mass, soil.density]\nvehicle:"),
