@@ -46,6 +46,10 @@ class Measure(NamedTuple):
 
     value: float
     unit: str
+    before: str = ""
+    """Of a number that is a bound: ``at most ``."""
+    up: int = 0
+    """Of a depth, which has three decimals: 1 if it is rounded up, -1 if down."""
 
 
 Sentence = tuple[str | Measure, ...]
