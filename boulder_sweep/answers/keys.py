@@ -10,6 +10,7 @@ import numpy as np
 
 from boulder_sweep.answers.spread import narrowed
 from boulder_sweep.answers.trials import LEAST_RATIO
+from boulder_sweep.designs import SIDES
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.fields import BOULDER_MASS, UnknownNameError, named
@@ -64,6 +65,12 @@ class Key:
     def step(self) -> float:
         """Spacing of the values tried, in the unit of the table; answers are multiples of it."""
         return STEPS[self.field.unit]
+
+    @property
+    def gives(self) -> tuple[str, ...]:
+        """Columns of other inputs that an answer gives."""
+        is_mass = self.name == BOULDER_MASS.name
+        return (*(SIDES if is_mass else ()), *(fields.EMBEDMENT if is_mass or self.name in fields.EMBEDMENT else ()))
 
     @property
     def answer(self) -> str:

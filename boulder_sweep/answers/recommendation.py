@@ -257,7 +257,7 @@ class Recommendation:
         if prefer not in PREFERENCES:
             raise ValueError(f"{prefer} cannot be preferred")
         chosen, deepest = None if best is None else design(best), entries["deepest_m"]
-        if deepest is not None and not chosen.sizes[DEPTH] <= deepest <= chosen.sizes[HEIGHT]:
+        if deepest is not None and not (chosen and chosen.sizes[DEPTH] <= deepest <= chosen.sizes[HEIGHT]):
             raise ValueError("its greatest depth is none")
         return cls(prefer, chosen, others, boulders, qualified, alike, conditions, nearest, deepest_m=deepest)
 
@@ -416,7 +416,8 @@ class _Boulders:
         ends = np.floor(most.min() * MILLIMETRES + 1e-6), np.ceil(least * MILLIMETRES - 1e-6)
         if ends[0] <= ends[1]:
             return least
-        found = steady(search(predicate, *(np.array([end], dtype=np.int64) for end in ends)))
+        first, last = (np.array([end], dtype=np.int64) for end in ends)
+        found = steady(search(predicate, first, last))
         return float(found.holds[0]) / MILLIMETRES if found.has_holds[0] else least
 
     def nearest(self, asked: Question) -> Nearest:

@@ -125,10 +125,12 @@ def need(
     be computed, and `never` otherwise.
     """
     from boulder_sweep.answers.advice import Again
+    from boulder_sweep.answers.keys import key_of
     from boulder_sweep.answers.need import need as answer
     from boulder_sweep.answers.printing import need_lines
     from boulder_sweep.judge.quantiles import at_values
     from boulder_sweep.settings import load
+    from boulder_sweep.views.answer_charts import check_varies
 
     refuse_units_of_json(units, as_json)
     if question["probability"] is not None and at is not None:
@@ -140,6 +142,8 @@ def need(
     refuse_unwritable(out, picture)
 
     def say_how() -> None:
+        if picture is not None:
+            check_varies(sweep, key_of(question["most"] or question["least"] or "embedment_depth"))
         if not quiet:
             say_notes(sweep, units)
             say_percents(margin=question["margin"], probability=question["probability"])

@@ -91,13 +91,18 @@ def need_sentences(rows: ResultRows, need: Need) -> tuple[list[Sentence], NamedD
     return [worst], NamedDesign("The answer that is worst", number)
 
 
-def screens(rows: ResultRows) -> dict[str, Screen]:
+def screens(rows: ResultRows, answer: Answer) -> dict[str, Screen]:
     """Return the answers as tables by system of units; none of a run, or of one that is the design recommended."""
-    file, found = rows.finished, rows.need and rows.need.recommendation
+    file, found = rows.finished, answer.need.recommendation
     if not isinstance(file, AnswerFile) or (found and found.design is not None and len(rows.codes) == 1):
         return {}
     answers = file.answers()
-    return {system: SCREENS[file.kind](answers, system) for system in SYSTEMS}
+    best = (
+        []
+        if file.kind != CAPACITY or not found or not found.design
+        else [{row["design_id"] for row in found.design.rows}]
+    )
+    return {system: SCREENS[file.kind](answers, system, *best) for system in SYSTEMS}
 
 
 @dataclass(frozen=True, eq=False)

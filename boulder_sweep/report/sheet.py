@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from boulder_kernels.rules import ISLAND_RATIO, ISLAND_SLIDE
-from boulder_sweep.answers.advice import advice, question
+from boulder_sweep.answers.advice import advice, mass_is_least, question
 from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.outputs import AnswerFile
 from boulder_sweep.answers.printing import Screen, cases_screen, withstood
@@ -57,7 +57,8 @@ DRAWN = (
 )
 """Grade and note of a design with a probability of a robust pass."""
 WITHSTANDS = "Which speed, which truck and which soil does the boulder withstand?"
-"""What `sweep capacity` asks."""
+WITHSTAND = "Which of {:,} designs is to be built, and which speed, truck and soil does it withstand?"
+"""What `sweep capacity` asks, of one design and of several."""
 Cell = str | Measure
 LAYER_UNITS = ("m", "deg", "kg/m^3", "MN/m^3", "kPa")
 """Units of what `soils_of` returns."""
@@ -140,19 +141,21 @@ def _words(rows: ResultRows, answer: Answer, design: Design, names: Sequence[str
     """Return the sentences; the names are inputs that tell cases apart."""
     found, said, asked = answer.need.recommendation, advice(answer.need, units), question(answer.need, units)
     ground = ground_words(rows.settings, units) or "dry, level, the same at every depth, without cohesion"
-    derived, first = rows.settings.get("derived", {}), tuple[str, ...]()
+    derived, last = rows.settings.get("derived", {}), tuple[str, ...]()
+    case = ", ".join(_named(name, answer.row[name], units) for name in names)
+    governs = f"in the worst of {len(design.rows):,} cases: {case}" if case and len(design.rows) > 1 else ""
     logs = dict.fromkeys(log_title(soil) for soil in derived.get("soil", ()) if "log" in soil)
     ground += "".join(f", from {title}" for title in logs)
     ground += "".join(f". Boulders: from {boulders['file']}" for boulders in derived.get("table", ()))
     if isinstance(rows.finished, AnswerFile) and isinstance(reserves := rows.finished.answers(), Reserves):
-        asked, first = WITHSTANDS, (withstood(reserves, answer.named.number, units),)
-    case = ", ".join(_named(name, answer.row[name], units) for name in names)
-    governs = f"in the worst of {len(design.rows):,} cases: {case}" if case and len(design.rows) > 1 else ""
+        asked = WITHSTANDS if len(rows.codes) == 1 else WITHSTAND.format(len(rows.codes))
+        where = f"I{governs[1:].replace(': ', ' (')}) it" if governs else "It"
+        last = (withstood(reserves, answer.named.number, units, where),)
     if found is None:  # the worst answer, or why there is none
         said = ["".join(p if isinstance(p, str) else _measured(p, units) for p in answer.sentences[0])]
     if found is None or found.design is None:
-        return Words(asked, (*first, *said), (), "", ground, governs)
-    return Words(asked, (*first, said[0]), tuple(said[1:-1]), said[-1], ground, governs)
+        return Words(asked, (*said, *last), (), "", ground, governs)
+    return Words(asked, (said[0], *last), tuple(said[1:-1]), said[-1], ground, governs)
 
 
 def _measured(part: Measure, units: str) -> str:
@@ -185,11 +188,9 @@ def _checks(
     lines: list[tuple[str, Cell, Cell, str]] = []
     for words, name, unit, allowed in of:
         value = row[name]
-        used, bound = "–", "at least " * (overturned and name in UP_TO_THE_END)
-        if value and allowed:
-            used = (
-                f"{bound and '≥ '}{100.0 * max(allowed / value if name == 'overlap_m' else value / allowed, 0.0):.0f} %"
-            )
+        used, bound = "–", "≥ " * (overturned and name in UP_TO_THE_END)
+        if value and allowed and not (bound and value < 0.0):
+            used = f"{bound}{100.0 * max(allowed / value if name == 'overlap_m' else value / allowed, 0.0):.0f} %"
         none = "no limit" if name == "max_displacement_m" else "–"
         computed = _outcome(row, name, unit, bound)
         lines.append((words, computed, none if allowed is None else Measure(allowed, unit), used))
@@ -197,8 +198,9 @@ def _checks(
         # A second opinion tells whether the boulder stays below a limit, not how far it turns.
         found, limit = need.recommendation, criterion["max_rotation_deg"]
         share = 1.0 - need.least_margin * (need.robust and (found is None or found.design is design))
-        bound = Measure(share * limit, "deg", "at most "), f"≤ {100.0 * share:.0f} %"
-        computed, used = bound if design.stands else ("fails", "–")
+        computed, used = "fails", "–"
+        if design.stands:
+            computed, used = Measure(share * limit, "deg", "at most "), f"≤ {100.0 * share:.0f} %"
         lines.insert(1, ("rotation, weakest model", computed, Measure(limit, "deg"), used))
     if "p_pass" in row:
         least = "–" if need.probability is None else f"≥ {100.0 * need.probability:.4g} %"
@@ -227,11 +229,12 @@ def _build(rows: ResultRows, row: Mapping[str, Any], design: Design, need: Need)
     mass, density = row.get(BOULDER_MASS) or float(rows.mass().flat[0]), float(row["boulder_density_kg_m3"])
     rock = "".join(kind["name"] for kind in rows.settings.get("derived", {}).get("rock", ())) or "rock"
     low = ", low end" * rows.settings.get("taken_at", {}).get("boulder_density_kg_m3", "").endswith("low")
-    of_mass = "" if BOULDER_MASS in rows.settings["inputs"] else low
+    of_mass = ", low end" * mass_is_least(need.sweep)
+    name = BOULDER_MASS if BOULDER_MASS in rows.settings["inputs"] else "boulder_density_kg_m3"
     lines.append((f"mass{of_mass}", Measure(float(mass), "kg")))
-    judged = [case.get("boulder_density_kg_m3") for case in rows.settings.get("judged_at", ()) if of_mass]
+    judged = [case.get(name) for case in rows.settings.get("judged_at", ()) if of_mass]
     if high := max((other for other in judged if isinstance(other, float)), default=0.0):
-        lines.append(("mass, high end", Measure(float(mass) * high / density, "kg")))
+        lines.append(("mass, high end", Measure(float(mass) * high / float(row.get(name) or mass), "kg")))
     lines.append((f"density of {rock}{low}", Measure(density, "kg/m^3")))
     if _is_taped(row):
         lines.append(("fills of its box", f"{row['solidity']:.0%}"))

@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+    from boulder_sweep.answers.keys import Key
     from boulder_sweep.answers.need import Need
     from boulder_sweep.answers.reserves import Reserves
     from boulder_sweep.answers.uncertainty import Uncertainty
@@ -72,9 +73,18 @@ ANSWERS = {
 }
 """Columns of answers that are drawn, each with its words and unit."""
 DASHES = ("-", "--", "-.", (0, (1, 1)))
+ONE_ANSWER = "a design chart needs an input with several values; this question has one answer, no curve"
 FIFTHS = 5
 LEAST_RANGE = 0.01
 """Least width of the axis of probabilities."""
+
+
+def check_varies(sweep: Sweep, key: Key) -> None:
+    """Refuse a question that has one answer, before it is asked: no input varies but the one asked for."""
+    found = {axis.name for axis in sweep.axes if axis.labels} | {key.name, *key.gives}
+    given = {name: one for name, one in sweep.plan.given.items() if not {name, BY_NAME[name].section} & found}
+    if all(one.values.min() == one.values.max() for one in given.values()):
+        raise PictureError(ONE_ANSWER)
 
 
 def draw_design_chart(need: Need, path: str | Path, *, units: str = "si") -> None:
@@ -153,7 +163,7 @@ def _shown(sweep: Sweep, frame: pd.DataFrame, searched: Sequence[str]) -> ChartR
     varying = [name for name in open_ if BY_NAME[name].section not in sets and len(frame[name].unique()) > 1]
     across = next((name for name in ACROSS if name in varying), next(iter(varying), None))
     if across is None:
-        raise PictureError("a design chart needs an input with several values; this question has one answer, no curve")
+        raise PictureError(ONE_ANSWER)
     over = next(iter(sets), None) or next((name for name in CURVES if name in varying and name != across), None)
     held: dict[str, float | str] = {}
     for name, names in sets.items():
