@@ -94,6 +94,13 @@ class Key:
         return first, np.floor(high / self.step + 1e-6).astype(np.int64)
 
 
+def others_vary(sweep: Sweep, key: Key) -> bool:
+    """Return whether inputs vary beside the one asked for, and beside named soils and vehicles."""
+    found = {axis.name for axis in sweep.axes if axis.labels} | {key.name, *key.gives}
+    given = (one for name, one in sweep.plan.given.items() if not {name, fields.BY_NAME[name].section} & found)
+    return any(one.values.min() < one.values.max() for one in given)
+
+
 def key_of(word: str, *, most: bool = False) -> Key:
     """Return the input that a path, key or column names; ``mass`` is the boulder's.
 

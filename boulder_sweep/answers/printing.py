@@ -305,8 +305,8 @@ def withstood(result: Reserves, number: int, units: str = "si", where: str = "It
         answer = answer_cell(key, column, f"{word}_found", units)(row).rstrip("*")
         known = row[column] is not None
         unit = head_of(key.name, units)[1]
-        to = "" if answer[0] in "≤≥" else "up to " if key.most else "down to "
-        said.append(f"a {what} of {to}{answer} {unit}".replace(" deg", "°") if known else f"no {what} that was tried")
+        to = "" if answer[0] in "≤≥" else " or less" if key.most else " or more"
+        said.append(f"a {what} of {answer} {unit}{to}".replace(" deg", "°") if known else f"no {what} that was tried")
     return f"{where} withstands {', '.join(said[:-1])} and {said[-1]}, each alone and without a margin."
 
 

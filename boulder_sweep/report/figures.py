@@ -318,7 +318,7 @@ def sketch_of(
         dimensions=dimensions,
         strata=tuple(strata),
         water=ground.water_table_m,
-        truck=min(float(front[heights >= depth + bumper].min(initial=0.0)), 0.0),
+        truck=min(float(np.interp(depth + bumper, heights, front)), *front[heights >= depth + bumper].tolist(), 0.0),
         plan=(wide - length, upper, length, width),
         foot=(wide - length + float(front[0]) - edge, middle + foot[1] / 2, *foot) if stands_out else None,
         bar=BARS[units],

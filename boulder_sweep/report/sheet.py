@@ -148,7 +148,8 @@ def _words(rows: ResultRows, answer: Answer, design: Design, names: Sequence[str
     ground += "".join(f", from {title}" for title in logs)
     ground += "".join(f". Boulders: from {boulders['file']}" for boulders in derived.get("table", ()))
     if isinstance(rows.finished, AnswerFile) and isinstance(reserves := rows.finished.answers(), Reserves):
-        asked = WITHSTANDS if len(rows.codes) == 1 else WITHSTAND.format(len(rows.codes))
+        boulders = 1 if found is None else found.boulders
+        asked = WITHSTANDS if boulders == 1 else WITHSTAND.format(boulders)
         where = f"I{governs[1:].replace(': ', ' (')}) it" if governs else "It"
         last = (withstood(reserves, answer.named.number, units, where),)
     if found is None:  # the worst answer, or why there is none

@@ -51,7 +51,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from boulder_sweep.answers.keys import Key
     from boulder_sweep.answers.need import Need
     from boulder_sweep.answers.reserves import Reserves
     from boulder_sweep.answers.uncertainty import Uncertainty
@@ -77,14 +76,6 @@ ONE_ANSWER = "a design chart needs an input with several values; this question h
 FIFTHS = 5
 LEAST_RANGE = 0.01
 """Least width of the axis of probabilities."""
-
-
-def check_varies(sweep: Sweep, key: Key) -> None:
-    """Refuse a question that has one answer, before it is asked: no input varies but the one asked for."""
-    found = {axis.name for axis in sweep.axes if axis.labels} | {key.name, *key.gives}
-    given = {name: one for name, one in sweep.plan.given.items() if not {name, BY_NAME[name].section} & found}
-    if all(one.values.min() == one.values.max() for one in given.values()):
-        raise PictureError(ONE_ANSWER)
 
 
 def draw_design_chart(need: Need, path: str | Path, *, units: str = "si") -> None:
