@@ -10,7 +10,6 @@ import numpy as np
 
 from boulder_sweep.answers.spread import narrowed
 from boulder_sweep.answers.trials import LEAST_RATIO
-from boulder_sweep.designs import SIDES
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.fields import BOULDER_MASS, UnknownNameError, named
@@ -67,12 +66,6 @@ class Key:
         return STEPS[self.field.unit]
 
     @property
-    def gives(self) -> tuple[str, ...]:
-        """Columns of other inputs that an answer gives."""
-        is_mass = self.name == BOULDER_MASS.name
-        return (*(SIDES if is_mass else ()), *(fields.EMBEDMENT if is_mass or self.name in fields.EMBEDMENT else ()))
-
-    @property
     def answer(self) -> str:
         """Column of the answer: ``least_embedment_depth_m``."""
         return f"{'most' if self.most else 'least'}_{self.name}"
@@ -92,13 +85,6 @@ class Key:
         """Return the outermost lattice positions within a range, the first behind the last where there is none."""
         first = np.ceil(low / self.step - 1e-6).astype(np.int64)
         return first, np.floor(high / self.step + 1e-6).astype(np.int64)
-
-
-def others_vary(sweep: Sweep, key: Key) -> bool:
-    """Return whether inputs vary beside the one asked for, and beside named soils and vehicles."""
-    found = {axis.name for axis in sweep.axes if axis.labels} | {key.name, *key.gives}
-    given = (one for name, one in sweep.plan.given.items() if not {name, fields.BY_NAME[name].section} & found)
-    return any(one.values.min() < one.values.max() for one in given)
 
 
 def key_of(word: str, *, most: bool = False) -> Key:

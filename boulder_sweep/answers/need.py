@@ -81,8 +81,10 @@ class Need(Result):
     def derived(self) -> tuple[str, ...]:
         """Input columns that follow from others or from the answer."""
         given = self.sweep.plan.given
-        derived = (name for name in ("embedment_depth_m", "impact_height_m") if name not in given)
-        return (*derived, *self.key.gives)
+        derived = tuple(name for name in ("embedment_depth_m", "impact_height_m") if name not in given)
+        if self.key.name == BOULDER_MASS.name:
+            return (*derived, *SIDES, *EMBEDMENT)
+        return (*derived, *EMBEDMENT) if self.key.name in EMBEDMENT else derived
 
     @property
     def seeks_depth(self) -> bool:

@@ -399,26 +399,24 @@ class _Boulders:
         """Return how deep [m] a design may be buried at most: it holds in all its rows from its own depth on."""
         rows, _ = next(self.tried[each] for each, one in self._judged.items() if one is design)
         given = {name: values[rows] for name, values in self.given.items() if name not in EMBEDMENT}
-        least, sweep, judges, count = design.sizes[DEPTH], self.asked.sweep, self.asked.judges, len(rows)
-        sides = {name: np.full(count, design.sizes[name]) for name in SIDES}
-        share, overlap = np.ones(count), sweep.criterion.min_overlap_m
-        most = depth_within(
-            least, covered_depth(sweep.derived), share, sides[HEIGHT], given["bumper_height_m"], overlap
-        )
+        sizes, sweep = {name: design.sizes[name] for name in (*SIDES, DEPTH)}, self.asked.sweep
+        bumper, least = given["bumper_height_m"], sizes[DEPTH]
+        high, height = covered_depth(sweep.derived), np.full(len(rows), sizes[HEIGHT])
+        most = depth_within(least, high, np.ones(len(rows)), height, bumper, sweep.criterion.min_overlap_m).min()
 
         def predicate(index: np.ndarray, positions: np.ndarray) -> np.ndarray:
-            depths = np.repeat(positions / MILLIMETRES, count)
-            block = block_at(given | sides, np.tile(np.arange(count), len(positions)), **{DEPTH: depths})
-            held = judges.holds(judges.final(block), block)
-            return np.where(held.reshape(-1, count).all(axis=1), HOLDS, FAILS)
+            held = []
+            for position in positions.tolist():  # its own depth is known to hold
+                one = sizes | {DEPTH: position / MILLIMETRES}
+                held.append(position == last or self.judged(rows, given, one, self.asked.judges) is not None)
+            return np.where(held, HOLDS, FAILS)
 
         # From the greatest depth up: where it begins to hold for good.
-        ends = np.floor(most.min() * MILLIMETRES + 1e-6), np.ceil(least * MILLIMETRES - 1e-6)
-        if ends[0] <= ends[1]:
+        first, last = int(most * MILLIMETRES + 1e-6), math.ceil(least * MILLIMETRES - 1e-6)
+        if first <= last:
             return least
-        first, last = (np.array([end], dtype=np.int64) for end in ends)
-        found = steady(search(predicate, first, last))
-        return float(found.holds[0]) / MILLIMETRES if found.has_holds[0] else least
+        found = steady(search(predicate, np.array([first]), np.array([last])))
+        return float(found.holds[0]) / MILLIMETRES
 
     def nearest(self, asked: Question) -> Nearest:
         """Return the boulder that fails in the fewest rows, and of these the one that is least short of the limits."""

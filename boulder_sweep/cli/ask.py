@@ -30,7 +30,7 @@ from boulder_sweep.cli.options import (
     with_or_without,
 )
 from boulder_sweep.cli.output import say, say_written, show, working
-from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED, PictureError
+from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
 from boulder_sweep.text import counted
 
 NEED_EXAMPLES = """\b
@@ -125,12 +125,10 @@ def need(
     be computed, and `never` otherwise.
     """
     from boulder_sweep.answers.advice import Again
-    from boulder_sweep.answers.keys import key_of, others_vary
     from boulder_sweep.answers.need import need as answer
     from boulder_sweep.answers.printing import need_lines
     from boulder_sweep.judge.quantiles import at_values
     from boulder_sweep.settings import load
-    from boulder_sweep.views.answer_charts import ONE_ANSWER
 
     refuse_units_of_json(units, as_json)
     if question["probability"] is not None and at is not None:
@@ -142,9 +140,6 @@ def need(
     refuse_unwritable(out, picture)
 
     def say_how() -> None:
-        key = key_of(question["most"] or question["least"] or "embedment_depth")
-        if picture is not None and not others_vary(sweep, key):
-            raise PictureError(ONE_ANSWER)
         if not quiet:
             say_notes(sweep, units)
             say_percents(margin=question["margin"], probability=question["probability"])

@@ -278,15 +278,21 @@ def sketch_of(
         Dimension(wide - length, upper + 0.2, wide, upper + 0.2, "L =", length, wide - length, upper + 0.36, "start"),
         upright(wide + 0.35, lower, upper, "W =", middle - 0.1),
     )
-    soils = soils_of(inputs, settings)
-    tops = [top for top, *_ in soils]
+    tops = [0.0, *(layer.from_m for layer in ground.layers)]
+    names = ("friction_angle_deg", "soil_density_kg_m3", "subgrade_reaction_MN_m3")
+    soils = [(*(inputs[name] for name in names), ground.cohesion_kPa)]
+    soils += [
+        (layer.friction_angle_deg, layer.density_kg_m3, layer.subgrade_reaction_MN_m3, layer.cohesion_kPa)
+        for layer in ground.layers
+    ]
+    has_cohesion = any(constants[-1] for constants in soils)
     # The ground is drawn as deep as its deepest boundary within two heights of the boulder.
     known = [*tops, ground.water_table_m or 0.0]
     bottom = min(bottom, -max(level for level in known if level <= 2 * height) - BELOW)
-    bottom = min(bottom, -(3 + (ground.cohesion_kPa > 0) + bool(ground.layers)) * LINE * len(tops) - 0.3)
+    bottom = min(bottom, -(3 + has_cohesion + bool(ground.layers)) * LINE * len(tops) - 0.3)
     strata = []
     written = 0.0
-    for k, (top, *constants) in enumerate(soils):
+    for k, (top, constants) in enumerate(zip(tops, soils, strict=True)):
         if -top <= bottom:
             break
         under = min(tops[k + 1] if k + 1 < len(tops) else -bottom, -bottom)
@@ -296,7 +302,7 @@ def sketch_of(
             *(
                 (name, value, unit)
                 for (name, unit), value in zip(symbols, constants, strict=True)
-                if name != "c" or value
+                if name != "c" or has_cohesion
             ),
         )
         first = max(top, written) + LINE
@@ -323,21 +329,6 @@ def sketch_of(
         foot=(wide - length + float(front[0]) - edge, middle + foot[1] / 2, *foot) if stands_out else None,
         bar=BARS[units],
     )
-
-
-def soils_of(inputs: Mapping[str, float], settings: Mapping[str, Any]) -> list[tuple[float, ...]]:
-    """Return the layers of the soil from the top down.
-
-    Of each the depth of its upper boundary [m], friction angle [deg], density [kg/m^3], subgrade reaction [MN/m^3] and
-    cohesion [kPa]. Arguments: see `sketch_of`.
-    """
-    ground = Ground.of_dict(settings["model"].get("ground", {}))
-    names = ("friction_angle_deg", "soil_density_kg_m3", "subgrade_reaction_MN_m3")
-    below = (
-        (one.from_m, one.friction_angle_deg, one.density_kg_m3, one.subgrade_reaction_MN_m3, one.cohesion_kPa)
-        for one in ground.layers
-    )
-    return [(0.0, *(inputs[name] for name in names), ground.cohesion_kPa), *below]
 
 
 class Reading(NamedTuple):

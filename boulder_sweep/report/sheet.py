@@ -21,7 +21,7 @@ from boulder_sweep.columns import BOULDER_MASS, SHAPES, TO_BUILD
 from boulder_sweep.judge.robustness import meaning_of
 from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
 from boulder_sweep.report.answers import Answer, Measure
-from boulder_sweep.report.figures import Sketch, sketch_of, soils_of
+from boulder_sweep.report.figures import Sketch, sketch_of
 from boulder_sweep.report.rows import DEPTH, ResultRows, inputs_of
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.settings.model import Ground, ProfilePoint
@@ -60,8 +60,6 @@ WITHSTANDS = "Which speed, which truck and which soil does the boulder withstand
 WITHSTAND = "Which of {:,} designs is to be built, and which speed, truck and soil does it withstand?"
 """What `sweep capacity` asks, of one design and of several."""
 Cell = str | Measure
-LAYER_UNITS = ("m", "deg", "kg/m^3", "MN/m^3", "kPa")
-"""Units of what `soils_of` returns."""
 
 
 class Words(NamedTuple):
@@ -90,8 +88,6 @@ class Sheet(NamedTuple):
     build: tuple[tuple[str, Cell], ...]
     soil: tuple[tuple[str, Cell, str], ...]
     """Name, value and source of each input; of soil in layers the uppermost one's."""
-    layers: tuple[tuple[Measure, ...], ...]
-    """Of each layer below: from which depth, friction angle, density, subgrade reaction, cohesion."""
     vehicle: tuple[tuple[str, Cell, str], ...]
     """Name, value and source of each input."""
     grade: tuple[str, str]
@@ -130,7 +126,6 @@ def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
         checks=_checks(row, settings["criterion"], answer.need, design),
         build=_build(rows, row, design, answer.need),
         soil=_soil(design.rows, settings),
-        layers=tuple(tuple(map(Measure, layer, LAYER_UNITS)) for layer in soils_of(inputs_of(row), settings)[1:]),
         vehicle=_inputs(design.rows, VEHICLE, settings),
         grade=opinion if "p_pass" not in row else DRAWN if row.get("p_robust") is not None else NOT_ASKED,
         cases={one: cases_screen(design, [*named, *several], one) for one in SYSTEMS if len(design.rows) > 1},

@@ -20,8 +20,6 @@ RESULT_ONLY = "--set, --at and --second-opinion change the settings of a file; s
 SI_ONLY = "leave out --units us or --json"
 NEED = "need SITE --set 'site.embedment_ratio=[0.3, 0.7]'"
 """A question that is asked with a note, which is not given where the question is refused."""
-ONE = "--set 'boulder.height=3.4 m' --set 'soil.friction_angle=40 deg'"
-"""One boulder in one soil."""
 NOTED = "UNCERTAIN --set 'boulder.width=6 m'"
 """The same of a file with uncertain inputs."""
 
@@ -84,8 +82,6 @@ def beside(tmp_path_factory):
         (f"{NEED} -o depths.csv", "must end in .parquet"),
         (f"{NEED} -o memory://answers/least.csv", "must end in .parquet"),
         (f"{NEED} --plot chart.bmp", "must end in"),
-        (f"{NEED} {ONE} --plot chart.png", "this question has one answer, no curve"),
-        (f"{NEED} {ONE} --least mass --plot chart.png", "this question has one answer, no curve"),
         (f"{NEED} --json --units us", "--json is in SI units for this command"),
         (f"{NEED} --margin 1", "--margin 1: must be 0 or more and less than 100 %"),
         (f"{NEED} --probability 120%", "must be more than 0 and less than 100 %"),
