@@ -289,7 +289,7 @@ def sketch_of(
     # The ground is drawn as deep as its deepest boundary within two heights of the boulder.
     known = [*tops, ground.water_table_m or 0.0]
     bottom = min(bottom, -max(level for level in known if level <= 2 * height) - BELOW)
-    bottom = min(bottom, -(3 + has_cohesion + bool(ground.layers)) * LINE * len(tops) - 0.3)
+    bottom = min(bottom, -(2 + (has_cohesion and len(tops) > 1)) * LINE * len(tops) - 0.3)
     strata = []
     written = 0.0
     for k, (top, constants) in enumerate(zip(tops, soils, strict=True)):
@@ -306,7 +306,7 @@ def sketch_of(
             ),
         )
         first = max(top, written) + LINE
-        written = first + (len(named) - 1) * LINE
+        written = first + (len(named) - 1) // 2 * LINE  # two to a line
         strata.append(Stratum(top, under, -first, named))
     bottom = min(bottom, -written - 0.2, lower - 1.0)
     strata[-1] = strata[-1]._replace(bottom=-bottom)

@@ -364,7 +364,7 @@ def test_the_name_of_a_project_stays_text_in_the_footer(files: dict[str, Path], 
     assert "<" not in footer
 
 
-@pytest.mark.parametrize(("name", "units"), [("depth", "si"), ("chance", "us"), ("nearest", "us")])
+@pytest.mark.parametrize(("name", "units"), [("depth", "si"), ("chance", "us"), ("nearest", "us"), ("layers", "us")])
 def test_the_sheet_fits_on_one_page(files: dict[str, Path], name: str, units: str, tmp_path: Path, opened: Any) -> None:
     page = opened(write_report(files[name], tmp_path / "page.html", units=units, heading=HEADING))
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
