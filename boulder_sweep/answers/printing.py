@@ -270,9 +270,7 @@ def reserve_screen(result: Reserves, units: str = "si", recommended: Sequence[in
 
     names = ("design_id", "verdict", "robustness", BOULDER_MASS.name)
     rows = zip(*(result.arrow[name].to_pylist() for name in names), strict=True)
-    order = sorted(
-        (row not in {*recommended}, verdict != "pass", RANKS[grade], mass, row) for row, verdict, grade, mass in rows
-    )
+    order = sorted((row not in recommended, verdict != "pass", RANKS[g], mass, row) for row, verdict, g, mass in rows)
     columns: list[Column] = [(("verdict", ""), lambda row: str(row["verdict"])), GRADE]
     for key, column, word, _ in RESERVES:
         columns.append((head_of(key.name, units), _format_withstood(key, column, f"{word}_found", units)))

@@ -94,15 +94,12 @@ def need_sentences(rows: ResultRows, need: Need) -> tuple[list[Sentence], NamedD
 def screens(rows: ResultRows, answer: Answer) -> dict[str, Screen]:
     """Return the answers as tables by system of units; none of a run, or of one that is the design recommended."""
     file, found = rows.finished, answer.need.recommendation
-    if not isinstance(file, AnswerFile) or (found and found.design is not None and len(rows.codes) == 1):
+    best = found.design.rows if found and found.design else []
+    if not isinstance(file, AnswerFile) or (rows.need and best and len(rows.codes) == 1):
         return {}
     answers = file.answers()
-    best = (
-        []
-        if file.kind != CAPACITY or not found or not found.design
-        else [{row["design_id"] for row in found.design.rows}]
-    )
-    return {system: SCREENS[file.kind](answers, system, *best) for system in SYSTEMS}
+    marked = [[row["design_id"] for row in best]] if file.kind == CAPACITY else []
+    return {system: SCREENS[file.kind](answers, system, *marked) for system in SYSTEMS}
 
 
 @dataclass(frozen=True, eq=False)

@@ -99,7 +99,8 @@ def test_of_a_question_without_a_recommendation_the_governing_answer_is_named(fi
 def test_what_has_no_answer_says_why(files: dict[str, Path], tmp_path: Path) -> None:
     bare_need(site(height="2.0 m"), most="speed").write(tmp_path / "speed.parquet")
     assert answer_of(read_rows(tmp_path / "speed.parquet")).sentences == (("Nothing that was tried passes.",),)
-    assert screens(read_rows(files["nothing"]))["si"].signs == [
+    nothing = read_rows(files["nothing"])
+    assert screens(nothing, answer_of(nothing))["si"].signs == [
         "blocked: does not pass by what was asked, up to where the truck would pass or ride over the boulder (1 row)"
     ]
     rows = read_rows(files["depth"])
