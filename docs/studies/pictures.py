@@ -41,7 +41,7 @@ SHEETS = {
     "borehole": (
         Path("configs/borehole_log.yaml"),
         "us",
-        Heading("Harbor plaza", "Port authority", "Pier 4, landward side", "2026-10-09", "B", "R. Moore", "L. Hart"),
+        Heading("Harbor plaza", "Port authority", "Pier 4, landward side", "2026-10-09", "B", "R. Moore", "L. Hale"),
     ),
     "stone": (
         Path("configs/quarry_stone.yaml"),
