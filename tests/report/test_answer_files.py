@@ -133,7 +133,7 @@ def test_the_page_opens_without_a_complaint(files: dict[str, Path], name: str, t
         lines += [[cell(row) for _, cell in screen.columns] for row in screen.rows]
         shown = page.locator(".answers:visible tr").all_inner_texts()
         assert [line.split() for line in shown] == [" ".join(line).split() for line in lines]
-        assert page.locator("[data-in]:visible > .wide ~ .hint").all_inner_texts() == screen.signs
+        assert page.locator("[data-in]:visible > .wide ~ .hint").all_inner_texts() == [*screen.signs]
     if len(table) > 1:
         assert re.match(rf"\d+ of the {len(table)} designs shown pass", page.inner_text("#sweep-words"))
     chosen = page.evaluate("page.data.chosen[0]")
