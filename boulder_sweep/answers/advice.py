@@ -21,6 +21,7 @@ from boulder_sweep.text import NO_BREAK_SPACE
 
 if TYPE_CHECKING:
     from boulder_sweep.answers.need import Need
+    from boulder_sweep.settings import Sweep
 
 MODELS = "under the weakest of three soil models"
 """What second opinions are, in the words of an answer."""
@@ -175,9 +176,7 @@ class _Words:
 
     def mass(self, row: Mapping[str, Any]) -> str:
         """Return the mass of the boulder of a row, tonnes or pounds; of one taken at its low end that it is no less."""
-        sweep = self.need.sweep
-        uncertain = BOULDER_MASS if BOULDER_MASS in sweep.plan.given else "boulder_density_kg_m3"
-        least = "at least " * sweep.taken_at.get(uncertain, "").endswith("low")
+        least = "at least " * mass_is_least(self.need.sweep)
         if self.units == "us":
             return least + self.quantity("kg", row[BOULDER_MASS], ",.0f")
         return f"{least}{row[BOULDER_MASS] / 1000:.1f}{NO_BREAK_SPACE}t"
@@ -413,6 +412,12 @@ class _Words:
             changes.append(f"{BY_NAME[name].path} {self.value(name, held)} or {'less' if at_most else 'more'}{built}")
         either = "; or ".join(changes)
         return f"{text} It would qualify with {either}." if changes else text
+
+
+def mass_is_least(sweep: Sweep) -> bool:
+    """Return whether the masses of boulders are taken at their low end."""
+    uncertain = BOULDER_MASS if BOULDER_MASS in sweep.plan.given else "boulder_density_kg_m3"
+    return sweep.taken_at.get(uncertain, "").endswith("low")
 
 
 def depth_text(depth: float) -> str:

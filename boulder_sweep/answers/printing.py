@@ -8,8 +8,8 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from boulder_sweep.answers.advice import MODELS, Again, advice, depth_text, next_questions
-from boulder_sweep.answers.recommendation import OF_A_DESIGN, PREFERENCES, Design
+from boulder_sweep.answers.advice import MODELS, Again, advice, depth_text, mass_is_least, next_questions
+from boulder_sweep.answers.recommendation import OF_A_DESIGN, PREFERENCES, RANKS, Design
 from boulder_sweep.answers.search import ALWAYS, BLOCKED, FAULTY, NEVER, NOT_MONOTONE, UNKNOWN, WORDS
 from boulder_sweep.columns import BY_NAME as COLUMNS
 from boulder_sweep.columns import GRADES, WAY_OUT
@@ -201,15 +201,15 @@ def wrapped(texts: Iterable[str]) -> list[str]:
     return [line.replace(NO_BREAK_SPACE, " ") for line in lines]
 
 
-def _rows_screen(result: Result, columns: Sequence[Column], units: str) -> Screen:
-    """Return designs with their varying inputs and these columns: all, or evenly spaced ones."""
-    count = len(result)
+def _rows_screen(result: Result, columns: Sequence[Column], units: str, best: Sequence[int] = ()) -> Screen:
+    """Return designs with their varying inputs and these columns: all, or evenly spaced ones, or the best of them."""
+    count, of = len(result), "the best first" if best else "evenly spaced"
     indices: Sequence[int] = range(count)
     if count > MOST_LINES:
-        indices = [k * (count - 1) // (MOST_LINES - 1) for k in range(MOST_LINES)]
+        indices = best[:MOST_LINES] or [k * (count - 1) // (MOST_LINES - 1) for k in range(MOST_LINES)]
     rows = rows_of(result.arrow.take(list(indices)), units)
     names = [name for name in HEADS if name in result.sweep.plan.given]
-    part = f"{MOST_LINES} of {count:,} rows, evenly spaced" if count > MOST_LINES else ""
+    part = f"{MOST_LINES} of {count:,} rows, {of}" if count > MOST_LINES else ""
     return Screen([*leading(result.sweep, result.arrow, names, units), *columns], rows, part)
 
 
@@ -259,15 +259,24 @@ def reserve_lines(result: Reserves, units: str = "si") -> list[str]:
     return [*wrapped([f"{WITHOUT_MARGIN} (need --most speed has one):"]), *lines]
 
 
-def reserve_screen(result: Reserves, units: str = "si") -> Screen:
-    """Return the table of `reserve_lines`."""
+def reserve_screen(result: Reserves, units: str = "si", recommended: Sequence[int] = ()) -> Screen:
+    """Return the table of `reserve_lines`; rows that are recommended are marked.
+
+    Of more than fit, they come first, then the ones that pass, the robust and of these the lightest before others.
+    """
     from boulder_sweep.answers.reserves import RESERVES
 
+    names = ("design_id", "verdict", "robustness", BOULDER_MASS.name)
+    rows = zip(*(result.arrow[name].to_pylist() for name in names), strict=True)
+    order = sorted((row not in recommended, verdict != "pass", RANKS[g], mass, row) for row, verdict, g, mass in rows)
     columns: list[Column] = [(("verdict", ""), lambda row: str(row["verdict"])), GRADE]
     for key, column, word, _ in RESERVES:
         columns.append((head_of(key.name, units), _format_withstood(key, column, f"{word}_found", units)))
     columns.append((("class,", "simulated"), lambda row: row["simulated_class"] or row["simulated_iso_speed"] or "-"))
-    screen = _rows_screen(result, [*columns, *volume_columns(units)], units)
+    screen = _rows_screen(result, [*columns, *volume_columns(units)], units, [row for *_, row in order])
+    if recommended:
+        mark: Column = ("", ""), lambda row: MARK if row["design_id"] in recommended else ""
+        screen = screen._replace(columns=[mark, *screen.columns])
     kinds = {row[f"{reserve.word}_found"] for row in screen.rows for reserve in RESERVES}
     return screen._replace(signs=[words for kind, words in WITHSTOOD.items() if kind in kinds])
 
@@ -283,8 +292,8 @@ def _format_withstood(key: Key, column: str, found: str, units: str) -> Cell:
     return cell
 
 
-def withstood(result: Reserves, number: int, units: str = "si") -> str:
-    """Return what the design of a row withstands, as a sentence."""
+def withstood(result: Reserves, number: int, units: str = "si", where: str = "It") -> str:
+    """Return what the design of a row withstands, as a sentence that begins with these words."""
     from boulder_sweep.answers.reserves import RESERVES
 
     row, said = rows_of(result.arrow.slice(number, 1), units)[0], list[str]()
@@ -292,8 +301,9 @@ def withstood(result: Reserves, number: int, units: str = "si") -> str:
         answer = answer_cell(key, column, f"{word}_found", units)(row).rstrip("*")
         known = row[column] is not None
         unit = head_of(key.name, units)[1]
-        said.append(f"a {what} of {answer} {unit}".replace(" deg", "°") if known else f"no {what} that was tried")
-    return f"It withstands {', '.join(said[:-1])} and {said[-1]}, each alone and without a margin."
+        to = "" if answer[0] in "≤≥" else " or less" if key.most else " or more"
+        said.append(f"a {what} of {answer} {unit}{to}".replace(" deg", "°") if known else f"no {what} that was tried")
+    return f"{where} withstands {', '.join(said[:-1])} and {said[-1]}, each alone and without a margin."
 
 
 def answer_cell(key: Key, column: str, found: str, units: str) -> Cell:
@@ -518,7 +528,7 @@ def _by_boulder(need: Need, rows: Sequence[Row], units: str) -> Screen:
         boulders.append({**max(some, key=lambda row: row["passes_at"] or 0.0), "rows": some, "failing": failing})
     answer = answer_cell(key, key.answer, "found", units)
     edge = [(head_of(name, units), number_of(name, units)) for name in chosen]
-    edge += [] if key.name.startswith("boulder_") else [_mass(units)]
+    edge += [] if key.name.startswith("boulder_") else [_mass(need, units)]
     count = len(boulders[0]["rows"])
     edge.append((("all", head_of(key.name, units)[1]), lambda row: "-" if row["failing"] else answer(row)))
     wide = _across(need, names, boulders[0]["rows"], answer, units)
@@ -564,7 +574,7 @@ def designs_screen(need: Need, units: str = "si") -> Screen:
     columns: list[Column] = [(("", ""), lambda row: MARK if found.design and row is boulders[0] else "")]
     columns += [(("design", ""), word_of("design_id"))] if need.sweep.table is not None else []
     columns += [(head_of(name, units), number_of(name, units)) for name in SIDES]
-    columns += [(head_of(DEPTH, units), _length(DEPTH)), _mass(units), (("least", "margin"), _margin), GRADE]
+    columns += [(head_of(DEPTH, units), _length(DEPTH)), _mass(need, units), (("least", "margin"), _margin), GRADE]
     columns += volume_columns(units)
     first = boulders[0]["rows"]
     table = pa.Table.from_pylist(first)
@@ -652,7 +662,7 @@ def _need_columns(need: Need, units: str) -> list[Column]:
     if key.name == DEPTH:
         columns.append((("ratio", "d/H"), _where_it_passes(lambda row: f"{row[DEPTH] / row[HEIGHT]:.3f}")))
         columns.append((("above", unit), _where_it_passes(lambda row: f"{row[HEIGHT] - row[DEPTH]:.2f}")))
-    columns.append(_mass(units))
+    columns.append(_mass(need, units))
     if "p_pass" in need.arrow.column_names:
         columns.append((("P(pass)", ""), _chance("p_pass")))
         if need.robust:
@@ -683,8 +693,9 @@ def _margin(row: Row) -> str:
     return "" if row["margin"] is None else f"{row['margin']:.1%}"
 
 
-def _mass(units: str) -> Column:
-    """Return the column of the mass of the boulder: tonnes, or pounds."""
+def _mass(need: Need, units: str) -> Column:
+    """Return the column of the mass of the boulder: tonnes, or pounds, with a sign where it is no less."""
+    least = "≥ " * mass_is_least(need.sweep)
     if units == "us":
-        return ("mass", "lb"), lambda row: f"{row['boulder_mass_kg']:.0f}"
-    return ("mass", "t"), lambda row: f"{row['boulder_mass_kg'] / 1000:.1f}"
+        return ("mass", f"{least}lb"), lambda row: f"{row['boulder_mass_kg']:.0f}"
+    return ("mass", f"{least}t"), lambda row: f"{row['boulder_mass_kg'] / 1000:.1f}"

@@ -18,13 +18,16 @@ import numpy as np
 from boulder_sweep.answers.keys import key_of, range_of, usual_ends
 from boulder_sweep.answers.questions import Question, ValueSearch
 from boulder_sweep.answers.result import chance_columns, rows_table, to_build
+from boulder_sweep.answers.search import FAILS, HOLDS, search, steady
 from boulder_sweep.answers.trials import (
     DEPTH,
     HEIGHT,
+    MILLIMETRES,
     RATIO,
     InputRows,
     Judges,
     block_at,
+    depth_within,
     judges_of,
     rows_at,
     uncertain_rows,
@@ -36,6 +39,7 @@ from boulder_sweep.judge.quantities import EXCAVATED
 from boulder_sweep.judge.robustness import DECISIVE
 from boulder_sweep.judge.validity import FLAGS, SEPARATOR
 from boulder_sweep.settings.fields import EMBEDMENT
+from boulder_sweep.settings.soil_readings import covered_depth
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -183,6 +187,9 @@ class Recommendation:
         What comes nearest where none qualifies, of depths without a probability.
     of_run : bool
         Whether it is one of the designs of a run, whose depths were given; a boulder is then one of these designs.
+    deepest_m : float or None
+        How deep the design may be buried at most [m]: from its depth down to there it qualifies. None where that was
+        not asked: of a run, or with a probability.
     """
 
     prefer: str
@@ -194,6 +201,7 @@ class Recommendation:
     conditions: int
     nearest: Nearest | None = None
     of_run: bool = False
+    deepest_m: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data."""
@@ -206,6 +214,7 @@ class Recommendation:
             "alike": self.alike,
             "conditions": self.conditions,
             "nearest": None if self.nearest is None else self.nearest.to_dict(),
+            "deepest_m": self.deepest_m,
         }
 
     @classmethod
@@ -249,8 +258,10 @@ class Recommendation:
         prefer, others = entries["prefer"], by_name(entries["others"], (*PREFERENCES,))
         if prefer not in PREFERENCES:
             raise ValueError(f"{prefer} cannot be preferred")
-        chosen = None if best is None else design(best)
-        return cls(prefer, chosen, others, boulders, qualified, alike, conditions, nearest)
+        chosen, deepest = None if best is None else design(best), entries["deepest_m"]
+        if deepest is not None and not (chosen and chosen.sizes[DEPTH] <= deepest <= chosen.sizes[HEIGHT]):
+            raise ValueError("its greatest depth is none")
+        return cls(prefer, chosen, others, boulders, qualified, alike, conditions, nearest, deepest_m=deepest)
 
 
 def recommended(asked: Question, table: pa.Table, prefer: str) -> Recommendation | None:
@@ -272,7 +283,8 @@ def recommended(asked: Question, table: pa.Table, prefer: str) -> Recommendation
         nearest = boulders.nearest(asked)
     alike = 0 if best is None else int((boulders.rank <= RANKS[best.grade]).sum())
     counts = (len(boulders.members), len(boulders.qualified), alike, max(map(len, boulders.members)))
-    return Recommendation(prefer, best, others, *counts, nearest)
+    deepest = None if best is None or boulders.sampling is not None else boulders.deepest(best)
+    return Recommendation(prefer, best, others, *counts, nearest, deepest_m=deepest)
 
 
 class _Boulders:
@@ -380,6 +392,29 @@ class _Boulders:
             judged = ungraded(judged)
             columns += chance_columns(chances)
         return rows_table(0, block, judged, columns).to_pylist()
+
+    def deepest(self, design: Design) -> float:
+        """Return how deep [m] a design may be buried at most: it holds in all its rows from its own depth on."""
+        rows, _ = next(self.tried[each] for each, one in self._judged.items() if one is design)
+        given = {name: values[rows] for name, values in self.given.items() if name not in EMBEDMENT}
+        sizes, sweep = {name: design.sizes[name] for name in (*SIDES, DEPTH)}, self.asked.sweep
+        bumper, least = given["bumper_height_m"], sizes[DEPTH]
+        high, height = covered_depth(sweep.derived), np.full(len(rows), sizes[HEIGHT])
+        most = depth_within(least, high, np.ones(len(rows)), height, bumper, sweep.criterion.min_overlap_m).min()
+
+        def predicate(index: np.ndarray, positions: np.ndarray) -> np.ndarray:
+            held = []
+            for position in positions.tolist():  # its own depth is known to hold
+                one = sizes | {DEPTH: position / MILLIMETRES}
+                held.append(position == last or self.judged(rows, given, one, self.asked.judges) is not None)
+            return np.where(held, HOLDS, FAILS)
+
+        # From the greatest depth up: where it begins to hold for good.
+        first, last = int(most * MILLIMETRES + 1e-6), math.ceil(least * MILLIMETRES - 1e-6)
+        if first <= last:
+            return least
+        found = steady(search(predicate, np.array([first]), np.array([last])))
+        return float(found.holds[0]) / MILLIMETRES
 
     def nearest(self, asked: Question) -> Nearest:
         """Return the boulder that fails in the fewest rows, and of these the one that is least short of the limits."""

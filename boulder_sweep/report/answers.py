@@ -46,6 +46,10 @@ class Measure(NamedTuple):
 
     value: float
     unit: str
+    before: str = ""
+    """Of a number that is a bound: ``at most ``."""
+    up: int = 0
+    """Of a depth, which has three decimals: 1 if it is rounded up, -1 if down."""
 
 
 Sentence = tuple[str | Measure, ...]
@@ -86,13 +90,15 @@ def need_sentences(rows: ResultRows, need: Need) -> tuple[list[Sentence], NamedD
     return [worst], NamedDesign("The answer that is worst", number)
 
 
-def screens(rows: ResultRows) -> dict[str, Screen]:
+def screens(rows: ResultRows, answer: Answer) -> dict[str, Screen]:
     """Return the answers as tables by system of units; none of a run, or of one that is the design recommended."""
-    file, found = rows.finished, rows.need and rows.need.recommendation
-    if not isinstance(file, AnswerFile) or (found and found.design is not None and len(rows.codes) == 1):
+    file, found = rows.finished, answer.need.recommendation
+    best = found.design.rows if found and found.design else []
+    if not isinstance(file, AnswerFile) or (rows.need and best and len(rows.codes) == 1):
         return {}
     answers = file.answers()
-    return {system: SCREENS[file.kind](answers, system) for system in SYSTEMS}
+    marked = [[row["design_id"] for row in best]] if file.kind == CAPACITY else []
+    return {system: SCREENS[file.kind](answers, system, *marked) for system in SYSTEMS}
 
 
 @dataclass(frozen=True, eq=False)

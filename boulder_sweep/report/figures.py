@@ -43,13 +43,13 @@ PARTS = {
     "soil_drag": ("soil, dragged", "#7FCFB5"),
 }
 """Energies in stacking order: word and colour."""
-LEFT, RIGHT = 5.3, 4.6
+LEFT, RIGHT = 5.3, 4.7
 """How much is drawn before and behind the boulder [m]: room for constants of the soil there, and dimensions here."""
 PLAN = 1.7, 2.45
 """Room before and behind the boulder in the plan [m]: for the arrow of the truck, and for the width."""
 BARS = {"si": (2.0, "2 m"), "us": (1.524, "5 ft")}
 """Length of the scale bar [m], and how it is called."""
-SKY, BELOW = 0.5, 0.5
+SKY, BELOW = 0.5, 0.7
 """Room above what stands, and below the boulder [m]."""
 LINE = 0.34
 """Distance of lines of text [m]."""
@@ -217,8 +217,12 @@ class Sketch(NamedTuple):
     dimensions: tuple[Dimension, ...]
     strata: tuple[Stratum, ...]
     water: float | None
+    truck: float
+    """Where the front of the truck is; before 0 where the boulder leans out below the blow."""
     plan: tuple[float, float, float, float]
-    """The boulder from above: x of its near side and y of its upper one, length and width."""
+    """The boulder from above: x of its near side and y of its upper one, greatest length and width."""
+    foot: tuple[float, float, float, float] | None
+    """The same of its foot, where that is smaller."""
     bar: tuple[float, str]
 
 
@@ -251,16 +255,15 @@ def sketch_of(
     front, back = struck - near, struck + far
     around = [*zip(front, heights, strict=True), *reversed([*zip(back, heights, strict=True)])]
     water = depth - (ground.water_table_m or 0.0)
-    first, last = float(front.min()), float(back.max())
+    edge, last = float(front.min()), float(back.max())
     beside = last + 0.35
     low = -depth / 2 if abs((ground.water_table_m or 0.0) - depth) < 2 * LINE else -depth + 0.12  # beside its words
     ends = last + RIGHT
     # The plan lies as high as the middle of the elevation, so that the two are read together.
-    wide, middle = ends + PLAN[0] + length, (above + 0.6 - depth) / 2
+    wide, middle = ends + PLAN[0] + length, (above - depth) / 2
     upper, lower = middle + width / 2, middle - width / 2
-
-    def across(left: float, right: float, y: float, name: str) -> Dimension:
-        return Dimension(left, y + 0.2, right, y + 0.2, name, right - left, left + 0.15, y + 0.3, "start")
+    foot = float(near[0] + far[0]), points[0].width * width
+    stands_out = foot[0] < 0.99 * length or foot[1] < 0.99 * width
 
     def upright(x: float, low: float, high: float, name: str, at: float) -> Dimension:
         return Dimension(x, low, x, high, name, high - low, x + 0.12, at, "start")
@@ -269,9 +272,10 @@ def sketch_of(
         upright(beside, 0.0, above, "above", above / 2 - 0.1),
         upright(beside, -depth, 0.0, "d =", low),
         upright(last + 2.7, -depth, above, "H =", max(above / 2 - 0.1, 0.2)),
-        across(first, last, above, "L =")._replace(value=length),  # the sides may lean
+        # Below the foot, where it is clear of the truck; the sides may lean.
+        Dimension(edge, -depth - 0.2, last, -depth - 0.2, "L =", length, edge, -depth - 0.54, "start"),
         Dimension(-3.0, 0.0, -3.0, bumper, "bumper", bumper, -3.12, 0.12, "end"),
-        across(wide - length, wide, upper, "L ="),
+        Dimension(wide - length, upper + 0.2, wide, upper + 0.2, "L =", length, wide - length, upper + 0.36, "start"),
         upright(wide + 0.35, lower, upper, "W =", middle - 0.1),
     )
     tops = [0.0, *(layer.from_m for layer in ground.layers)]
@@ -281,10 +285,11 @@ def sketch_of(
         (layer.friction_angle_deg, layer.density_kg_m3, layer.subgrade_reaction_MN_m3, layer.cohesion_kPa)
         for layer in ground.layers
     ]
+    has_cohesion = any(constants[-1] for constants in soils)
     # The ground is drawn as deep as its deepest boundary within two heights of the boulder.
     known = [*tops, ground.water_table_m or 0.0]
     bottom = min(bottom, -max(level for level in known if level <= 2 * height) - BELOW)
-    bottom = min(bottom, -(3 + (ground.cohesion_kPa > 0) + bool(ground.layers)) * LINE * len(tops) - 0.3)
+    bottom = min(bottom, -(2 + (has_cohesion and len(tops) > 1)) * LINE * len(tops) - 0.3)
     strata = []
     written = 0.0
     for k, (top, constants) in enumerate(zip(tops, soils, strict=True)):
@@ -297,13 +302,13 @@ def sketch_of(
             *(
                 (name, value, unit)
                 for (name, unit), value in zip(symbols, constants, strict=True)
-                if name != "c" or value
+                if name != "c" or has_cohesion
             ),
         )
         first = max(top, written) + LINE
-        written = first + (len(named) - 1) * LINE
+        written = first + (len(named) - 1) // 2 * LINE  # two to a line
         strata.append(Stratum(top, under, -first, named))
-    bottom = min(bottom, -written - 0.2)
+    bottom = min(bottom, -written - 0.2, lower - 1.0)
     strata[-1] = strata[-1]._replace(bottom=-bottom)
     return Sketch(
         corners=tuple((float(x), float(z) - depth) for x, z in around),
@@ -314,12 +319,14 @@ def sketch_of(
         left=-LEFT,
         ground=ends,
         right=wide + PLAN[1],
-        top=max(above + 0.6, roof) + SKY,
+        top=max(above, roof, upper + 0.75) + SKY,
         bottom=bottom,
         dimensions=dimensions,
         strata=tuple(strata),
         water=ground.water_table_m,
+        truck=min(float(np.interp(depth + bumper, heights, front)), *front[heights >= depth + bumper].tolist(), 0.0),
         plan=(wide - length, upper, length, width),
+        foot=(wide - length + float(front[0]) - edge, middle + foot[1] / 2, *foot) if stands_out else None,
         bar=BARS[units],
     )
 

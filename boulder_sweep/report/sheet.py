@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from boulder_kernels.rules import ISLAND_RATIO, ISLAND_SLIDE
-from boulder_sweep.answers.advice import advice, question
+from boulder_sweep.answers.advice import advice, mass_is_least, question
 from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.outputs import AnswerFile
 from boulder_sweep.answers.printing import Screen, cases_screen, withstood
@@ -24,7 +24,7 @@ from boulder_sweep.report.answers import Answer, Measure
 from boulder_sweep.report.figures import Sketch, sketch_of
 from boulder_sweep.report.rows import DEPTH, ResultRows, inputs_of
 from boulder_sweep.settings.fields import BY_NAME
-from boulder_sweep.settings.model import ProfilePoint
+from boulder_sweep.settings.model import Ground, ProfilePoint
 from boulder_sweep.settings.soil_readings import log_title
 from boulder_sweep.settings.units import SYSTEMS, quantity_text
 from boulder_sweep.stones.taped import taped_profiles
@@ -45,6 +45,8 @@ VEHICLE = {
     "hood_height_m": "hood above ground",
     "bed_offset_m": "bumper to cargo bed",
 }
+UP_TO_THE_END = ("max_rotation_deg", "max_displacement_m", "penetration_m", "peak_force_kN")
+"""Outcomes that might be more after the end of a run."""
 OPEN_IN_WORDS = "no study says what a second opinion is worth here; the design is judged by its margin alone"
 """Note on a design without a grade."""
 NOT_ASKED = "not asked", "no second opinion was asked of the designs that were drawn at random"
@@ -55,7 +57,8 @@ DRAWN = (
 )
 """Grade and note of a design with a probability of a robust pass."""
 WITHSTANDS = "Which speed, which truck and which soil does the boulder withstand?"
-"""What `sweep capacity` asks."""
+WITHSTAND = "Which of {:,} designs is to be built, and which speed, truck and soil does it withstand?"
+"""What `sweep capacity` asks, of one design and of several."""
 Cell = str | Measure
 
 
@@ -84,7 +87,7 @@ class Sheet(NamedTuple):
     """Name, computed, limit, and how much of it is used."""
     build: tuple[tuple[str, Cell], ...]
     soil: tuple[tuple[str, Cell, str], ...]
-    """Name, value and source of each input."""
+    """Name, value and source of each input; of soil in layers the uppermost one's."""
     vehicle: tuple[tuple[str, Cell, str], ...]
     """Name, value and source of each input."""
     grade: tuple[str, str]
@@ -121,8 +124,8 @@ def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
         title=answer.named.title,
         sketch=sketch_of(inputs_of(row), settings, units, _profile(row)),
         checks=_checks(row, settings["criterion"], answer.need, design),
-        build=_build(rows, row, design),
-        soil=_inputs(design.rows, SOIL, settings),
+        build=_build(rows, row, design, answer.need),
+        soil=_soil(design.rows, settings),
         vehicle=_inputs(design.rows, VEHICLE, settings),
         grade=opinion if "p_pass" not in row else DRAWN if row.get("p_robust") is not None else NOT_ASKED,
         cases={one: cases_screen(design, [*named, *several], one) for one in SYSTEMS if len(design.rows) > 1},
@@ -133,19 +136,22 @@ def _words(rows: ResultRows, answer: Answer, design: Design, names: Sequence[str
     """Return the sentences; the names are inputs that tell cases apart."""
     found, said, asked = answer.need.recommendation, advice(answer.need, units), question(answer.need, units)
     ground = ground_words(rows.settings, units) or "dry, level, the same at every depth, without cohesion"
-    derived, first = rows.settings.get("derived", {}), tuple[str, ...]()
+    derived, last = rows.settings.get("derived", {}), tuple[str, ...]()
+    case = ", ".join(_named(name, answer.row[name], units) for name in names)
+    governs = f"in the worst of {len(design.rows):,} cases: {case}" if case and len(design.rows) > 1 else ""
     logs = dict.fromkeys(log_title(soil) for soil in derived.get("soil", ()) if "log" in soil)
     ground += "".join(f", from {title}" for title in logs)
     ground += "".join(f". Boulders: from {boulders['file']}" for boulders in derived.get("table", ()))
     if isinstance(rows.finished, AnswerFile) and isinstance(reserves := rows.finished.answers(), Reserves):
-        asked, first = WITHSTANDS, (withstood(reserves, answer.named.number, units),)
-    case = ", ".join(_named(name, answer.row[name], units) for name in names)
-    governs = f"in the worst of {len(design.rows):,} cases: {case}" if case and len(design.rows) > 1 else ""
+        boulders = 1 if found is None else found.boulders
+        asked = WITHSTANDS if boulders == 1 else WITHSTAND.format(boulders)
+        where = f"I{governs[1:].replace(': ', ' (')}) it" if governs else "It"
+        last = (withstood(reserves, answer.named.number, units, where),)
     if found is None:  # the worst answer, or why there is none
         said = ["".join(p if isinstance(p, str) else _measured(p, units) for p in answer.sentences[0])]
     if found is None or found.design is None:
-        return Words(asked, (*first, *said), (), "", ground, governs)
-    return Words(asked, (*first, said[0]), tuple(said[1:-1]), said[-1], ground, governs)
+        return Words(asked, (*said, *last), (), "", ground, governs)
+    return Words(asked, (said[0], *last), tuple(said[1:-1]), said[-1], ground, governs)
 
 
 def _measured(part: Measure, units: str) -> str:
@@ -164,6 +170,7 @@ def _checks(
     row: Mapping[str, Any], criterion: Mapping[str, Any], need: Need, design: Design
 ) -> tuple[tuple[str, Cell, Cell, str], ...]:
     """Return loads and limits of the row that governs; a boulder that is hardly buried may not slide far."""
+    overturned = row["time_to_limit_s"] is not None  # the run ended there
     slides = ISLAND_SLIDE if row[DEPTH] < ISLAND_RATIO * row["boulder_height_m"] else None
     limit, overlap = PENETRATION_LIMITS_M[criterion["rating"]], criterion["min_overlap_m"]
     of: list[tuple[str, str, str, float | None]] = [
@@ -177,17 +184,19 @@ def _checks(
     lines: list[tuple[str, Cell, Cell, str]] = []
     for words, name, unit, allowed in of:
         value = row[name]
-        used = "–"
-        if value and allowed:
-            used = f"{100.0 * max(allowed / value if name == 'overlap_m' else value / allowed, 0.0):.0f} %"
+        used, bound = "–", "≥ " * (overturned and name in UP_TO_THE_END)
+        if value and allowed and not (bound and value < 0.0):
+            used = f"{bound}{100.0 * max(allowed / value if name == 'overlap_m' else value / allowed, 0.0):.0f} %"
         none = "no limit" if name == "max_displacement_m" else "–"
-        computed = _outcome(row, name, unit)
+        computed = _outcome(row, name, unit, bound)
         lines.append((words, computed, none if allowed is None else Measure(allowed, unit), used))
     if "p_pass" not in row and (design.stands or design.grade == "sensitive"):
         # A second opinion tells whether the boulder stays below a limit, not how far it turns.
         found, limit = need.recommendation, criterion["max_rotation_deg"]
         share = 1.0 - need.least_margin * (need.robust and (found is None or found.design is design))
-        computed, used = (f"≤ {share * limit:.4g}°", f"≤ {100.0 * share:.0f} %") if design.stands else ("fails", "–")
+        computed, used = "fails", "–"
+        if design.stands:
+            computed, used = Measure(share * limit, "deg", "at most "), f"≤ {100.0 * share:.0f} %"
         lines.insert(1, ("rotation, weakest model", computed, Measure(limit, "deg"), used))
     if "p_pass" in row:
         least = "–" if need.probability is None else f"≥ {100.0 * need.probability:.4g} %"
@@ -198,25 +207,30 @@ def _checks(
     return tuple(lines)
 
 
-def _outcome(row: Mapping[str, Any], name: str, unit: str) -> Cell:
+def _outcome(row: Mapping[str, Any], name: str, unit: str, bound: str) -> Cell:
     """Return an outcome of a row; of a cargo bed that stays before the boulder, that it does not penetrate."""
     value = row[name]
     if name == "penetration_m" and value is not None and value <= 0.0:
-        return "none"
-    return "–" if value is None else Measure(value, unit)
+        return "none so far" if bound else "none"
+    return "–" if value is None else Measure(value, unit, bound)
 
 
-def _build(rows: ResultRows, row: Mapping[str, Any], design: Design) -> tuple[tuple[str, Cell], ...]:
+def _build(rows: ResultRows, row: Mapping[str, Any], design: Design, need: Need) -> tuple[tuple[str, Cell], ...]:
     """Return what the drawing does not say of the boulder, and what it takes to build in the soil that needs most."""
+    found, lines = need.recommendation, list[tuple[str, Cell]]()
+    if found is not None and found.design is design and not found.of_run:
+        lines.append(("depth, at least", Measure(row[DEPTH], "m", up=1)))
+        lines += [("depth, at most", Measure(found.deepest_m, "m", up=-1))] if found.deepest_m else []
     built = zip(("excavation", "backfill"), TO_BUILD[1:], strict=True)
     mass, density = row.get(BOULDER_MASS) or float(rows.mass().flat[0]), float(row["boulder_density_kg_m3"])
     rock = "".join(kind["name"] for kind in rows.settings.get("derived", {}).get("rock", ())) or "rock"
     low = ", low end" * rows.settings.get("taken_at", {}).get("boulder_density_kg_m3", "").endswith("low")
-    of_mass = "" if BOULDER_MASS in rows.settings["inputs"] else low
-    lines: list[tuple[str, Cell]] = [(f"mass{of_mass}", Measure(float(mass), "kg"))]
-    judged = [case.get("boulder_density_kg_m3") for case in rows.settings.get("judged_at", ()) if of_mass]
+    of_mass = ", low end" * mass_is_least(need.sweep)
+    name = BOULDER_MASS if BOULDER_MASS in rows.settings["inputs"] else "boulder_density_kg_m3"
+    lines.append((f"mass{of_mass}", Measure(float(mass), "kg")))
+    judged = [case.get(name) for case in rows.settings.get("judged_at", ()) if of_mass]
     if high := max((other for other in judged if isinstance(other, float)), default=0.0):
-        lines.append(("mass, high end", Measure(float(mass) * high / density, "kg")))
+        lines.append(("mass, high end", Measure(float(mass) * high / float(row.get(name) or mass), "kg")))
     lines.append((f"density of {rock}{low}", Measure(density, "kg/m^3")))
     if _is_taped(row):
         lines.append(("fills of its box", f"{row['solidity']:.0%}"))
@@ -238,6 +252,16 @@ def _profile(row: Mapping[str, Any]) -> tuple[ProfilePoint, ...]:
         return ()
     points = taped_profiles(row["shape"], np.array([row["solidity"]]))[0]
     return tuple(ProfilePoint(*map(float, point)) for point in points)
+
+
+def _soil(cases: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> tuple[tuple[str, Cell, str], ...]:
+    """Return constants of the soil, of layers the uppermost, cohesion and water table with their sources."""
+    ground, lines = Ground.of_dict(settings["model"].get("ground", {})), _inputs(cases, SOIL, settings)
+    if ground.cohesion_kPa:
+        lines = (*lines, ("cohesion", Measure(ground.cohesion_kPa, "kPa"), "settings"))
+    if ground.water_table_m is not None:
+        lines = (*lines, ("water table below ground", Measure(ground.water_table_m, "m"), "settings"))
+    return lines
 
 
 def _inputs(

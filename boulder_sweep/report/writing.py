@@ -137,7 +137,7 @@ def write_report(
         start=chosen[0]["inputs"],
         sheet=sheet_of(rows, answer, units),
         sentences=answer.sentences[answer.need.recommendation is None :],  # the first is then the headline
-        answers=screens(rows),
+        answers=screens(rows, answer),
         rows=rows,
         chosen=chosen,
         facts=_facts(identity, command, str(out)),

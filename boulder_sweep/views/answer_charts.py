@@ -151,9 +151,8 @@ def _shown(sweep: Sweep, frame: pd.DataFrame, searched: Sequence[str]) -> ChartR
         frame = frame.assign(**{RATIO: (frame["embedment_depth_m"] / frame["boulder_height_m"]).round(9)})
         open_.append(RATIO)
     varying = [name for name in open_ if BY_NAME[name].section not in sets and len(frame[name].unique()) > 1]
-    across = next((name for name in ACROSS if name in varying), next(iter(varying), None))
-    if across is None:
-        raise PictureError("a design chart needs an input with several values; this question has one answer, no curve")
+    one = next(name for name in ACROSS if name not in searched)  # a question with one answer is drawn as a point
+    across = next((name for name in ACROSS if name in varying), next(iter(varying), one))
     over = next(iter(sets), None) or next((name for name in CURVES if name in varying and name != across), None)
     held: dict[str, float | str] = {}
     for name, names in sets.items():

@@ -32,13 +32,26 @@ STILL_AT_S = 0.06
 ROCK, ROCK_KG = Path("docs/examples/rock.ply"), 23_500.0
 FILM = "film_rwg.gif"
 """A boulder that holds, on the first screen of the README."""
-HEADING = Heading("Main Street", "City of Springfield", "North gate", "2026-11-28", "A", "C. Day", "E. Fox")
 SHEETS = {
-    "site": (SITE, "si"),
-    "borehole": (Path("configs/borehole_log.yaml"), "us"),
-    "stone": (Path("configs/quarry_stone.yaml"), "si"),
+    "site": (
+        SITE,
+        "si",
+        Heading("Main Street", "City of Springfield", "North gate", "2026-11-28", "A", "C. Day", "E. Fox"),
+    ),
+    "borehole": (
+        Path("configs/borehole_log.yaml"),
+        "us",
+        Heading("Harbor plaza", "Port authority", "Pier 4, landward side", "2026-10-09", "B", "R. Moore", "L. Hale"),
+    ),
+    "stone": (
+        Path("configs/quarry_stone.yaml"),
+        "si",
+        Heading("Castle car park", "County museum", "Upper drive", "2026-09-17", "0", "J. Reed", "M. Stone"),
+    ),
 }
-"""Answers whose sheet to sign is shown, and their units."""
+"""Answers whose sheet to sign is shown, their units and headings."""
+GRID_HEADING = Heading("Embassy row", "Ministry of Works", "East forecourt", "2026-11-12", "A", "P. Lane", "S. Birch")
+"""Heading of the sheet of a run."""
 MARGIN = 20
 """Beside a photographed sheet [px]."""
 
@@ -86,13 +99,13 @@ def draw_all(root: Path, chromium: Browser) -> list[Path]:
         run(sweep, Path(scratch) / "grid.sweep")
         table, terms = read(Path(scratch) / "grid.sweep"), terms_line(sweep.resolved())
         draw_verdict_map(table, named("m30_sizing.png"), title=sweep.name, terms=terms)
-        for name, (file, units) in SHEETS.items():
+        for name, (file, units, heading) in SHEETS.items():
             need(load(root / file)).write(Path(scratch) / f"{name}.parquet")
             page = write_report(
-                Path(scratch) / f"{name}.parquet", Path(scratch) / "page.html", units=units, heading=HEADING
+                Path(scratch) / f"{name}.parquet", Path(scratch) / "page.html", units=units, heading=heading
             )
             photograph(chromium, page, named(f"report_{name}.png"))
-        page = write_report(Path(scratch) / "grid.sweep", Path(scratch) / "page.html", units="si", heading=HEADING)
+        page = write_report(Path(scratch) / "grid.sweep", Path(scratch) / "page.html", units="si", heading=GRID_HEADING)
         photograph(chromium, page, named("report_grid.png"))
     for path in drawn:
         if path.name != FILM:

@@ -14,8 +14,9 @@ import pytest
 import boulder_sweep
 from boulder_sweep.answers.advice import advice, depth_text
 from boulder_sweep.answers.need import Need, need
+from boulder_sweep.answers.printing import need_screen
 from boulder_sweep.answers.recommendation import PREFERENCES, Design, _Boulders
-from boulder_sweep.answers.trials import judges_of
+from boulder_sweep.answers.trials import Open, block_at, judges_of
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.judge.validity import BY_FLAG
@@ -319,6 +320,9 @@ def test_a_boulder_of_uncertain_density_has_its_rock_and_its_least_mass(at: str,
     text = TRUCKS.replace("density: 2600 kg/m^3}", "rock: granite}", 1)
     found = bare_need(at_values(load_text(text, Path("g.yaml")), at))
     assert f"ury the 3.4 m granite boulder ({mass}) " in said(found)
+    for units, unit in (("si", "t"), ("us", "lb")):  # the head of the column says it, too
+        heads = [head for head, _ in need_screen(found, units).columns]
+        assert ("mass", f"≥ {unit}" if mass.startswith("at least") else unit) in heads
 
 
 def test_a_boulder_that_nothing_else_tells_apart_is_named_by_its_size() -> None:
@@ -329,6 +333,28 @@ def test_numbers_are_read_in_the_units_asked_for() -> None:
     words = said(need(site(**SIX)), "us")
     assert words.startswith("Bury the 11.15 ft boulder (54,023 lb) 7.983 ft deep: ")
     assert " m " not in words
+
+
+@pytest.mark.parametrize("height", ["3.4 m", "3.6 m"])
+def test_a_design_holds_down_to_its_greatest_depth_and_no_further(height: str) -> None:
+    found = need(site(height=height))
+    best = found.recommendation
+    assert best is not None
+    assert best.design is not None
+    least, most = best.design.sizes[DEPTH], best.deepest_m
+    assert most is not None
+    judges = judges_of(found.sweep, found.least_margin, robust=True)
+    rows = Open(found.sweep, (DEPTH,)).rows(0, best.conditions)
+
+    def holds(depth: float) -> bool:
+        block = block_at(rows, np.arange(best.conditions), **{DEPTH: np.full(best.conditions, depth)})
+        return bool(judges.holds(judges.final(block), block).all())
+
+    assert [holds(depth) for depth in (least - 0.001, *np.linspace(least, most, 7), most + 0.001)] == [
+        False,
+        *([True] * 7),
+        False,
+    ]
 
 
 def test_a_path_is_asked_as_its_settings_are() -> None:

@@ -99,7 +99,8 @@ def test_of_a_question_without_a_recommendation_the_governing_answer_is_named(fi
 def test_what_has_no_answer_says_why(files: dict[str, Path], tmp_path: Path) -> None:
     bare_need(site(height="2.0 m"), most="speed").write(tmp_path / "speed.parquet")
     assert answer_of(read_rows(tmp_path / "speed.parquet")).sentences == (("Nothing that was tried passes.",),)
-    assert screens(read_rows(files["nothing"]))["si"].signs == [
+    nothing = read_rows(files["nothing"])
+    assert screens(nothing, answer_of(nothing))["si"].signs == [
         "blocked: does not pass by what was asked, up to where the truck would pass or ride over the boulder (1 row)"
     ]
     rows = read_rows(files["depth"])
@@ -132,7 +133,7 @@ def test_the_page_opens_without_a_complaint(files: dict[str, Path], name: str, t
         lines += [[cell(row) for _, cell in screen.columns] for row in screen.rows]
         shown = page.locator(".answers:visible tr").all_inner_texts()
         assert [line.split() for line in shown] == [" ".join(line).split() for line in lines]
-        assert page.locator("[data-in]:visible > .wide ~ .hint").all_inner_texts() == screen.signs
+        assert page.locator("[data-in]:visible > .wide ~ .hint").all_inner_texts() == [*screen.signs]
     if len(table) > 1:
         assert re.match(rf"\d+ of the {len(table)} designs shown pass", page.inner_text("#sweep-words"))
     chosen = page.evaluate("page.data.chosen[0]")

@@ -75,7 +75,8 @@ def test_one_design_has_its_interval_and_what_decides(tmp_path: Path) -> None:
     found = boulder_sweep.uncertainty(one, half_width=0.1)
     found.write(tmp_path / "one.parquet")
     row = found.frame.iloc[0]
-    screen = screens(read_rows(tmp_path / "one.parquet"))["si"]
+    rows = read_rows(tmp_path / "one.parquet")
+    screen = screens(rows, answer_of(rows))["si"]
     heads, shown = zip(*((head[0], cell(screen.rows[0])) for head, cell in screen.columns), strict=True)
     begin = heads.index("P(pass)")
     assert shown[begin : begin + 3] == tuple(f"{one:.4f}" for one in (row.p_pass, row.p_pass_low, row.p_pass_high))

@@ -28,6 +28,7 @@ from boulder_sweep.settings import Sweep, load
 from boulder_sweep.settings.sweep import Heading
 from tests.answers.designs import UNCERTAIN_FRICTION, bare_need, site
 from tests.report.conftest import OTHER_VALUES, places, put
+from tests.soils.test_ground import IN_FILE
 
 HEADING = Heading("Main Street", "City", "North gate", "2026-11-28", "A", "C. Day", "E. Fox")
 
@@ -47,6 +48,7 @@ def needs() -> dict[str, Need]:
         "stands": boulder_sweep.need(site(height="3.6 m", friction="40 deg"), margin=0.4, robust=False),
         "bare": bare_need(site(height="3.6 m")),
         "never": boulder_sweep.need(site(height="2.0 m", friction="36 deg")),
+        "layers": boulder_sweep.need(load(Path("configs/rwg.yaml"), [*IN_FILE, "site.embedment_depth=to be found"])),
     }
 
 
@@ -147,18 +149,53 @@ def test_the_limits_are_those_of_the_case_with_the_least_margin(needs: dict[str,
 @pytest.mark.parametrize(
     ("name", "line"),
     [
-        ("depth", ("≤ 15°", Measure(20.0, "deg"), "≤ 75 %")),
-        ("stands", ("≤ 20°", Measure(20.0, "deg"), "≤ 100 %")),
+        ("depth", (Measure(15.0, "deg", "at most "), Measure(20.0, "deg"), "≤ 75 %")),
+        ("stands", (Measure(20.0, "deg", "at most "), Measure(20.0, "deg"), "≤ 100 %")),
         ("bare", ("fails", Measure(20.0, "deg"), "–")),
         ("chance", None),
         ("never", None),
     ],
 )
 def test_a_second_opinion_is_among_the_limits_with_what_it_proves(
-    files: dict[str, Path], name: str, line: tuple[str, Measure, str] | None
+    files: dict[str, Path], name: str, line: tuple[str | Measure, Measure, str] | None
 ) -> None:
     checks = {words: tuple(rest) for words, *rest in sheet(files[name]).checks}
     assert checks.get("rotation, weakest model") == line
+
+
+def test_what_a_run_that_ended_at_the_limit_says_is_marked_as_a_bound(tmp_path: Path) -> None:
+    boulder_sweep.run(site(height="3.4 m", site="embedment_depth: 1.5 m"), tmp_path / "site.sweep")
+    checks = {words: tuple(rest) for words, *rest in sheet(tmp_path / "site.sweep").checks}
+    assert checks["rotation"] == (Measure(pytest.approx(20.0), "deg", "≥ "), Measure(20.0, "deg"), "≥ 100 %")
+    for name in ("displacement", "peak force of the truck"):
+        assert checks[name][0].before == "≥ "
+    assert checks["cargo bed penetration, P1"] == ("none so far", Measure(1.0, "m"), "–")
+    assert checks["overlap, at least"][0].before == ""
+
+
+def test_every_layer_and_the_water_stand_in_the_tables(files: dict[str, Path], tmp_path: Path, opened: Any) -> None:
+    page = opened(write_report(files["layers"], tmp_path / "page.html"))
+    assert page.locator(".layers tr").all_text_contents() == [
+        "fromφ′ρβc",
+        "0.5\u00a0m36°2,000\u00a0kg/m³40\u00a0MN/m³2\u00a0kPa",
+        "1.2\u00a0m40°2,100\u00a0kg/m³80\u00a0MN/m³0\u00a0kPa",
+    ]
+    assert sheet(files["layers"]).soil[-2:] == (
+        ("cohesion", Measure(4.0, "kPa"), "settings"),
+        ("water table below ground", Measure(0.8, "m"), "settings"),
+    )
+    page = opened(write_report(files["depth"], tmp_path / "page.html"))
+    assert page.locator(".layers").count() == 0
+
+
+def test_the_depth_to_build_is_a_least_and_a_greatest(needs: dict[str, Need], files: dict[str, Path]) -> None:
+    for name in ("depth", "chance", "never"):
+        best, built = needs[name].recommendation, dict(sheet(files[name]).build)
+        assert best is not None
+        depths = [built.get(f"depth, at {end}") for end in ("least", "most")]
+        least = None if best.design is None else Measure(best.design.sizes["embedment_depth_m"], "m", up=1)
+        assert depths == [least, None if best.deepest_m is None else Measure(best.deepest_m, "m", up=-1)]
+        assert (best.deepest_m is None) == (name != "depth")
 
 
 def test_the_drawing_is_as_deep_as_the_headline_says(files: dict[str, Path], tmp_path: Path, opened: Any) -> None:
@@ -170,9 +207,10 @@ def test_the_drawing_is_as_deep_as_the_headline_says(files: dict[str, Path], tmp
 
 
 def test_one_answer_is_not_shown_again(files: dict[str, Path]) -> None:
-    assert screens(read_rows(files["taken"])) == {}
-    assert len(screens(read_rows(files["soils"]))["si"].rows) == 1
-    assert len(screens(read_rows(files["never"]))["si"].rows) == 1
+    for name, lines in (("taken", None), ("soils", 1), ("never", 1)):
+        rows = read_rows(files[name])
+        shown = screens(rows, answer_of(rows))
+        assert (len(shown["si"].rows) if shown else None) == lines
 
 
 def test_what_does_not_qualify_is_not_recommended(files: dict[str, Path]) -> None:
@@ -193,12 +231,42 @@ def test_a_map_is_printed_only_where_no_table_says_the_same(
     assert page.is_visible("#figure-sweep-map") == printed
 
 
-def test_a_sheet_of_capacity_says_what_is_withstood_before_what_passes(tmp_path: Path) -> None:
-    boulder_sweep.capacity(site(height="3.4 m", site="embedment_depth: 2.6 m")).write(tmp_path / "capacity.parquet")
+@pytest.mark.parametrize(
+    ("height", "asks", "rows"),
+    [
+        ("3.4 m", "Which speed, which truck and which soil does the boulder withstand?", 2),
+        ("{from: 2.4 m, to: 4.4 m, count: 25}", "Which of 25 designs is to be built, and which speed, truck ", 40),
+    ],
+)
+def test_a_sheet_of_capacity_names_a_design_and_what_it_withstands(
+    height: str, asks: str, rows: int, tmp_path: Path
+) -> None:
+    asked = boulder_sweep.capacity(site(height=height, site="embedment_depth: 2.6 m"))
+    asked.write(tmp_path / "capacity.parquet")
     words = sheet(tmp_path / "capacity.parquet").words["us"]
-    assert words.question == "Which speed, which truck and which soil does the boulder withstand?"
-    assert re.match(r"It withstands a speed of [\d.]+ mph, a truck of \d+ lb and a friction ", words.recommendation[0])
-    assert words.recommendation[1].startswith("Bury the boulder 5.413\u00a0ft long, ")
+    assert words.question.startswith(asks)
+    assert words.recommendation[0].startswith("Bury the ")
+    where = r"In the worst of 2 cases \(friction angle φ′ 36°\) it withstands a speed of [\d.]+ mph or less, "
+    assert re.match(
+        f"{where}a truck of \\d+ lb or less and a friction angle of [\\d.]+° or more, ", words.recommendation[1]
+    )
+    read = read_rows(tmp_path / "capacity.parquet")
+    answer = answer_of(read)
+    shown = screens(read, answer)["si"]
+    assert len(shown.rows) == rows
+    best = answer.need.recommendation
+    assert best is not None
+    assert best.design is not None
+    (_, mark), *_ = shown.columns
+    marked = [row["design_id"] for row in shown.rows if mark(row) == "→"]
+    assert marked == [row["design_id"] for row in best.design.rows]
+    if rows < len(asked):  # the marked ones first, then what passes, the lightest robust ones before others
+        assert [row["design_id"] for row in shown.rows[:2]] == marked
+        assert shown.part == "40 of 50 rows, the best first"
+        others = [
+            (row["verdict"] != "pass", row["robustness"] != "robust", row["boulder_mass_kg"]) for row in shown.rows
+        ]
+        assert others[2:] == sorted(others[2:])
 
 
 def test_the_first_page_names_where_soil_and_boulders_come_from(files: dict[str, Path]) -> None:
@@ -296,7 +364,7 @@ def test_the_name_of_a_project_stays_text_in_the_footer(files: dict[str, Path], 
     assert "<" not in footer
 
 
-@pytest.mark.parametrize(("name", "units"), [("depth", "si"), ("chance", "us"), ("nearest", "us")])
+@pytest.mark.parametrize(("name", "units"), [("depth", "si"), ("chance", "us"), ("nearest", "us"), ("layers", "us")])
 def test_the_sheet_fits_on_one_page(files: dict[str, Path], name: str, units: str, tmp_path: Path, opened: Any) -> None:
     page = opened(write_report(files[name], tmp_path / "page.html", units=units, heading=HEADING))
     page.evaluate("dispatchEvent(new Event('beforeprint'))")

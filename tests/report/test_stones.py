@@ -138,5 +138,26 @@ def test_the_section_is_that_of_the_stone_and_its_water_ends_at_the_faces():
     reaches = np.array([-0.75, -0.9, -0.8, 0.5, 0.8, 0.75])
     np.testing.assert_allclose(xs, STRUCK + reaches)
     assert drawn.at_water == pytest.approx(STRUCK + np.interp(1.23, [0, 1.6], [0.75, 0.8]))
+    x, y, length, width = drawn.plan
+    assert (length, width) == pytest.approx((1.7, 1.8))
+    assert drawn.foot == pytest.approx((x + 0.15, y - 0.15, 1.5, 1.5))
+    assert drawn.truck == pytest.approx(STRUCK - np.interp(2.53, [1.6, 3.44], [0.9, 0.8]))
     length = next(one for one in drawn.dimensions if one.name == "L =")
     assert (length.x1 - length.x0, length.value) == pytest.approx((1.7, 1.7))
+
+
+@pytest.mark.parametrize(
+    ("length", "height", "depth"), [(0.6, 1.6, 0.8), (0.6, 4.6, 2.0), (4, 1.6, 0.7), (4, 4.6, 2.3)]
+)
+def test_the_length_of_a_box_stands_clear_of_the_truck(length, height, depth):
+    sizes = (f"boulder.length={length} m", f"boulder.height={height} m", f"site.embedment_depth={depth} m")
+    sweep = stone(TAPERED.replace("0.8", "1"), *sizes)
+    inputs = sweep.constants | {"impact_height_m": 0.95, "bumper_height_m": 0.5, "hood_height_m": 1.4}
+    drawn = sketch_of(inputs, sweep.resolved())
+    below = next(one for one in drawn.dimensions if one.name == "L =")
+    assert drawn.bottom + 0.1 < below.at_y < below.y0 < -depth
+    assert drawn.foot is None
+    assert drawn.truck == 0.0
+    _, upper, _, width = drawn.plan
+    assert drawn.top > upper + 0.75
+    assert drawn.bottom < upper - width - 0.9

@@ -299,13 +299,13 @@ class Units {
    * A number with its unit.
    * @param {number | string | null} value in the unit of the table
    * @param {string} unit of the table
-   * @param {boolean} [up] whether it is a depth, which is rounded up, as on the command line
+   * @param {number} [up] of a depth: 1 if it is rounded up, as on the command line, -1 if down
    */
-  text(value, unit, up = false) {
+  text(value, unit, up = 0) {
     if (value === null) return "–";
     if (typeof value === "string") return value;
     const name = this.name(unit);
-    return name === "" ? number(value) : `${up ? this.rounded(value, unit) : this.bare(value, unit)}${name === "°" ? "" : "\u00a0"}${name}`;
+    return name === "" ? number(value) : `${up ? this.rounded(value, unit, up) : this.bare(value, unit)}${name === "°" ? "" : "\u00a0"}${name}`;
   }
 
   /**
@@ -319,9 +319,9 @@ class Units {
     return `${sixDigits(value / this.size(unit), digits)}${plain === "1" ? "" : ` ${plain}`}`;
   }
 
-  /** @param {number} value @param {string} unit of the table @returns {string} a depth that is not less than the value */
-  rounded(value, unit) {
-    return (Math.ceil((value / this.size(unit)) * 1000 - 1e-6) / 1000).toFixed(3);
+  /** @param {number} value @param {string} unit of the table @param {number} up see `text` @returns {string} a depth that is not less, or not more, than the value */
+  rounded(value, unit, up) {
+    return ((up * Math.ceil(((up * value) / this.size(unit)) * 1000 - 1e-6)) / 1000).toFixed(3);
   }
 
   /** @param {number | string | null} value @param {string} unit of the table @returns {string} a number without its unit */

@@ -133,8 +133,8 @@ class Page {
     place.replaceChildren(element("b", `${sign} ${found.verdict}`), element("span", words.length > 0 ? `: ${words.join("; ")}` : ""));
   }
 
-  /** @param {string} label @param {number | string | null} value @param {string} unit @param {boolean} [up] see `Units.text` */
-  row(label, value, unit, up = false) {
+  /** @param {string} label @param {number | string | null} value @param {string} unit @param {number} [up] see `Units.text` */
+  row(label, value, unit, up = 0) {
     const line = document.createElement("tr");
     const head = element("th", label);
     head.setAttribute("scope", "row");
@@ -268,12 +268,12 @@ class Page {
     document.documentElement.dataset.units = this.units.system;
     for (const place of document.querySelectorAll(".quantity")) {
       const { value, unit, up } = /** @type {HTMLElement} */ (place).dataset;
-      place.textContent = this.units.text(Number(value), String(unit), up !== undefined);
+      place.textContent = this.units.text(Number(value), String(unit), Number(up ?? 0));
     }
     this.data.chosen.forEach((/** @type {any} */ one, /** @type {number} */ k) => {
       this.show(`chosen${k}`, one.inputs);
       byId(`chosen${k}-inputs`).replaceChildren(
-        ...this.inputs.map((input) => this.row(input.label, one.inputs[input.name], input.unit, input.name === "embedment_depth_m")),
+        ...this.inputs.map((input) => this.row(input.label, one.inputs[input.name], input.unit, Number(input.name === "embedment_depth_m"))),
       );
     });
     if (this.axes.sweep !== null) {
