@@ -17,8 +17,8 @@ from boulder_sweep.cli.console import accuracy_lines
 from boulder_sweep.judge.accuracy import (
     LADDER,
     STEPS,
-    STEPS_PRINTED,
     Accuracy,
+    Steps,
     accuracy_of,
     control_of,
     pilot,
@@ -40,11 +40,18 @@ def asked(accuracy: str, **changes: str) -> Sweep:
     return load_text(text, Path("grid.yaml"))
 
 
-@pytest.mark.parametrize("name", ["fast", "balanced", "fine"])
-def test_names_stand_for_steps(name: str) -> None:
-    assert accuracy_of(asked(name)).steps == STEPS[name]
+@pytest.mark.parametrize(
+    ("name", "corrected", "printed"),
+    [
+        ("fast", Steps(0.012), Steps(0.006)),
+        ("balanced", Steps(0.012), Steps(0.006)),
+        ("fine", Steps(0.006, locate_yield=True), Steps(0.003, locate_yield=True)),
+    ],
+)
+def test_names_stand_for_steps(name: str, corrected: Steps, printed: Steps) -> None:
+    assert accuracy_of(asked(name)).steps == corrected
     text = GRID.format(**DEFAULTS).replace("step: 4 ms", f"accuracy: {name}").replace("corrected", "as_printed")
-    assert accuracy_of(load_text(text, Path("grid.yaml"))).steps == STEPS_PRINTED[name]
+    assert accuracy_of(load_text(text, Path("grid.yaml"))).steps == printed
     assert accuracy_of(asked(name)).error_estimate == (name != "fast")
 
 
