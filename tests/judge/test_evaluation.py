@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -10,13 +11,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from boulder_kernels import Status
 from boulder_sweep.columns import OUTCOME_COLUMNS, REASONS, VERDICTS
 from boulder_sweep.judge.accuracy import accuracy_of, control_of, readings_of
 from boulder_sweep.judge.evaluation import by_kernels, evaluation_of
 from boulder_sweep.judge.inputs import designs_of
-from boulder_sweep.judge.judged import ERROR, joined, not_computed
+from boulder_sweep.judge.judged import ERROR, PASS, joined, not_computed, worst_of
+from boulder_sweep.judge.verdict import STATUS_REASONS
 from boulder_sweep.store.part import verdict_counts
-from tests.runner.grids import grid, partly_impossible, plausible
+from tests.runner.grids import grid, grid_of, partly_impossible, plausible
 
 
 def test_the_kernels_get_si_and_radians():
@@ -62,6 +65,30 @@ def test_impossible_rows_never_enter_the_kernels_and_keep_their_place():
         alone = evaluation_of(sweep, accuracy_of(sweep), plausible)(sweep.block(row, row + 1))
         assert alone.row(0) == rows.row(row)
         assert (VERDICTS[alone.verdict[0]] == "error" and bool(block.reasons[row])) == impossible[row]
+
+
+def test_a_pass_of_several_cases_stands_under_what_all_of_them_do():
+    """The one with the least margin is the row; where one was not asked, what that row says is left."""
+    sweep = grid_of(3)
+    own = evaluation_of(sweep, accuracy_of(sweep), plausible)(sweep.block(0, 3))
+    cases = []
+    for margin, under in ((0.1, 3), (0.5, [0, 1, -1])):
+        given = {"verdict": PASS, "margin": margin, "robustness": 0, "stands_under": under}
+        columns = {name: np.broadcast_to(value, 3).astype(own[name].dtype) for name, value in given.items()}
+        cases.append(replace(own, columns=own.columns | columns))
+    assert worst_of(cases)["stands_under"].tolist() == [0, 1, 3]
+
+
+def test_designs_that_the_kernels_gave_up_have_their_reasons_among_others():
+    def some_given_up(table, readings, control):
+        outcomes = plausible(table, readings, control)
+        given_up = np.where(np.arange(len(table.L)) == 1, Status.INVALID, Status.SETTLED)
+        return outcomes._replace(status=given_up.astype(np.int8))
+
+    sweep = grid_of(3)
+    rows = evaluation_of(sweep, accuracy_of(sweep), some_given_up)(sweep.block(0, 3))
+    assert (rows.verdict == ERROR).tolist() == [False, True, False]
+    assert rows.row(1)["reason"] == STATUS_REASONS[Status.INVALID]
 
 
 def test_a_block_of_impossible_rows_only():
