@@ -11,13 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from boulder_kernels import Status
 from boulder_sweep.columns import OUTCOME_COLUMNS, REASONS, VERDICTS
 from boulder_sweep.judge.accuracy import accuracy_of, control_of, readings_of
 from boulder_sweep.judge.evaluation import by_kernels, evaluation_of
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.judged import ERROR, PASS, joined, not_computed, worst_of
-from boulder_sweep.judge.verdict import STATUS_REASONS
 from boulder_sweep.store.part import verdict_counts
 from tests.runner.grids import grid, grid_of, partly_impossible, plausible
 
@@ -77,18 +75,6 @@ def test_a_pass_of_several_cases_stands_under_what_all_of_them_do():
         columns = {name: np.broadcast_to(value, 3).astype(own[name].dtype) for name, value in given.items()}
         cases.append(replace(own, columns=own.columns | columns))
     assert worst_of(cases)["stands_under"].tolist() == [0, 1, 3]
-
-
-def test_designs_that_the_kernels_gave_up_have_their_reasons_among_others():
-    def some_given_up(table, readings, control):
-        outcomes = plausible(table, readings, control)
-        given_up = np.where(np.arange(len(table.L)) == 1, Status.INVALID, Status.SETTLED)
-        return outcomes._replace(status=given_up.astype(np.int8))
-
-    sweep = grid_of(3)
-    rows = evaluation_of(sweep, accuracy_of(sweep), some_given_up)(sweep.block(0, 3))
-    assert (rows.verdict == ERROR).tolist() == [False, True, False]
-    assert rows.row(1)["reason"] == STATUS_REASONS[Status.INVALID]
 
 
 def test_a_block_of_impossible_rows_only():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -118,18 +117,6 @@ def test_an_estimate_is_in_proportion():
 def test_a_rate_counts_the_rows_of_this_run():
     cases = ((30, 0.5), (30, 2.0), (0, 0.0))
     assert [Progress(400, rows, 441, seconds).rows_per_second for rows, seconds in cases] == [60.0, 15.0, 0.0]
-
-
-def test_rows_are_computed_in_blocks_and_seconds_are_from_the_call_on(tmp_path, monkeypatch):
-    sizes = []
-
-    def watching(table, readings, control):
-        sizes.append(len(table.L))
-        return plausible(table, readings, control)
-
-    monkeypatch.setattr(running, "time", Mock(monotonic=lambda: 7.0))
-    assert running.run(grid(), tmp_path / "out", simulate=watching).seconds == 0.0
-    assert np.mean(sizes) > 50
 
 
 def test_more_workers_than_cores_are_not_faster(monkeypatch):

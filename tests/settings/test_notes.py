@@ -231,7 +231,6 @@ def test_a_factor_of_thirty_outside(load_with, problems_of, minimal, path, side)
     ("entry", "words"),
     [
         ("vehicle.mass=15 lb", "15 lb is less than 1/30 of the usual 2205 to 66140 lb (car to heavy truck"),
-        ("vehicle.mass=15.000 lb", "15 lb is less than 1/30"),
         ("vehicle.mass=6.8e6", "6.8e+06 kg is more than 30 times the usual 1000 to 30000 kg"),
         ("vehicle.mass=[6800, 12, 15]", "12 to 15 kg is less than"),
         ("vehicle.mass=[12, 1e6]", "12 to 1e+06 kg is more than 30 times outside the usual"),
@@ -242,7 +241,6 @@ def test_a_factor_of_thirty_outside(load_with, problems_of, minimal, path, side)
         ("vehicle.spring=3103.3", "a bare number is in N/m, not in kN/m"),
         ("vehicle.damper=138.91", "not in kN*s/m"),
         ("vehicle.speed=0.05", "0.05 m/s is less than"),
-        ("boulder.density=2.6", "not in t/m^3 or pcf"),
         ("soil.density=1.86", "not in t/m^3 or pcf"),
         (
             "soil.layers=[{from: 1 m, density: 1.9, friction_angle: 36, subgrade_reaction: 60}]",
