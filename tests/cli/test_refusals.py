@@ -116,7 +116,6 @@ def beside(tmp_path_factory):
         ("simulate RWG --trajectory no/t.parquet", "no/t.parquet: the folder HERE/no does not exist"),
         ("simulate RWG --trajectory folder.parquet", "folder.parquet cannot be written: Is a directory"),
         ("simulate RWG --trajectory ./t.parquet --plot t.parquet", "./t.parquet is named twice; give each output a"),
-        ("simulate RWG --plot x.png --energy x.png", "x.png is named twice"),
         ("simulate RWG --plot x.png --energy HERE/x.png", "is named twice"),
         ("simulate RWG --energy e.bmp", "must end in .png, .svg, .pdf"),
         ("simulate RWG --animate film.png", "must end in .gif"),

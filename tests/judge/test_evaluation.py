@@ -40,7 +40,8 @@ def test_readings_and_control_are_those_of_the_settings():
     control = control_of(sweep, accuracy_of(sweep))
     assert control.elements == 50
     assert control.h == 0.002
-    assert control.horizon == 1.0
+    longer = replace(sweep, solver=replace(sweep.solver, horizon_s=2.0, accuracy="balanced", step_s=None))
+    assert (control.horizon, control_of(longer, accuracy_of(longer)).longest_horizon) == (1.0, 20.0)
     assert control.theta_limit == pytest.approx(np.radians(10.0))
 
 
