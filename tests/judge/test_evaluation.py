@@ -71,11 +71,11 @@ def test_a_pass_of_several_cases_stands_under_what_all_of_them_do():
     sweep = grid_of(3)
     own = evaluation_of(sweep, accuracy_of(sweep), plausible)(sweep.block(0, 3))
     cases = []
-    for margin, under in ((0.1, 3), (0.5, [0, 1, -1])):
+    for margin, under in ((0.1, [3, 3, -1]), (0.5, [0, 1, 3])):
         given = {"verdict": PASS, "margin": margin, "robustness": 0, "stands_under": under}
         columns = {name: np.broadcast_to(value, 3).astype(own[name].dtype) for name, value in given.items()}
         cases.append(replace(own, columns=own.columns | columns))
-    assert worst_of(cases)["stands_under"].tolist() == [0, 1, 3]
+    assert worst_of(cases)["stands_under"].tolist() == [0, 1, -1]
 
 
 def test_a_block_of_impossible_rows_only():

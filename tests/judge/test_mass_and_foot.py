@@ -257,7 +257,7 @@ def test_a_small_foot_is_never_a_pass(tmp_path):
 def test_a_weighed_boulder_with_a_profile_is_decided(tmp_path):
     """A column holds its mass over the mass of its box, and no box has to stand for it."""
     sweep = shaped(tmp_path, "taper: 0.8\n  mass: 18 t", "vehicle.speed=25 mph")
-    density = designs_of(sweep.block(0, 1), sweep.model).table.rho_b  # of what is simulated
+    density = designs_of(sweep.block(0, 1), model=sweep.model).table.rho_b  # of what is simulated
     assert density * 1.65 * 1.68 * 3.44 * sweep.model.shape.filled == pytest.approx(18000)
     row = table_of(sweep, tmp_path / "table").iloc[0]
     assert row.solidity == pytest.approx(18000 / (2596 * 1.65 * 1.68 * 3.44), rel=1e-9)
