@@ -47,10 +47,8 @@ def test_no_other_depth_of_the_usual_range_gives_a_better_answer(given, asked):
         if own[name] is not None:
             best = max(best, sign * own[name])
     assert sign * found[name] >= best - 0.002 * abs(best)
-    there = bare_need(site(**given, site=f"embedment_depth: {found['embedment_depth_m']}"), **asked).arrow.to_pylist()[
-        0
-    ]
-    assert there[name] == found[name]
+    there = bare_need(site(**given, site=f"embedment_depth: {found['embedment_depth_m']}"), **asked).arrow
+    assert there.to_pylist()[0][name] == found[name]
 
 
 def test_the_lightest_boulder_has_any_depth_of_the_usual_range():

@@ -47,6 +47,8 @@ def test_threads_work_side_by_side_and_results_are_in_order_by_default(how, firs
     calls = [call(begun.wait, 60.0), call(times, 1), call(begun.set)]
     results = list(Pool(2)(calls, **how))
     assert results[0] == first
+    three = threading.Barrier(3)
+    assert sorted(Pool(3)([call(three.wait, 60.0)] * 3)) == [0, 1, 2]
 
 
 @pytest.mark.parametrize(("jobs", "count", "own"), [(1, 2, True), (2, 1, True), (2, 2, False)])
