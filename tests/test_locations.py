@@ -167,6 +167,16 @@ def test_a_file_is_not_named_in_a_store_that_fails_but_in_one_that_lets_nobody_r
             check_target(target, PictureError)
 
 
+@pytest.mark.parametrize("closed", ["folder", "folder/map.png"])
+def test_a_target_that_may_not_be_written_is_refused_before_the_work(tmp_path, monkeypatch, closed):
+    target = tmp_path / "folder" / "map.png"
+    target.parent.mkdir()
+    target.touch()
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != tmp_path / closed or not mode & os.W_OK)
+    with pytest.raises(PictureError, match="Permission denied"):
+        check_target(target, PictureError)
+
+
 def test_no_output_is_written_through_a_link(tmp_path):
     outside = tmp_path / "outside"
     outside.write_text("precious")

@@ -137,7 +137,7 @@ def _wider(need: Need, units: str) -> list[tuple[str, ...]]:
 
 def _down(length: float, units: str) -> float:
     """Return a length [m] that is written in few digits."""
-    size = shown_unit("m", units).size if units == "us" else 1.0
+    size = shown_unit("m", units).size
     return math.floor(length / size * 100.0 + 1e-6) / 100.0 * size
 
 
@@ -407,7 +407,7 @@ class _Words:
             at_most = name == "impact_speed_m_s"
             value = (min if at_most else max)(row[name] for row in one.rows)
             built = f" ({self.mass(one.rows[0])}, {self.depth(one)})" if name == HEIGHT else ""
-            size = shown_unit(BY_NAME[name].unit, self.units).size if self.units == "us" else 1.0
+            size = shown_unit(BY_NAME[name].unit, self.units).size
             held = size * within(value / size, math.floor if at_most else math.ceil)
             changes.append(f"{BY_NAME[name].path} {self.value(name, held)} or {'less' if at_most else 'more'}{built}")
         either = "; or ".join(changes)

@@ -621,7 +621,7 @@ def _in_row(number: int, cell: Cell) -> Cell:
 
 def _marker(need: Need, units: str) -> Column:
     """Return the column that marks the boulder of the recommendation."""
-    found, metre = need.recommendation, 1.0 if units == "si" else shown_unit("m", units).size
+    found, metre = need.recommendation, shown_unit("m", units).size
     design = None if found is None else found.design
     sizes = {} if design is None else {n: design.sizes[n] / metre for n in SIDES if n != need.key.name}
     return ("", ""), lambda row: MARK if sizes and all(row[name] == size for name, size in sizes.items()) else ""

@@ -444,9 +444,8 @@ class _Boulders:
         failing = rows[np.isnan(self.passes[rows])]
         # Deeper, the truck would ride over it.
         reach = given[HEIGHT] - given["bumper_height_m"] - asked.sweep.criterion.min_overlap_m
-        # Of a boulder that has a depth in every row, but no common one, the greatest of them.
-        tried = self._column(DEPTH)[failing if len(failing) else rows[[self.passes[rows].argmax()]]]
-        deepest = min(float(tried.min()), math.floor(float(reach.min()) * 1000.0) / 1000.0)
+        tried = self._column(DEPTH)[failing if len(failing) else rows]
+        deepest = min(float(tried.max()), math.floor(float(reach.min()) * 1000.0) / 1000.0)
         return Nearest(
             self.table.take(rows.tolist()).to_pylist(), design, left, robust, self._changes(rows, given, deepest)
         )

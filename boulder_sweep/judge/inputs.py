@@ -174,7 +174,7 @@ def designs_of(
         fills = solidity_of(mass, rocks, *sides)
         # What is simulated has the mass of the boulder.
         volume = sides[0] * sides[1] * sides[2]
-        columns["rho_b"] = mass / (volume if shape.is_box else volume * shape.filled)
+        columns["rho_b"] = mass / (volume * shape.filled)
     given = DesignTable(**columns)
     table = with_soil(given, model.resistance, model.ground, shape=shape)
     factors = None if table is given else given.K_epsilon

@@ -112,7 +112,7 @@ def encoded_part(
 
 def encode(table: pa.Table) -> memoryview:
     """Return the bytes of a Parquet file with the whole table in one row group."""
-    split = [field.name for field in table.schema if field.name != DESIGN_ID.name and pa.types.is_floating(field.type)]
+    split = [field.name for field in table.schema if pa.types.is_floating(field.type)]
     by_dictionary = [field.name for field in table.schema if pa.types.is_dictionary(field.type)]
     sink = pa.BufferOutputStream()
     pq.write_table(

@@ -466,4 +466,4 @@ def _ordered(words: pd.Series, known: Sequence[str]) -> pd.Series:
     """Return a column of words with the known ones first and the others sorted, whatever parts they come from."""
     there = list(words.cat.categories)
     wanted = [*(word for word in known if word in there), *sorted(set(there) - set(known))]
-    return words if wanted == there else words.cat.reorder_categories(wanted)
+    return words.cat.reorder_categories(wanted)

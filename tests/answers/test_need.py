@@ -15,7 +15,7 @@ import pytest
 
 from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.printing import need_lines, uncertainty_lines
-from boulder_sweep.answers.trials import Remembered, judges_of
+from boulder_sweep.answers.trials import Remembered, judges_of, ranges
 from boulder_sweep.answers.uncertainty import uncertainty
 from boulder_sweep.designs import DesignBlock, some
 from boulder_sweep.errors import PictureError, QuestionError
@@ -218,7 +218,10 @@ def test_progress_counts_rows_or_the_values_tried_for_a_probability() -> None:
             {"most": "speed", "between": ("12.001 m/s", "12.009 m/s")},
             r"12\.001 to 12\.009 m/s, holds no multiple of",
         ),
-        ({"most": "speed", "between": ("12.001 m/s", "12.015 m/s")}, r"holds only one multiple of its step, 0\.01 m/s"),
+        (
+            {"most": "speed", "between": ("12.001 m/s", "12.015 m/s")},
+            r"12\.001 to 12\.015 m/s, holds only one multiple of",
+        ),
         ({"between": ("1.9491 m", "1.9499 m")}, r"1\.9491 to 1\.9499 m, holds no multiple of its step, 0\.001 m; give"),
         ({"least": "embedment_ratio", "between": (0.6101, 0.6109)}, r"0\.6101 to 0\.6109, holds no multiple"),
     ],
@@ -323,6 +326,26 @@ def test_a_design_is_judged_once_with_the_accuracy_of_the_sweep(monkeypatch: pyt
     found = bare_need(sweep, jobs=1)
     assert own.accuracy.error_estimate
     assert len(judged) == len(set(judged)) >= len(found)
+
+
+def test_a_second_opinion_of_full_accuracy_is_asked_once_a_design(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[float] = []
+    stand = Evaluation.stand
+
+    def counted(evaluation: Evaluation, block: DesignBlock, tolerance_m: float | None = None) -> np.ndarray:
+        asked.extend(block.columns[DEPTH].to_numpy().tolist() if tolerance_m is None else [])
+        return stand(evaluation, block, tolerance_m)
+
+    monkeypatch.setattr(Evaluation, "stand", counted)
+    bare_need(site(height="3.4 m", friction="36 deg"), robust=True, jobs=1)
+    assert len(asked) == len(set(asked)) > 1
+
+
+@pytest.mark.parametrize(
+    ("count", "expected"), [(0, [(0, 0)]), (4, [(0, 4)]), (5, [(0, 2), (2, 5)]), (10, [(0, 3), (3, 6), (6, 10)])]
+)
+def test_ranges_hold_all_and_are_no_larger_than_they_may(count: int, expected: list[tuple[int, int]]) -> None:
+    assert list(ranges(count, 4)) == expected
 
 
 def test_judging_again_gives_the_same_rows() -> None:

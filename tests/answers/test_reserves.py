@@ -100,7 +100,9 @@ vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3 kN/m, damper: 138.91 kN*
 
 def test_a_boulder_that_a_slower_truck_overturns_has_no_class() -> None:
     """It passes at 30 mph by sliding, and overturns at 12.6 m/s; in better soil it overturns at 30 mph, too."""
-    found = capacity(load_text(SLIDES, Path("slides.yaml")))
+    seen: list[tuple[int, int]] = []
+    found = capacity(load_text(SLIDES, Path("slides.yaml")), progress=lambda *now: seen.append(now))
+    assert seen == [(0, 1), (1, 1)]
     row = found.frame.iloc[0]
     assert row.withstands_speed_m_s < 12.6
     assert row.speed_fails_at == pytest.approx(row.withstands_speed_m_s + 0.01)

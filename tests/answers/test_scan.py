@@ -13,7 +13,7 @@ from boulder_sweep.answers.search import CELLS, FAILS, FAR, HOLDS, search
 from boulder_sweep.answers.trials import judges_of
 from boulder_sweep.settings import Sweep
 from boulder_sweep.settings.model import Model, ReadingChoice
-from tests.answers.designs import random_designs
+from tests.answers.designs import random_designs, site
 
 SHALLOW = ("0.05 m", "1.2 m")
 KEYS = ("embedment_depth", "height", "width", "friction_angle", "speed", "vehicle.mass")
@@ -66,6 +66,19 @@ def test_the_same_for_many_designs_and_both_readings(readings: str, between: End
     corrected = readings == "corrected"
     sweep = random_designs(10_000 if corrected else 1000, seed=5)
     compared(sweep if corrected else as_printed(sweep), "embedment_depth", between)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "speed", "slides"), [(0.35, 9.0, True), (0.35, 11.0, False), (0.44, 3.0, False), (0.46, 6.0, False)]
+)
+def test_a_shallow_boulder_that_passes_by_sliding_is_searched_by_smaller_steps(ratio, speed, slides) -> None:
+    """Not one that overturns, moves by 0.07 m, or is deeper."""
+    sweep = site(length="3 m", width="0.8 m", height="2 m", friction="40 deg", site=f"embedment_ratio: {ratio}")
+    key = key_of("speed", most=True)
+    asked = Question(sweep, key, None, judges_of(sweep))
+    trial = asked.trial(asked.open.rows(0, 1))
+    trial.coarse(np.array([0]), np.array([round(speed / key.step)]))
+    assert trial.slides.tolist() == [slides]
 
 
 def test_only_what_lies_between_two_far_places_is_left_out() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -220,6 +221,9 @@ def test_stated_intervals_hold_for_whatever_number_of_inputs_decides(weights: tu
 def test_scramblings_that_agree_are_not_certain() -> None:
     low, high = interval(np.full((1, SCRAMBLINGS), 16.0), 32, 0.95)
     assert (high - low)[0] == pytest.approx(2.0 * (1.0 - 0.05 ** (1 / 16)) / 32)
+    wider = interval(np.array([[15.0, 17.0] * 8]), 32, 0.95)
+    of_the_mean = 2.13145 * math.sqrt(16 / 15) / 32 / 4  # Student's t of 15 degrees of freedom
+    assert (wider[1] - wider[0] - (high - low))[0] == pytest.approx(2.0 * of_the_mean, rel=1e-5)
 
 
 def test_an_undecided_design_without_a_margin_is_as_good_as_at_its_limit():

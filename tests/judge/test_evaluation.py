@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -14,9 +15,9 @@ from boulder_sweep.columns import OUTCOME_COLUMNS, REASONS, VERDICTS
 from boulder_sweep.judge.accuracy import accuracy_of, control_of, readings_of
 from boulder_sweep.judge.evaluation import by_kernels, evaluation_of
 from boulder_sweep.judge.inputs import designs_of
-from boulder_sweep.judge.judged import ERROR, joined, not_computed
+from boulder_sweep.judge.judged import ERROR, PASS, joined, not_computed, worst_of
 from boulder_sweep.store.part import verdict_counts
-from tests.runner.grids import grid, partly_impossible, plausible
+from tests.runner.grids import grid, grid_of, partly_impossible, plausible
 
 
 def test_the_kernels_get_si_and_radians():
@@ -39,7 +40,8 @@ def test_readings_and_control_are_those_of_the_settings():
     control = control_of(sweep, accuracy_of(sweep))
     assert control.elements == 50
     assert control.h == 0.002
-    assert control.horizon == 1.0
+    longer = replace(sweep, solver=replace(sweep.solver, horizon_s=2.0, accuracy="balanced", step_s=None))
+    assert (control.horizon, control_of(longer, accuracy_of(longer)).longest_horizon) == (1.0, 20.0)
     assert control.theta_limit == pytest.approx(np.radians(10.0))
 
 
@@ -62,6 +64,18 @@ def test_impossible_rows_never_enter_the_kernels_and_keep_their_place():
         alone = evaluation_of(sweep, accuracy_of(sweep), plausible)(sweep.block(row, row + 1))
         assert alone.row(0) == rows.row(row)
         assert (VERDICTS[alone.verdict[0]] == "error" and bool(block.reasons[row])) == impossible[row]
+
+
+def test_a_pass_of_several_cases_stands_under_what_all_of_them_do():
+    """The one with the least margin is the row; where one was not asked, what that row says is left."""
+    sweep = grid_of(3)
+    own = evaluation_of(sweep, accuracy_of(sweep), plausible)(sweep.block(0, 3))
+    cases = []
+    for margin, under in ((0.1, [3, 3, -1]), (0.5, [0, 1, 3])):
+        given = {"verdict": PASS, "margin": margin, "robustness": 0, "stands_under": under}
+        columns = {name: np.broadcast_to(value, 3).astype(own[name].dtype) for name, value in given.items()}
+        cases.append(replace(own, columns=own.columns | columns))
+    assert worst_of(cases)["stands_under"].tolist() == [0, 1, -1]
 
 
 def test_a_block_of_impossible_rows_only():

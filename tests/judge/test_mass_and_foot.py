@@ -240,6 +240,13 @@ def test_outlines_are_shares_of_the_sides():
     np.testing.assert_allclose(outline, [[0.0, W, L / 2, L / 2], [H, W / 2, L / 4, L / 4]])
 
 
+def test_the_vehicle_strikes_the_near_face_of_an_outline_at_the_impact_height():
+    designs = plain_designs()
+    table = designs.table
+    shaped = designs._replace(table=with_soil(table, "kp_squared", Ground(), shape=tapered(0.5)))
+    assert shaped.length == pytest.approx(table.L * (1.0 - (table.d + table.e) / table.H / 4.0))
+
+
 def test_a_small_foot_is_never_a_pass(tmp_path):
     row = table_of(shaped(tmp_path, "taper: 2.2"), tmp_path / "table").iloc[0]
     assert (row.verdict, row.reason) in {("undecided", "foot"), ("fail", "overturns")}
@@ -250,6 +257,8 @@ def test_a_small_foot_is_never_a_pass(tmp_path):
 def test_a_weighed_boulder_with_a_profile_is_decided(tmp_path):
     """A column holds its mass over the mass of its box, and no box has to stand for it."""
     sweep = shaped(tmp_path, "taper: 0.8\n  mass: 18 t", "vehicle.speed=25 mph")
+    density = designs_of(sweep.block(0, 1), model=sweep.model).table.rho_b  # of what is simulated
+    assert density * 1.65 * 1.68 * 3.44 * sweep.model.shape.filled == pytest.approx(18000)
     row = table_of(sweep, tmp_path / "table").iloc[0]
     assert row.solidity == pytest.approx(18000 / (2596 * 1.65 * 1.68 * 3.44), rel=1e-9)
     assert row.verdict == "pass"

@@ -22,6 +22,7 @@ from boulder_sweep.judge.judged import PASS, Judged
 from boulder_sweep.judge.robustness import (
     DECISIVE,
     ERROR_DEG,
+    ERROR_M,
     FINENESS,
     FREE,
     NEAR_DEG,
@@ -146,6 +147,21 @@ def test_near_the_limit_a_fine_solution_decides_with_its_error_taken_off() -> No
         assert above == {-0.2: False, 0.5 * ERROR_DEG: False, 0.2: True}
 
 
+def test_near_the_limit_of_penetration_the_error_is_taken_off() -> None:
+    sweep = grid()
+    evaluation, judged = evaluated(sweep, DECISIVE)
+    block = sweep.block(0, sweep.n_designs)
+    passing = np.flatnonzero(judged.verdict == PASS)
+    one = designs_of(block).rows(passing[standing(judged)[passing]][:1])
+    watched = second_opinions(with_law(one.table, DECISIVE), HeaveControl(1.2, 1.0, 1e-8, FINEST, stop=False)).x_v_max
+    stands = {}
+    for beyond_m in (-2.0 * ERROR_M, -0.5 * ERROR_M, 0.5 * ERROR_M):
+        offset = watched - one.table.L - evaluation.limits.penetration - beyond_m
+        near = one._replace(bed_offset=offset)
+        stands[beyond_m] = robustness.stands(near, DECISIVE, Model(), evaluation.limits, evaluation.longest_s)[0]
+    assert list(stands.values()) == [True, False, False]
+
+
 def test_the_weakest_law_decides_and_others_are_asked_where_it_overturns() -> None:
     sweep = grid()
     _, both = evaluated(sweep, *SECOND_OPINIONS)
@@ -171,6 +187,16 @@ def test_where_broms_resists_less_it_is_asked_too() -> None:
     row = evaluation.judged(plain_designs(**slender)).row(0)
     assert (row["verdict"], row["stands_under"], row["robustness"]) == ("pass", "paper;width_capped", "sensitive")
     assert not standing(evaluation.judged(plain_designs(**slender)))[0]
+    how = Model(), evaluation.limits, evaluation.longest_s
+    assert robustness.stands(plain_designs(**slender), DECISIVE, *how).all()
+    assert not robustness.stands_under_the_weakest(plain_designs(**slender), *how).any()
+
+
+def test_an_open_design_stands_where_the_law_that_decides_lets_it() -> None:
+    bit = 1 << SECOND_OPINIONS.index(DECISIVE)
+    grades, under = [ROBUST, OPEN, OPEN, OPEN, OPEN, SENSITIVE], [-1, bit, 3 - bit, 0, -1, 3]
+    columns = {"robustness": np.array(grades), "stands_under": np.array(under)}
+    assert standing(Judged(columns, {})).tolist() == [True, True, False, False, False, False]
 
 
 def test_what_is_robust_without_asking_is_not_simulated(monkeypatch: pytest.MonkeyPatch) -> None:

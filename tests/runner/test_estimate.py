@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,11 +13,13 @@ from boulder_sweep.runner import run as running
 from boulder_sweep.runner.progress import Progress, RowCost, take_sample, time_and_disk, too_large
 from boulder_sweep.runner.ranges import WORK_S, planned, seconds_per_row
 from boulder_sweep.runner.run import estimate
+from boulder_sweep.settings.model import Layer
 from boulder_sweep.store.failures import DoesNotFitError
 from boulder_sweep.store.part import encode, part_table
 from boulder_sweep.text import size_text
 from tests.runner.grids import grid, grid_of, plausible
 
+LAYERED = (Layer(from_m=1.0, density_kg_m3=2e3, friction_angle_deg=38.0, subgrade_reaction_MN_m3=60.0),)
 HUGE = {
     "width": "{from: 1 m, to: 2.5 m, count: 10000}",
     "height": "{from: 1.6 m, to: 3.4 m, count: 10000}",
@@ -26,18 +30,21 @@ HUGE = {
 
 
 @pytest.mark.parametrize(
-    ("changes", "least", "most"),
+    ("changes", "model", "cost_us"),
     [
-        ({}, 1e-5, 5e-5),
-        ({"step": "1 ms"}, 5e-5, 2e-4),
-        ({"soil": "{elements: 160}"}, 5e-5, 4e-4),
+        ({}, {}, 3 * 5 + 10),
+        ({"step": "1 ms"}, {}, 12 * 5 + 10),
+        ({"step": "20 ms"}, {}, 5 + 10),
+        ({"soil": "{elements: 160}"}, {}, 11 * 3 * 5 + 10),
+        ({}, {"layers": LAYERED}, 3 * 20 + 10),
+        ({}, {"layers": LAYERED, "taper": 0.8}, 3 * 30 + 10),
     ],
 )
-def test_costs_grow_with_the_work_by_a_fixed_table(changes, least, most):
+def test_costs_grow_with_the_work_by_a_fixed_table(changes, model, cost_us):
     sweep = grid(**changes)
+    sweep = replace(sweep, model=replace(sweep.model, **model))
     evaluation = evaluation_of(sweep, accuracy_of(sweep), plausible)
-    assert least < seconds_per_row(sweep, evaluation) < most
-    assert seconds_per_row(sweep, evaluation) == seconds_per_row(sweep, evaluation)
+    assert seconds_per_row(sweep, evaluation) == pytest.approx(1e-6 * cost_us)
     assert planned(sweep, evaluation).rows == 441
 
 
@@ -103,13 +110,13 @@ def test_a_sample_sees_the_bytes_of_a_whole_part(wide):
 def test_an_estimate_is_in_proportion():
     cost = RowCost(1e-6, 50.0, 10_000.0)
     one, ten = (time_and_disk(cost, rows, rows // 25_000, 2) for rows in (10**6, 10**7))
-    assert one[0] == pytest.approx(0.5)
-    assert ten[0] == pytest.approx(10 * one[0])
-    assert ten[1] == pytest.approx(10 * one[1], rel=0.05)
+    assert one == (pytest.approx(0.5), 50 * 10**6 + 40 * 10_000)
+    assert ten == (pytest.approx(5.0), 50 * 10**7 + 400 * 10_000)
 
 
 def test_a_rate_counts_the_rows_of_this_run():
-    assert [Progress(400, rows, 441, seconds).rows_per_second for rows, seconds in ((30, 0.5), (0, 0.0))] == [60.0, 0.0]
+    cases = ((30, 0.5), (30, 2.0), (0, 0.0))
+    assert [Progress(400, rows, 441, seconds).rows_per_second for rows, seconds in cases] == [60.0, 15.0, 0.0]
 
 
 def test_more_workers_than_cores_are_not_faster(monkeypatch):
@@ -118,6 +125,7 @@ def test_more_workers_than_cores_are_not_faster(monkeypatch):
     one, two, eight = (estimate(grid(), jobs=jobs, simulate=plausible) for jobs in (1, 2, 8))
     assert one.seconds == pytest.approx(0.441)
     assert two.seconds == eight.seconds == pytest.approx(0.441 / 2)
+    assert (one.jobs, eight.jobs, estimate(grid(), simulate=plausible).jobs) == (1, 8, 2)
 
 
 def test_what_does_not_fit_is_said_with_numbers(tmp_path, monkeypatch):
@@ -145,6 +153,7 @@ def test_an_estimate_writes_nothing_and_counts_what_is_there_only_to_resume(tmp_
     assert found.rows == grid().n_designs
     assert list(tmp_path.iterdir()) == []
     assert running.run(grid(), tmp_path / "out", simulate=plausible).jobs == running.available_cores()
+    assert running.run(grid_of(1, subgrade="60 MN/m^3"), tmp_path / "one", simulate=plausible).jobs == 1
     assert estimate(grid(), tmp_path / "out", simulate=plausible).rows_to_compute == found.rows
     assert estimate(grid(), tmp_path / "out", resume=True, simulate=plausible).rows_to_compute == 0
 
