@@ -302,7 +302,7 @@ def test_table_has_units_and_settings(tmp_path: Path) -> None:
 def test_chart_is_drawn(tmp_path: Path) -> None:
     bare_need(site()).plot(tmp_path / "chart.png")
     assert (tmp_path / "chart.png").stat().st_size > 10_000
-    for least in ("embedment_depth", "boulder.height", "mass"):  # a point
+    for least in ("embedment_depth", "boulder.height"):  # a point
         bare_need(site(height="3 m", friction="40 deg"), least).plot(tmp_path / f"{least}.png")
         assert (tmp_path / f"{least}.png").stat().st_size > 10_000
     with pytest.raises(PictureError, match="nothing passes"):
