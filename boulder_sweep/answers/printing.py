@@ -262,13 +262,12 @@ def reserve_lines(result: Reserves, units: str = "si") -> list[str]:
 def reserve_screen(result: Reserves, units: str = "si", recommended: Sequence[int] = ()) -> Screen:
     """Return the table of `reserve_lines`; rows that are recommended are marked.
 
-    Of more than fit, they come first, then the ones that pass, the robust and of these the lightest before others.
+    Of more than fit, they come first, then the ones that pass, the robust before others.
     """
     from boulder_sweep.answers.reserves import RESERVES
 
-    names = ("design_id", "verdict", "robustness", BOULDER_MASS.name)
-    rows = zip(*(result.arrow[name].to_pylist() for name in names), strict=True)
-    order = sorted((row not in recommended, verdict != "pass", RANKS[g], mass, row) for row, verdict, g, mass in rows)
+    rows = zip(*(result.arrow[name].to_pylist() for name in ("design_id", "verdict", "robustness")), strict=True)
+    order = sorted((row not in recommended, verdict != "pass", RANKS[grade], row) for row, verdict, grade in rows)
     columns: list[Column] = [(("verdict", ""), lambda row: str(row["verdict"])), GRADE]
     for key, column, word, _ in RESERVES:
         columns.append((head_of(key.name, units), _format_withstood(key, column, f"{word}_found", units)))

@@ -293,8 +293,7 @@ def answers(data: bytes) -> bool:
 def described(path: Path) -> None:
     """Read what the page of a report says."""
     rows = read_rows(path)
-    answer_of(rows)
-    screens(rows)
+    screens(rows, answer_of(rows))
 
 
 def with_column(table: pa.Table, name: str, value: Any) -> pa.Table:
