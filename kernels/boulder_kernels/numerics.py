@@ -23,6 +23,7 @@ The loop over j is vectorised if its elements are read by `field`, whose index n
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
@@ -35,6 +36,7 @@ from numba.core import cgutils
 from ._jit import exact_inlined, fields_of, inlined, overload
 
 
+@functools.cache
 def record_type(kind: Any) -> np.dtype:
     """Return the type of a record with a number for each field of a named tuple, or a record where it is one itself."""
     fields = fields_of(kind).items()

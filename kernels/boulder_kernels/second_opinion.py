@@ -77,12 +77,10 @@ FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 2e-4, 0.02, 1e-9
 MOST_ATTEMPTS = 50_000
 CAUTION = 0.01
 """Share of the least energy by which the energy must be below it: the errors of integrator and search, and more."""
-TURNS = 3
-"""How often the least energy is looked for along x_b and along y_b in turn."""
 PLACED = 1e-4
-"""How precisely, as a share of the energy that lifts the boulder by its length."""
+"""How precisely it is found, as a share of the energy that lifts the boulder by its length."""
 ROUGHLY = 1e-2
-"""The same before the last turn."""
+"""The same for the first turn along either axis."""
 
 
 class HeaveControl(NamedTuple):
@@ -220,13 +218,14 @@ def least_energy(theta: float, work: np.ndarray, f: HeaveConstants) -> float:
 
     Notes
     -----
-    Along x_b alone, and along y_b alone, the energy is convex: its least is where its slope is zero, in either in turn.
+    Along x_b alone, and along y_b alone, the energy is convex: its least is where its slope is zero. The search goes
+    along either in turn until a turn gains nothing.
     (As a face that widens upwards rises, depth and pressure of the soil both fall, and so their product is convex. As
     one that narrows rises, the pressure grows: it counts as sunk by as much as it can be, which is no more than the
     energy.) Along x_b the least is between the positions where the uppermost and the lowest soil are as they were, and
     further by what an inclined face moves the soil; along y_b between those where all strips carry what they can, which
     is more than the weight, and where the boulder is out of the soil. There may be several, of large rotations: the
-    search starts from both ends along x_b.
+    search starts from the middle, and from where the uppermost soil is as it was.
     """
     sin, versin = sine_versine(theta)
     upper = f.c.l_n * versin - f.c.z_0 * sin
@@ -241,13 +240,15 @@ def least_energy(theta: float, work: np.ndarray, f: HeaveConstants) -> float:
     # Begin where the end of the foot, pressed in along a wedge, carries the weight.
     y = touch - min(most, math.sqrt(2.0 * f.m_b * G * f.foot * abs(sin) / f.k_foot))
     least = np.inf
-    for x in (left, right):
+    for x in (0.5 * (left + right), upper):
         position = Equilibrium(x, f.heave * y, np.inf)
-        for turn in range(TURNS):
-            precision = PLACED if turn == TURNS - 1 else ROUGHLY
+        for turn in range(ITERATIONS):
+            before, precision = position.energy, PLACED if turn > 0 else ROUGHLY
             if f.heave > 0.0:
                 position = move_to_least_energy(position, False, bottom, top, precision, theta, work, f)
             position = move_to_least_energy(position, True, *ends, precision, theta, work, f)
+            if before - position.energy <= PLACED * f.m_b * G * f.L:
+                break
         y, least = position.y, min(least, position.energy)
     return least
 
@@ -332,7 +333,7 @@ def simulate_heave(
     t, h, touching = 0.0, FIRST_STEP, True
     u = first_rate(work, touching, f)
     theta_max = x_b_max = y_b_max = x_v_max = 0.0
-    t_limit, barrier, is_old = np.nan, np.inf, True
+    t_limit, barrier, is_old, both_ways = np.nan, np.inf, True, False
     proved_at = control.theta_limit - control.margin
     written, attempts = 0, 0
     status = Status.STEP_BUDGET.value
@@ -399,9 +400,9 @@ def simulate_heave(
             if theta_max >= proved_at and proved_at < control.theta_limit:
                 proved_at, barrier, is_old = control.theta_limit, np.inf, True
             if held < barrier and is_old:
-                barrier = barrier_at(proved_at, work, f)
-                if held < barrier:
-                    barrier, is_old = min(barrier, barrier_at(-proved_at, work, f)), False
+                barrier, is_old, both_ways = barrier_at(proved_at, work, f), False, False
+            if held < barrier and not both_ways:
+                barrier, both_ways = min(barrier, barrier_at(-proved_at, work, f)), True
             if held < barrier:
                 status = Status.BELOW_LIMIT.value
                 break
