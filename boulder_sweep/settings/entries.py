@@ -198,7 +198,7 @@ class Entries:
         """Replace the readings of an investigation by soil constants."""
         listed = [key for key in SOIL_KEYS if fields.BY_PATH[f"soil.{key}"].name in self.listed]
         with self.reporting("soil", [f"soil.{key}" for key in SOIL_KEYS]) as problems:
-            soils = unfold_soils(self.root, listed, self._deepest_foot(), problems, self._read_log)
+            soils = unfold_soils(self.root, listed, self._feet(), problems, self._read_log)
         self.derived |= {"soil": soils} if soils else {}
 
     def _read_log(self, node: Scalar, hole: Scalar | None) -> Log:
@@ -207,29 +207,34 @@ class Entries:
 
         return read_log(node, hole, self._folder_of(node.position))
 
-    def _deepest_foot(self) -> float:
-        """Return the deepest foot of all designs [m]; infinity where mistakes leave it unknown.
+    def _feet(self) -> tuple[float, float]:
+        """Return the shallowest and the deepest foot of all designs [m]; infinity where mistakes leave them unknown.
 
-        A depth that is to be found is searched down to where the truck goes over the boulder.
+        A depth that is to be found is searched from the least usual embedment down to where the truck goes over the
+        boulder.
         """
-        height, depth, ratio = (self._largest(name) for name in ("boulder_height_m", *reversed(fields.EMBEDMENT)))
-        if depth.size:
-            return float(depth.max())
-        if self.depth_sought and height.size:
-            bumper = fields.BY_NAME["bumper_height_m"]
-            return float(height.max() - min(self.values(bumper.name), default=bumper.default))
-        if not height.size or not ratio.size:
-            return math.inf
-        in_rows = {"boulder_height_m", fields.EMBEDMENT[0]} <= self.listed
-        return float((height * ratio).max() if in_rows else height.max() * ratio.max())
+        names = "boulder_height_m", *reversed(fields.EMBEDMENT)
+        (low, high), (least, most), (from_ratio, to_ratio) = (self._drawn(name) for name in names)
+        if most.size:
+            return float(least.min()), float(most.max())
+        if self.depth_sought and high.size:
+            bumper, usual = fields.BY_NAME["bumper_height_m"], fields.BY_NAME[fields.EMBEDMENT[0]].usual
+            deepest = float(high.max() - min(self.values(bumper.name), default=bumper.default))
+            return (float(low.min()) * usual.low if usual else 0.0), deepest
+        if not high.size or not to_ratio.size:
+            return math.inf, math.inf
+        if {"boulder_height_m", fields.EMBEDMENT[0]} <= self.listed:
+            return float((low * from_ratio).min()), float((high * to_ratio).max())
+        return float(low.min() * from_ratio.min()), float(high.max() * to_ratio.max())
 
-    def _largest(self, name: str) -> np.ndarray:
-        """Return the values of an input that is no input of named sets, the largest that are drawn where uncertain."""
+    def _drawn(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return the values of an input that is no input of named sets, the least and largest drawn where uncertain."""
         values, leaf = self.values(name), self.leaves.get(name)
         spread = None if leaf is None else leaf.distribution
         if not isinstance(spread, Distribution):
-            return values
-        return np.minimum(spread.high, values + DRAWN_SD * spread.deviation(values))
+            return values, values
+        reach = DRAWN_SD * spread.deviation(values)
+        return np.maximum(spread.low, values - reach), np.minimum(spread.high, values + reach)
 
     def _take_sides(self) -> None:
         """Take the sides of the boulder from its profile, if it has one; they must not be given beside it."""

@@ -298,6 +298,8 @@ class Log(NamedTuple):
         Least depth of the ground water that the file gives [m].
     may_be_layered : bool
         Whether the soil may have layers: it is no named one, and the file gives no constant that is not one value.
+    shallowest_m : float
+        The shallowest foot of all designs [m].
     """
 
     key: str
@@ -307,6 +309,7 @@ class Log(NamedTuple):
     remarks: tuple[str, ...]
     water_m: float | None = None
     may_be_layered: bool = True
+    shallowest_m: float = math.inf
 
     def averaged(self, topsoil_m: float) -> tuple[LogReading, ...]:
         """Return one reading for each `WINDOW_M` below the topsoil: the lower of mean and median of the cone."""
@@ -344,8 +347,18 @@ class LogLayer(NamedTuple):
     scatter_deg: float
 
 
-def layers_of(readings: list[dict[str, Any]], foot_m: float, scatter_deg: float, *, is_cone: bool) -> list[LogLayer]:
+def layers_of(
+    readings: list[dict[str, Any]],
+    foot_m: float,
+    scatter_deg: float,
+    *,
+    is_cone: bool,
+    shallowest_m: float = math.inf,
+) -> list[LogLayer]:
     """Return the layers of a log, from the ground down.
+
+    No boulder is judged in soil that only a deeper foot reaches: of the means of a layer down to any foot, the lowest
+    counts.
 
     Parameters
     ----------
@@ -360,6 +373,8 @@ def layers_of(readings: list[dict[str, Any]], foot_m: float, scatter_deg: float,
     is_cone
         Whether a reading is the mean of `WINDOW_M`; a boundary then lies at its end, else at the depth of the stronger
         reading of the two.
+    shallowest_m
+        The shallowest foot [m]; infinity where there is one foot only.
     """
     by_depth = sorted(readings, key=lambda one: (one["depth_m"], -one["friction_angle_deg"]))
     readings = list({round(one["depth_m"], 3): one for one in by_depth}.values())  # of one depth the weakest
@@ -370,7 +385,6 @@ def layers_of(readings: list[dict[str, Any]], foot_m: float, scatter_deg: float,
     edges = np.concatenate([[0.0], 0.5 * (depths[1:] + depths[:-1]), [last]])
     adds_strength = len(depths) > 1 and depths[-1] > foot_m and angles[-1] >= angles[-2]
     ends = np.append(edges[:-1], max(foot_m, edges[-2])) if adds_strength else edges
-    weights = 0.5 * np.diff(ends**2)
     cuts = _cuts(angles, edges, scatter_deg)
     groups = [slice(*ends) for ends in pairwise([0, *cuts, len(readings)])]
     means = [float(np.average(angles[group], weights=np.diff(edges**2)[group])) for group in groups]
@@ -384,9 +398,15 @@ def layers_of(readings: list[dict[str, Any]], foot_m: float, scatter_deg: float,
         for reading in (one for group in groups if group not in firm for one in readings[group]):
             reading["left_out"] = HARD_SPOT
         kept = [reading for group in firm for reading in readings[group]]
-        return layers_of(kept, foot_m, scatter_deg, is_cone=is_cone)
-    each = zip(groups, spans, strict=True)
-    return [_layer(readings[group], weights[group], float(top), float(bottom)) for group, (top, bottom) in each]
+        return layers_of(kept, foot_m, scatter_deg, is_cone=is_cone, shallowest_m=shallowest_m)
+    feet = [*(foot for foot in (shallowest_m, *ends[:-1]) if shallowest_m <= foot < ends[-1]), ends[-1]]
+    layers = []
+    for group, (top, bottom) in zip(groups, spans, strict=True):
+        weights = 0.5 * np.diff(np.minimum.outer(feet, ends[group.start : group.stop + 1]) ** 2)
+        rows = [row for row in weights if row.any()] or [np.ones(group.stop - group.start)]
+        found = [_layer(readings[group], row, float(top), float(bottom)) for row in rows]
+        layers.append(min(found, key=lambda layer: min(layer.angles.values())))
+    return layers
 
 
 def _cuts(angles: np.ndarray, edges: np.ndarray, scatter_deg: float) -> list[int]:
@@ -411,7 +431,8 @@ def _cuts(angles: np.ndarray, edges: np.ndarray, scatter_deg: float) -> list[int
 
 
 def _layer(readings: list[dict[str, Any]], weights: np.ndarray, top: float, bottom: float) -> LogLayer:
-    """Return a layer by its readings and their weights."""
+    """Return a layer by its readings and their weights; those without weight do not count."""
+    readings, weights = [one for one, weight in zip(readings, weights, strict=True) if weight], weights[weights > 0.0]
     n = len(readings)
     if n < FEWEST:
         weakest = min(readings, key=lambda reading: reading["friction_angle_deg"])
@@ -501,7 +522,8 @@ def _of_log(
 
     Only single values can be given for deeper layers. Where there can be none, the weakest layer counts at every depth.
     """
-    found = layers_of(_counting(readings), foot_m, _SCATTER_DEG[method], is_cone=method == "cpt")
+    is_cone, sd = method == "cpt", _SCATTER_DEG[method]
+    found = layers_of(_counting(readings), foot_m, sd, is_cone=is_cone, shallowest_m=log.shallowest_m)
     layers: list[dict[str, Any]] = []
     for layer in found:
         constants = _constants(node, method, lacking, layer.angles, layer.scatter_deg)
@@ -665,7 +687,7 @@ def _reading_words(reading: dict[str, Any], units: str) -> str:
 def unfold_soils(
     root: Mapping,
     listed: Collection[str],
-    foot_m: float,
+    feet_m: tuple[float, float],
     problems: Problems,
     read_log: Callable[[Scalar, Scalar | None], Log],
 ) -> list[dict[str, Any]]:
@@ -677,8 +699,8 @@ def unfold_soils(
         The tree of the file, changed in place.
     listed : collection of str
         Keys of the soil that a table of designs gives.
-    foot_m : float
-        The deepest foot of all designs [m].
+    feet_m : tuple of float
+        The shallowest and the deepest foot of all designs [m].
     problems : Problems
         Receives what is wrong with them.
     read_log : callable
@@ -690,6 +712,7 @@ def unfold_soils(
         What is kept of each as plain data, under the name of its soil where it is a named one.
     """
     data: list[dict[str, Any]] = []
+    shallowest_m, foot_m = feet_m
     for soil in root.blocks("soil"):
         given = [key for key in METHODS if key in soil.entries]
         topsoil_m, topsoil = 0.0, soil.entries.pop(TOPSOIL.key, None)
@@ -719,7 +742,7 @@ def unfold_soils(
                 log = _opened(node, beside, read_log)
                 needed = {"friction_angle", "subgrade_reaction"} | ({"density"} if density is None else set())
                 is_one = soil.label or "layers" in soil.entries or not needed <= set(lacking) or math.isinf(foot_m)
-                log = log._replace(may_be_layered=not is_one)
+                log = log._replace(may_be_layered=not is_one, shallowest_m=shallowest_m)
                 if log.water_m is not None and log.water_m < foot_m and "water_table" not in soil.entries:
                     words = f"ground water at {log.water_m:g} m in {log.file} is not used; give soil.water_table"
                     words += " and soil.subgrade_reaction" if "subgrade_reaction" in lacking else ""

@@ -375,6 +375,21 @@ def test_a_thin_seam_of_a_cone_is_no_layer():
     assert [layer.from_m for layer in layers_of(rows, 2.5, 2.8, is_cone=True)] == [0.0, 1.0, 1.5]
 
 
+@pytest.mark.parametrize("embedment", ["[1.2, 2.0, 2.9] m", "to be found", "{mean: 2.0 m, sd: 0.2 m}"])
+def test_no_boulder_is_judged_in_soil_that_only_a_deeper_foot_reaches(site, embedment):
+    """Counts that grow with the depth, by less than the scatter from one to the next."""
+    log = (
+        "log: log.csv\n  energy_ratio: 60 %",
+        "log.csv",
+        table("Depth (m),N", [(0.3 * k, 14 + k) for k in range(2, 13)]),
+    )
+    whole = site(*log, f"site.embedment_depth={embedment}")
+    for depth in (1.2, 1.6, 2.0, 2.4, 2.9):
+        alone = site(*log, f"site.embedment_depth={depth} m")
+        assert whole.constants[ANGLE] <= alone.constants[ANGLE] + 1e-9
+    assert whole.constants[ANGLE] < alone.constants[ANGLE] - 0.1
+
+
 @given(st.lists(st.tuples(st.floats(0, 30), st.floats(28, 46)), min_size=1, max_size=40), st.floats(0.1, 10))
 def test_layers_fill_the_depth_and_stay_within_the_readings(pairs, foot):
     layers = layers_of([reading(z, angle) for z, angle in pairs], foot, 3.0, is_cone=False)
