@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import LINE, by_types, inlined, is_none, kernel
+from ._jit import LINE, align_stack, by_types, inlined, is_none, kernel
 from .design import Constants, Design, DesignTable, G, body_with, constants_of, corrected, design_in, is_computable
 from .dormand_prince import displacement_at, slope_at, time_of_limit, turning_point
 from .dynamics import BOX, empty_soil
@@ -339,6 +339,7 @@ def simulate_heave(
     record
         Filled with the time history at the times it names.
     """
+    align_stack()
     c = f.c
     for axis in range(2 * AXES):
         put(work, START, axis, 0.0)
