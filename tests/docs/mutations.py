@@ -165,7 +165,7 @@ MUTATIONS = (
         "weight * (y_b - f.a_b * sin + f.b_b * versin)",
     ),
     Mutation((136,), _OPINION, "- (f.b_b + f.c.c_y) * versin)", "- f.b_b * versin)"),
-    Mutation((137,), _OPINION, "return least - CAUTION * abs(least)", "return least + 2.0 * abs(least)"),
+    Mutation((137,), _OPINION, "least -= CAUTION * abs(least)", "least += 2.0 * abs(least)"),
     Mutation((137,), _OPINION, "min(bottom, depth - most)", "max(-0.5 * f.c.d, depth - most)"),
     Mutation(
         (137,),
