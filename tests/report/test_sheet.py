@@ -413,6 +413,24 @@ def test_what_is_written_beside_figures_is_printed_in_8_pt(files: dict[str, Path
     assert page.complaints == []
 
 
+def test_no_words_of_a_drawing_are_cut_at_its_frame(tmp_path: Path, opened: Any) -> None:
+    large = site(length="7 ft", width="8 ft", height="10 ft", site="embedment_depth: 6 ft", friction="38 deg")
+    boulder_sweep.run(large, tmp_path / "large.sweep")
+    page = opened(write_report(tmp_path / "large.sweep", tmp_path / "page.html", units="us"))
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    page.emulate_media(media="print")
+    cut = page.evaluate("""
+        [...document.querySelectorAll(".chosen .scene svg, .section svg")].map((svg) => {
+            const { x, y, width, height } = svg.viewBox.baseVal;
+            return [...svg.querySelectorAll("text")].filter((text) => {
+                const box = text.getBBox();
+                return box.x < x || box.x + box.width > x + width || box.y < y || box.y + box.height > y + height;
+            }).map((text) => text.textContent);
+        })
+    """)
+    assert cut == [[], []]
+
+
 def test_the_browser_that_prints_writes_for_paper(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(writing, "browser", lambda: "chromium")
     opened: list[str] = []
