@@ -45,6 +45,8 @@ VEHICLE = {
     "hood_height_m": "hood above ground",
     "bed_offset_m": "bumper to cargo bed",
 }
+USUAL_RATE = 1.0
+"""Strain rate factor of soil that is no stronger under a fast load."""
 UP_TO_THE_END = ("max_rotation_deg", "max_displacement_m", "penetration_m", "peak_force_kN")
 """Outcomes that might be more after the end of a run."""
 OPEN_IN_WORDS = "no study says what a second opinion is worth here; the design is judged by its margin alone"
@@ -135,7 +137,11 @@ def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
 def _words(rows: ResultRows, answer: Answer, design: Design, names: Sequence[str], units: str) -> Words:
     """Return the sentences; the names are inputs that tell cases apart."""
     found, said, asked = answer.need.recommendation, advice(answer.need, units), question(answer.need, units)
-    ground = ground_words(rows.settings, units) or "dry, level, the same at every depth, without cohesion"
+    ground = ground_words(rows.settings, units) or "level, the same at every depth, without cohesion"
+    if rows.settings["model"].get("ground", {}).get("water_table_m") is None:
+        ground += "; no ground water assumed"
+    if all(case["strain_rate_factor"] == USUAL_RATE for case in design.rows):
+        ground += f"; strain rate factor {USUAL_RATE:.1f}"
     derived, last = rows.settings.get("derived", {}), tuple[str, ...]()
     case = ", ".join(_named(name, answer.row[name], units) for name in names)
     governs = f"in the worst of {len(design.rows):,} cases: {case}" if case and len(design.rows) > 1 else ""
@@ -271,8 +277,8 @@ def _inputs(
     lines = []
     for name, words in names.items():
         values, field = sorted({float(one[name]) for one in cases}), BY_NAME[name]
-        if name == "strain_rate_factor" and values == [1.0]:
-            continue
+        if name == "strain_rate_factor" and values == [USUAL_RATE]:
+            continue  # it stands among the assumptions
         for value in dict.fromkeys((values[0], values[-1])):
             first = value == values[0]
             shown = f"{words}{', least' if first else ', largest'}" if len(values) > 1 else words

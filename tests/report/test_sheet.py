@@ -184,8 +184,16 @@ def test_every_layer_and_the_water_stand_in_the_tables(files: dict[str, Path], t
         ("cohesion", Measure(4.0, "kPa"), "settings"),
         ("water table below ground", Measure(0.8, "m"), "settings"),
     )
+    assert "no ground water" not in sheet(files["layers"]).words["si"].ground
     page = opened(write_report(files["depth"], tmp_path / "page.html"))
     assert page.locator(".layers").count() == 0
+    assert page.locator(".section figcaption").inner_text() == (
+        "Recommended design, to scale; drawn in the worst of 2 cases: friction angle φ′ 36°"
+    )
+    assert (
+        "Soil: level, the same at every depth, without cohesion; no ground water assumed; strain rate factor 1.0. "
+        in page.locator(".basis").inner_text()
+    )
 
 
 def test_the_depth_to_build_is_a_least_and_a_greatest(needs: dict[str, Need], files: dict[str, Path]) -> None:
