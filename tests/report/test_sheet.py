@@ -19,6 +19,7 @@ import boulder_sweep
 from boulder_sweep.answers.advice import advice, question
 from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.outputs import AnswerFile
+from boulder_sweep.answers.printing import need_screen
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report, writing
 from boulder_sweep.report.answers import Measure, answer_of, screens
@@ -281,6 +282,25 @@ def test_the_first_page_names_where_soil_and_boulders_come_from(files: dict[str,
     assert (
         sheet(files["list"]).words["si"].ground.endswith(", from borehole_log.csv, hole BH-2. Boulders: from list.csv")
     )
+
+
+def test_a_table_of_a_list_shows_every_row_and_explains_its_words(
+    files: dict[str, Path], needs: dict[str, Need], tmp_path: Path, opened: Any
+) -> None:
+    read = read_rows(files["list"])
+    shown = screens(read, answer_of(read))["si"]
+    assert (len(shown.rows), shown.part) == (17, "")
+    page = opened(write_report(files["nearest"], tmp_path / "page.html"))
+    page.emulate_media(media="print")
+    signs = page.locator(".signs:visible").all_inner_texts()
+    assert [words.partition(":")[0] for words in signs] == ["blocked"]
+    several = boulder_sweep.need(site(height="{from: 2.8 m, to: 3.4 m, count: 5}"))
+    assert several.recommendation is not None
+    n = several.recommendation.qualified
+    assert 1 < n < 4
+    left = f"of the {5 - n + 1} left out, 1 have one"
+    assert need_screen(several, most=n - 1).part == f"{n - 1} of 5, the best of the {n} with an answer first; {left}"
+    assert need_screen(several, most=4).part.endswith(f"the {n} with an answer first; those left out have none")
 
 
 def test_the_first_page_has_both_ends_of_a_mass_that_is_uncertain(files: dict[str, Path]) -> None:
