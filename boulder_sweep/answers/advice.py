@@ -195,12 +195,13 @@ class _Words:
         return self.quantity("m^3", design.excavated_m3, ".1f")
 
     def boulder(self, row: Mapping[str, Any], rock: str = "") -> str:
-        """Return what tells a boulder from the others of the file, after its kind of rock."""
-        if self.told_apart == [HEIGHT]:
+        """Return what tells a boulder from the others of the file: its own name, or its kind of rock, and its sides."""
+        label = self.label(row)
+        if self.told_apart == [HEIGHT] and not label:
             named = f"{self.length(row[HEIGHT])} {rock}boulder"
         else:
             sides = (f"{self.length(row[name])} {ALONG[name]}" for name in self.told_apart)
-            named = f"{rock}boulder {self.label(row)}{listed(tuple(sides))}".strip()
+            named = f"{'' if label else rock}boulder {label}{listed(tuple(sides))}".strip()
         rock = self.value("boulder_density_kg_m3", row["boulder_density_kg_m3"])
         return f"the {named} of {rock}" if self.rocks else f"the {named}"
 
@@ -209,7 +210,8 @@ class _Words:
         yard = self.need.sweep.table
         if yard is None or BOULDER_MASS not in yard.columns or self.found.conditions > 1:
             return ""
-        return "".join(f"{row[name]}, " for name in self.need.sweep.plan.labels if row.get(name))
+        names = " ".join(row[name] for name in self.need.sweep.plan.labels if row.get(name))
+        return f"{names}, " if names else ""
 
     def everywhere(self) -> str:
         """Return in which soils and before which vehicles; empty where there is one of each."""

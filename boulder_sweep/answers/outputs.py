@@ -16,6 +16,7 @@ from boulder_kernels import Control
 from boulder_sweep.answers.keys import key_of
 from boulder_sweep.answers.need import RECOMMENDATION, Need
 from boulder_sweep.answers.recommendation import ANSWER, Recommendation
+from boulder_sweep.answers.search import FAULTY, WORDS
 from boulder_sweep.answers.trials import Open
 from boulder_sweep.columns import BY_NAME as COLUMN_OF
 from boulder_sweep.columns import COLUMNS, DESIGN_ID, GRADES, RATINGS, VERDICTS
@@ -331,9 +332,11 @@ def answered(table: pa.Table) -> pa.Table:
     import pyarrow.compute as pc
 
     passes = table["passes_at"].is_valid()
+    found = table["found"].cast("string")
+    faulty = pc.equal(found, WORDS[FAULTY])
     words = {
         "verdict": pc.if_else(passes, "pass", "fail"),
-        "reason": pc.if_else(passes, "", table["found"].cast("string")),
+        "reason": pc.if_else(passes, "", pc.if_else(faulty, table["reason"].cast("string"), found)),
         "robustness": pc.if_else(passes, table["robustness"].cast("string"), None),
     }
     for name, column in words.items():

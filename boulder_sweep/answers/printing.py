@@ -462,8 +462,8 @@ def screen_lines(need: Need, units: str = "si") -> list[str]:
     return need_screen(need, units).lines("--table has all answers")
 
 
-def need_screen(need: Need, units: str = "si") -> Screen:
-    """Return a table of at most a screen: a line for each boulder, or else for each answer.
+def need_screen(need: Need, units: str = "si", most: int = MOST_SHOWN) -> Screen:
+    """Return a table of at most so many lines, one for each boulder, or else for each answer.
 
     Of more than fit, those come first that pass under the most conditions, and of these the ones that are preferred.
     """
@@ -474,13 +474,24 @@ def need_screen(need: Need, units: str = "si") -> Screen:
     lines, count = [*shown.rows], len(shown.rows)
     if is_yard(need):
         lines.sort(key=lambda row: (row["passes_at"] is None, row["passes_at"]))
-    elif count > MOST_SHOWN and found is not None:
+    elif count > most and found is not None:
         least = PREFERENCES[found.prefer]
         lines.sort(key=lambda row: (row.get("failing", row["passes_at"] is None), row[least]))
-    best = ", the shallowest first" if is_yard(need) else ", the best first" if found else ""
-    part = f"{MOST_SHOWN} of {count:,}{best}" if count > MOST_SHOWN else ""
+    part = _part(need, lines, most) if count > most else ""
     columns = [*([_marker(need, units)] if count > 1 else []), *shown.columns]
-    return Screen(columns, lines[:MOST_SHOWN], part, _legend(need), shown.has_each)
+    return Screen(columns, lines[:most], part, [*_legend(need), *_errors(need)], shown.has_each)
+
+
+def _part(need: Need, rows: Sequence[Row], most: int) -> str:
+    """Return which rows a table shows of more, and how many of the others have an answer."""
+    count, n = len(rows), sum(not row.get("failing", row["passes_at"] is None) for row in rows)
+    order = "the shallowest" if is_yard(need) else "the best" if need.recommendation else ""
+    if not n or not order:
+        return f"{most} of {count:,}"
+    if n == count:
+        return f"{most} of {count:,}, {order} first"
+    left = f"of the {count - most:,} left out, {n - most:,} have one" if n > most else "those left out have none"
+    return f"{most} of {count:,}, {order} of the {n:,} with an answer first; {left}"
 
 
 def is_yard(need: Need) -> bool:

@@ -18,7 +18,14 @@ from boulder_sweep.answers.advice import listed
 from boulder_sweep.answers.keys import key_of
 from boulder_sweep.answers.need import MARGIN, Need
 from boulder_sweep.answers.outputs import CAPACITY, NEED, UNCERTAINTY, AnswerFile, asked_sweep
-from boulder_sweep.answers.printing import Screen, need_screen, reserve_screen, uncertainty_screen
+from boulder_sweep.answers.printing import (
+    MOST_LINES,
+    Screen,
+    need_screen,
+    reserve_screen,
+    uncertainty_screen,
+    volume_lines,
+)
 from boulder_sweep.answers.recommendation import PREFERENCES, RANKS, Design, Nearest, Recommendation
 from boulder_sweep.columns import BOULDER_MASS, GRADES
 from boulder_sweep.judge.quantities import EXCAVATED, NEEDED, quantities_by
@@ -97,8 +104,11 @@ def screens(rows: ResultRows, answer: Answer) -> dict[str, Screen]:
     if not isinstance(file, AnswerFile) or (rows.need and best and len(rows.codes) == 1):
         return {}
     answers = file.answers()
-    marked = [[row["design_id"] for row in best]] if file.kind == CAPACITY else []
-    return {system: SCREENS[file.kind](answers, system, *marked) for system in SYSTEMS}
+    more: list[Any] = [MOST_LINES] if file.kind == NEED else []
+    more += [[row["design_id"] for row in best]] if file.kind == CAPACITY else []
+    made = {system: SCREENS[file.kind](answers, system, *more) for system in SYSTEMS}
+    heads = "  ".join(head[0] for head, _ in made[SYSTEMS[0]].columns)
+    return {system: one._replace(signs=[*one.signs, *volume_lines(heads)]) for system, one in made.items()}
 
 
 @dataclass(frozen=True, eq=False)

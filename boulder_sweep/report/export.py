@@ -145,7 +145,7 @@ def setting_lines(settings: Mapping[str, Any], indent: str = "") -> list[str]:
             for number, one in enumerate(value, 1):
                 lines += [f"{indent}{name} {number}:", *setting_lines(one, f"{indent}  ")]
         else:
-            values = value if isinstance(value, list) else [value]
+            values = value if isinstance(value, list) else ["not given" if value is None else value]
             shown = ", ".join(f"{one:.12g}" if isinstance(one, float) else str(one) for one in values)
             lines.append(f"{indent}{name}: {shown}")
     return lines
@@ -378,7 +378,7 @@ def _write_answer(book: Any, heading: Mapping[str, str], sentences: list[str], s
     for number, width in enumerate(widths):
         sheet.set_column(number, number, width)
     wraps = book.add_format({"text_wrap": True, "valign": "top"})
-    texts = [*(f"{name.replace('_', ' ')}: {text}" for name, text in heading.items()), *sentences]
+    texts = [*(f"{name.replace('checked_by', 'checker')}: {text}" for name, text in heading.items()), *sentences]
     for number, text in enumerate(_cells(text.replace(NO_BREAK_SPACE, " ") for text in texts)):
         sheet.set_row(number, LINE_POINTS * len(wrapped([text])))
         sheet.merge_range(number, 0, number, len(widths) - 1, text, wraps)

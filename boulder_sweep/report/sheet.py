@@ -6,29 +6,32 @@ Sentences that hold units are made in both systems; numbers are `Measure`, which
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from boulder_kernels.rules import ISLAND_RATIO, ISLAND_SLIDE
-from boulder_sweep.answers.advice import advice, mass_is_least, question
+from boulder_sweep.answers.advice import MODELS, advice, mass_is_least, question
 from boulder_sweep.answers.need import Need
-from boulder_sweep.answers.outputs import AnswerFile
+from boulder_sweep.answers.outputs import UNCERTAINTY, AnswerFile
 from boulder_sweep.answers.printing import Screen, cases_screen, withstood
 from boulder_sweep.answers.recommendation import Design
 from boulder_sweep.answers.reserves import Reserves
 from boulder_sweep.columns import BOULDER_MASS, SHAPES, TO_BUILD
 from boulder_sweep.judge.robustness import meaning_of
+from boulder_sweep.judge.validity import BY_FLAG
 from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
 from boulder_sweep.report.answers import Answer, Measure
 from boulder_sweep.report.figures import Sketch, sketch_of
 from boulder_sweep.report.rows import DEPTH, ResultRows, inputs_of
 from boulder_sweep.settings.fields import BY_NAME
-from boulder_sweep.settings.model import Ground, ProfilePoint
+from boulder_sweep.settings.model import Distribution, Ground, ProfilePoint
 from boulder_sweep.settings.soil_readings import log_title
 from boulder_sweep.settings.units import SYSTEMS, quantity_text
 from boulder_sweep.stones.taped import taped_profiles
-from boulder_sweep.views.wording import ground_words
+from boulder_sweep.text import NO_BREAK_SPACE
+from boulder_sweep.views.wording import ground_words, sized
 
 SOIL = {
     "friction_angle_deg": "friction angle φ′",
@@ -45,6 +48,8 @@ VEHICLE = {
     "hood_height_m": "hood above ground",
     "bed_offset_m": "bumper to cargo bed",
 }
+USUAL_RATE = 1.0
+"""Strain rate factor of soil that is no stronger under a fast load."""
 UP_TO_THE_END = ("max_rotation_deg", "max_displacement_m", "penetration_m", "peak_force_kN")
 """Outcomes that might be more after the end of a run."""
 OPEN_IN_WORDS = "no study says what a second opinion is worth here; the design is judged by its margin alone"
@@ -53,13 +58,14 @@ NOT_ASKED = "not asked", "no second opinion was asked of the designs that were d
 """Grade and note of a design with a probability, whose draws have no second opinion."""
 DRAWN = (
     "a probability",
-    "asked of every design that was drawn at random; the share of robust passes stands among the checks",
+    "asked of every design that was drawn at random; the share of robust passes stands among loads and limits",
 )
 """Grade and note of a design with a probability of a robust pass."""
 WITHSTANDS = "Which speed, which truck and which soil does the boulder withstand?"
 WITHSTAND = "Which of {:,} designs is to be built, and which speed, truck and soil does it withstand?"
 """What `sweep capacity` asks, of one design and of several."""
-Cell = str | Measure
+Cell = str | Measure | Mapping[str, str]
+"""A cell of a table: words, a number with its unit, or words by system of units."""
 
 
 class Words(NamedTuple):
@@ -86,9 +92,9 @@ class Sheet(NamedTuple):
     checks: tuple[tuple[str, Cell, Cell, str], ...]
     """Name, computed, limit, and how much of it is used."""
     build: tuple[tuple[str, Cell], ...]
-    soil: tuple[tuple[str, Cell, str], ...]
+    soil: tuple[tuple[str, Cell, Cell], ...]
     """Name, value and source of each input; of soil in layers the uppermost one's."""
-    vehicle: tuple[tuple[str, Cell, str], ...]
+    vehicle: tuple[tuple[str, Cell, Cell], ...]
     """Name, value and source of each input."""
     grade: tuple[str, str]
     """Grade of the recommended design over all cases, and its meaning."""
@@ -106,12 +112,16 @@ def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
     units
         Units shown first, ``si`` or ``us``.
     """
-    found, row, settings = answer.need.recommendation, answer.row, rows.settings
+    # Of the result of `sweep uncertainty` nobody asked a probability.
+    need = replace(answer.need, probability=None) if rows.kind == UNCERTAINTY else answer.need
+    found, row, settings = need.recommendation, answer.row, rows.settings
     near = None if found is None or found.nearest is None else found.nearest.design
-    design = (found.design if found is not None and found.design is not None else near) or Design([row])
+    design = (found.design if found is not None and found.design is not None else near) or Design(
+        [rows.to_build(answer.named.number) | row]
+    )
     qualifies = found is not None and found.design is not None
     several = [name for name in (*SOIL, *VEHICLE) if len({one[name] for one in design.rows}) > 1]
-    named = [name for name in answer.need.sweep.plan.labels if name in row]
+    named = [name for name in need.sweep.plan.labels if name in row]
     grade = design.grade
     worst = next(one for one in design.rows if one["robustness"] == grade)
     such = sum(one["robustness"] == grade for one in design.rows)
@@ -119,12 +129,12 @@ def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
     means = meaning_of(worst) or "" if grade != "open" or worst["stands_under"] else OPEN_IN_WORDS
     opinion = f"{grade or ''}{some}", means
     return Sheet(
-        words={system: _words(rows, answer, design, named or several, system) for system in SYSTEMS},
+        words={system: _words(rows, answer, need, design, named or several, system) for system in SYSTEMS},
         qualifies=qualifies,
         title=answer.named.title,
         sketch=sketch_of(inputs_of(row), settings, units, _profile(row)),
-        checks=_checks(row, settings["criterion"], answer.need, design),
-        build=_build(rows, row, design, answer.need),
+        checks=_checks(row, settings["criterion"], need, design),
+        build=_build(rows, row, design, need),
         soil=_soil(design.rows, settings),
         vehicle=_inputs(design.rows, VEHICLE, settings),
         grade=opinion if "p_pass" not in row else DRAWN if row.get("p_robust") is not None else NOT_ASKED,
@@ -132,13 +142,19 @@ def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
     )
 
 
-def _words(rows: ResultRows, answer: Answer, design: Design, names: Sequence[str], units: str) -> Words:
-    """Return the sentences; the names are inputs that tell cases apart."""
-    found, said, asked = answer.need.recommendation, advice(answer.need, units), question(answer.need, units)
-    ground = ground_words(rows.settings, units) or "dry, level, the same at every depth, without cohesion"
+def _words(rows: ResultRows, answer: Answer, need: Need, design: Design, names: Sequence[str], units: str) -> Words:
+    """Return the sentences; the need is what was asked, the names are inputs that tell cases apart."""
+    found, said, asked = need.recommendation, advice(answer.need, units), question(need, units)
+    ground = ground_words(rows.settings, units) or "level, the same at every depth, without cohesion"
+    if rows.settings["model"].get("ground", {}).get("water_table_m") is None:
+        ground += "; no ground water assumed"
+    if all(case["strain_rate_factor"] == USUAL_RATE for case in design.rows):
+        ground += f"; strain rate factor {USUAL_RATE:.1f}"
     derived, last = rows.settings.get("derived", {}), tuple[str, ...]()
     case = ", ".join(_named(name, answer.row[name], units) for name in names)
     governs = f"in the worst of {len(design.rows):,} cases: {case}" if case and len(design.rows) > 1 else ""
+    if "p_pass" in answer.row:
+        governs = f"{governs}{', ' * bool(governs)}at the means of its uncertain inputs"
     logs = dict.fromkeys(log_title(soil) for soil in derived.get("soil", ()) if "log" in soil)
     ground += "".join(f", from {title}" for title in logs)
     ground += "".join(f". Boulders: from {boulders['file']}" for boulders in derived.get("table", ()))
@@ -147,10 +163,16 @@ def _words(rows: ResultRows, answer: Answer, design: Design, names: Sequence[str
         asked = WITHSTANDS if boulders == 1 else WITHSTAND.format(boulders)
         where = f"I{governs[1:].replace(': ', ' (')}) it" if governs else "It"
         last = (withstood(reserves, answer.named.number, units, where),)
+    if rows.kind == UNCERTAINTY:
+        one = asked.startswith("Does ")
+        asked = f"With what probability d{asked[1:]}" if one else f"{asked[:-1]}, and with what probability?"
+        if len(rows.codes) == 1:
+            under = "" if answer.row.get("p_robust") is None else f", and of {_chance(answer.row, 'p_robust')} {MODELS}"
+            said = [f"The boulder passes with a probability of {_chance(answer.row, 'p_pass')}{under}.", *said[1:]]
     if found is None:  # the worst answer, or why there is none
         said = ["".join(p if isinstance(p, str) else _measured(p, units) for p in answer.sentences[0])]
     if found is None or found.design is None:
-        return Words(asked, (*said, *last), (), "", ground, governs)
+        return Words(asked, (*said, *last), (), _untested(rows, design), ground, governs)
     return Words(asked, (said[0], *last), tuple(said[1:-1]), said[-1], ground, governs)
 
 
@@ -200,11 +222,32 @@ def _checks(
         lines.insert(1, ("rotation, weakest model", computed, Measure(limit, "deg"), used))
     if "p_pass" in row:
         least = "–" if need.probability is None else f"≥ {100.0 * need.probability:.4g} %"
-        chances = [("probability of passing", f"{row['p_pass']:.1%}", "–" if need.robust else least, "–")]
-        if row.get("p_robust") is not None:
-            chances.append(("and of a robust pass", f"{row['p_robust']:.1%}", least if need.robust else "–", "–"))
-        lines = [*chances, *lines]
+        chances = [("probability of passing", "p_pass"), ("and of a robust pass", "p_robust")]
+        for words, name in reversed(chances):
+            if row.get(name) is not None:
+                own = need.robust == (name == "p_robust")
+                ends = [("its interval", _interval(row, name), "–", "–")] * (_interval(row, name) != "")
+                lines = [(words, f"{row[name]:.1%}", least if own else "–", "–"), *ends, *lines]
     return tuple(lines)
+
+
+def _chance(row: Mapping[str, Any], name: str) -> str:
+    """Return a probability with its interval, if there is one."""
+    ends = _interval(row, name)
+    return f"{row[name]:.1%}" + (f" ({ends})" if ends else "")
+
+
+def _interval(row: Mapping[str, Any], name: str) -> str:
+    """Return the interval of a probability; empty where there is none."""
+    low, high = row.get(f"{name}_low"), row.get(f"{name}_high")
+    return "" if low is None or high is None else f"{100.0 * low:.1f} to {high:.1%}"
+
+
+def _untested(rows: ResultRows, design: Design) -> str:
+    """Return in what a design with a probability lies outside the crash tests, where none is recommended."""
+    if rows.kind != UNCERTAINTY or not design.flags:
+        return ""
+    return f"No crash test covers it: {'; '.join(BY_FLAG[name].meaning for name in design.flags)}."
 
 
 def _outcome(row: Mapping[str, Any], name: str, unit: str, bound: str) -> Cell:
@@ -236,7 +279,7 @@ def _build(rows: ResultRows, row: Mapping[str, Any], design: Design, need: Need)
         lines.append(("fills of its box", f"{row['solidity']:.0%}"))
         lines.append(("drawn: worst of its shapes", row["shape"].replace("_", " ")))
     for words, spec in built:
-        if spec.name in row:
+        if spec.name in design.rows[0]:
             lines.append((words, Measure(max(float(one[spec.name]) for one in design.rows), spec.unit)))
     return tuple(lines)
 
@@ -254,7 +297,7 @@ def _profile(row: Mapping[str, Any]) -> tuple[ProfilePoint, ...]:
     return tuple(ProfilePoint(*map(float, point)) for point in points)
 
 
-def _soil(cases: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> tuple[tuple[str, Cell, str], ...]:
+def _soil(cases: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> tuple[tuple[str, Cell, Cell], ...]:
     """Return constants of the soil, of layers the uppermost, cohesion and water table with their sources."""
     ground, lines = Ground.of_dict(settings["model"].get("ground", {})), _inputs(cases, SOIL, settings)
     if ground.cohesion_kPa:
@@ -266,13 +309,15 @@ def _soil(cases: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> tu
 
 def _inputs(
     cases: Sequence[Mapping[str, Any]], names: Mapping[str, str], settings: Mapping[str, Any]
-) -> tuple[tuple[str, Cell, str], ...]:
+) -> tuple[tuple[str, Cell, Cell], ...]:
     """Return inputs with their values in all cases, and where they come from."""
     lines = []
     for name, words in names.items():
         values, field = sorted({float(one[name]) for one in cases}), BY_NAME[name]
-        if name == "strain_rate_factor" and values == [1.0]:
-            continue
+        if name in settings.get("distributions", {}) and "p_pass" in cases[0]:
+            words = f"{words}, mean"
+        if name == "strain_rate_factor" and values == [USUAL_RATE]:
+            continue  # it stands among the assumptions
         for value in dict.fromkeys((values[0], values[-1])):
             first = value == values[0]
             shown = f"{words}{', least' if first else ', largest'}" if len(values) > 1 else words
@@ -280,7 +325,7 @@ def _inputs(
     return tuple(lines)
 
 
-def _source(name: str, values: Sequence[float], settings: Mapping[str, Any]) -> str:
+def _source(name: str, values: Sequence[float], settings: Mapping[str, Any]) -> str | Mapping[str, str]:
     """Return where the value of an input comes from, in few words."""
     derived = settings.get("derived", {})
     read = {"density_low_kg_m3": "soil_density_kg_m3"}
@@ -294,11 +339,14 @@ def _source(name: str, values: Sequence[float], settings: Mapping[str, Any]) -> 
         source = "default"
     else:
         source = "settings"
-    return source if spread is None else f"{source}; {_spread(spread)}"
+    if spread is None:
+        return source
+    begin = "" if source == "settings" else f"{source}; "
+    return {system: begin + _spread(spread, BY_NAME[name].unit, system) for system in SYSTEMS}
 
 
-def _spread(own: Mapping[str, Any]) -> str:
-    """Return how an input is spread."""
-    if own.get("cov") is not None:
-        return f"cov {100.0 * own['cov']:.0f} %"
-    return f"sd {own['sd']:.3g}" if own.get("sd") is not None else str(own.get("kind", "uncertain"))
+def _spread(own: Mapping[str, Any], unit: str, units: str) -> str:
+    """Return how an input is spread; named sets may each have a distribution of their own."""
+    each = [Distribution(**one).words(*sized(unit, units)) for one in own.get("sets", [own]) if one is not None]
+    each = [NO_BREAK_SPACE.join(words.replace(" deg", "°").rsplit(" ", 1)) for words in each]
+    return " or ".join(dict.fromkeys(each))

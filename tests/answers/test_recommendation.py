@@ -407,15 +407,16 @@ def test_boulders_of_a_yard_that_will_not_do_are_named_with_what_was_asked(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     lines = (
-        "stone,boulder_length_m,boulder_width_m,boulder_height_m,boulder_mass_t",
-        "S3,1.5,2,3,16.55",
-        "S4,1.8,2.1,3.3,23.8",
-        "S8,1.6,2.3,3.4,29.84",
+        "kind,stone,boulder_length_m,boulder_width_m,boulder_height_m,boulder_mass_t",
+        "limestone,S3,1.5,2,3,16.55",
+        "limestone,S4,1.8,2.1,3.3,23.8",
+        "limestone,S8,1.6,2.3,3.4,29.84",
     )
     Path("yard.csv").write_text("\n".join(lines))
     soil = "soil: {density: 1900, friction_angle: 38, subgrade_reaction: 70}\n"
     vehicle = "vehicle: {mass: 15000 lb, speed: 30 mph, spring: 3103.3e3, damper: 138.91e3}\n"
-    boulder = "table: yard.csv\nboulder: {density: 2650}\nsite: {embedment_depth: to be found}\n"
+    boulder = "table: yard.csv\nboulder: {rock: granite}\nsite: {embedment_depth: to be found}\n"
     Path("yard.yaml").write_text(boulder + soil + vehicle)
     found = need("yard.yaml")
-    assert "At no depth with 25 % to spare under the weakest of three soil models: S3." in said(found)
+    assert "At no depth with 25 % to spare under the weakest of three soil models: limestone S3." in said(found)
+    assert "Bury the boulder limestone S8, 1.6 m long, 2.3 m wide and 3.4 m high (" in said(found)

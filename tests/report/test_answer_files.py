@@ -17,6 +17,7 @@ import pytest
 import boulder_sweep
 from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.outputs import AnswerFile
+from boulder_sweep.answers.printing import volume_lines
 from boulder_sweep.answers.reserves import capacity
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report
@@ -101,7 +102,8 @@ def test_what_has_no_answer_says_why(files: dict[str, Path], tmp_path: Path) -> 
     assert answer_of(read_rows(tmp_path / "speed.parquet")).sentences == (("Nothing that was tried passes.",),)
     nothing = read_rows(files["nothing"])
     assert screens(nothing, answer_of(nothing))["si"].signs == [
-        "blocked: does not pass by what was asked, up to where the truck would pass or ride over the boulder (1 row)"
+        "blocked: does not pass by what was asked, up to where the truck would pass or ride over the boulder (1 row)",
+        "dig, fill: soil to excavate and to put back (docs/model.md)",
     ]
     rows = read_rows(files["depth"])
     table = pq.read_table(files["depth"]).to_pylist()
@@ -133,7 +135,8 @@ def test_the_page_opens_without_a_complaint(files: dict[str, Path], name: str, t
         lines += [[cell(row) for _, cell in screen.columns] for row in screen.rows]
         shown = page.locator(".answers:visible tr").all_inner_texts()
         assert [line.split() for line in shown] == [" ".join(line).split() for line in lines]
-        assert page.locator("[data-in]:visible > .wide ~ .hint").all_inner_texts() == [*screen.signs]
+        signs = page.locator("[data-in]:visible > .wide:has(.answers) ~ .signs").all_inner_texts()
+        assert signs == [*screen.signs, *volume_lines("  ".join(head[0] for head, _ in screen.columns))]
     if len(table) > 1:
         assert re.match(rf"\d+ of the {len(table)} designs shown pass", page.inner_text("#sweep-words"))
     chosen = page.evaluate("page.data.chosen[0]")

@@ -15,8 +15,9 @@ from boulder_sweep.answers.advice import advice
 from boulder_sweep.answers.outputs import AnswerFile
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report
-from boulder_sweep.report.answers import answer_of, screens
+from boulder_sweep.report.answers import Measure, answer_of, screens
 from boulder_sweep.report.rows import read_rows
+from boulder_sweep.report.sheet import sheet_of
 from boulder_sweep.settings import load_text
 from boulder_sweep.store.provenance import sha256_of
 from tests.answers.designs import DEFAULTS, SITE, site
@@ -71,7 +72,11 @@ def test_the_page_has_them(chances: Path) -> None:
 
 
 def test_one_design_has_its_interval_and_what_decides(tmp_path: Path) -> None:
-    one = site(friction="{mean: 40 deg, cov: 5 %}", height="3.2 m")
+    one = site(
+        friction="{distribution: uniform, low: 37 deg, high: 43 deg}",
+        subgrade="{mean: 60 MN/m^3, sd: 2 MN/m^3}",
+        height="3.2 m",
+    )
     found = boulder_sweep.uncertainty(one, half_width=0.1)
     found.write(tmp_path / "one.parquet")
     row = found.frame.iloc[0]
@@ -81,6 +86,22 @@ def test_one_design_has_its_interval_and_what_decides(tmp_path: Path) -> None:
     begin = heads.index("P(pass)")
     assert shown[begin : begin + 3] == tuple(f"{one:.4f}" for one in (row.p_pass, row.p_pass_low, row.p_pass_high))
     assert shown[heads.index("decided")] == "soil.friction_angle"
+    sheet = sheet_of(rows, answer_of(rows), "si")
+    words, low, high = sheet.words["us"], 100.0 * row.p_pass_low, 100.0 * row.p_pass_high
+    assert words.question == "With what probability does the boulder stop a truck of 15,000\u00a0lb at 30\u00a0mph?"
+    chance = f"{row.p_pass:.1%} ({low:.1f} to {high:.1f}%)"
+    assert words.recommendation[0].startswith(f"The boulder passes with a probability of {chance}")
+    assert words.untested.startswith("No crash test covers it: ")
+    assert words.governs == "at the means of its uncertain inputs"
+    assert sheet.checks[0] == ("probability of passing", f"{row.p_pass:.1%}", "–", "–")
+    assert sheet.checks[1] == ("its interval", f"{low:.1f} to {high:.1f}%", "–", "–")
+    assert sheet.soil[0] == (
+        "friction angle φ′, mean",
+        Measure(40.0, "deg"),
+        dict.fromkeys(("si", "us"), "uniform, 37 to\u00a043°"),
+    )
+    assert sheet.soil[-1][2] == {"si": "normal, sd 2\u00a0MN/m³", "us": "normal, sd 7.368\u00a0pci"}
+    assert dict(sheet.build)["excavation"].value > dict(sheet.build)["backfill"].value > 0.0
 
 
 def test_no_design_may_be_safe(tmp_path: Path) -> None:

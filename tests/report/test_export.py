@@ -176,7 +176,8 @@ def test_of_a_long_table_the_first_sheet_says_where_the_rest_is(tmp_path):
     found = boulder_sweep.need(site(height="{from: 2.6 m, to: 3.6 m, count: 21}"))
     found.write(tmp_path / "depth.parquet")
     _, _, rows = answer_sheet(tmp_path / "depth.parquet", tmp_path / "depth.xlsx")
-    assert rows[-1][0].value == "(16 of 21, the best first; all are on the sheet designs)"
+    part = "16 of 21, the best of the 9 with an answer first; those left out have none"
+    assert rows[-1][0].value == f"({part}; all are on the sheet designs)"
     assert len(rows) == 17
 
 

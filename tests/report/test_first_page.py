@@ -68,8 +68,11 @@ def test_all_of_a_report_in_us_units_is_in_them_and_says_what_uncertain_inputs_w
 
 @pytest.mark.nightly
 def test_the_page_is_printed_to_a_pdf(result, tmp_path, chromium):
-    file = write_report(result, tmp_path / "page.pdf", heading=Heading(client="City"))
-    assert file.read_bytes().startswith(b"%PDF")
+    file = write_report(result, tmp_path / "page.pdf", heading=Heading(client="City", author="Ö"))
+    content = file.read_bytes()
+    assert content.startswith(b"%PDF")
+    assert b"/Title (sizing: boulder-sweep)" in content
+    assert b"/Author <feff00d6>" in content[content.index(b"%%EOF") :]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["page.pdf"]
 
 

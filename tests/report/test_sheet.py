@@ -19,6 +19,7 @@ import boulder_sweep
 from boulder_sweep.answers.advice import advice, question
 from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.outputs import AnswerFile
+from boulder_sweep.answers.printing import need_screen
 from boulder_sweep.errors import ReportError
 from boulder_sweep.report import write_report, writing
 from boulder_sweep.report.answers import Measure, answer_of, screens
@@ -184,8 +185,16 @@ def test_every_layer_and_the_water_stand_in_the_tables(files: dict[str, Path], t
         ("cohesion", Measure(4.0, "kPa"), "settings"),
         ("water table below ground", Measure(0.8, "m"), "settings"),
     )
+    assert "no ground water" not in sheet(files["layers"]).words["si"].ground
     page = opened(write_report(files["depth"], tmp_path / "page.html"))
     assert page.locator(".layers").count() == 0
+    assert page.locator(".section figcaption").inner_text() == (
+        "Recommended design, to scale; drawn in the worst of 2 cases: friction angle φ′ 36°"
+    )
+    assert (
+        "Soil: level, the same at every depth, without cohesion; no ground water assumed; strain rate factor 1.0. "
+        in page.locator(".basis").inner_text()
+    )
 
 
 def test_the_depth_to_build_is_a_least_and_a_greatest(needs: dict[str, Need], files: dict[str, Path]) -> None:
@@ -275,6 +284,25 @@ def test_the_first_page_names_where_soil_and_boulders_come_from(files: dict[str,
     )
 
 
+def test_a_table_of_a_list_shows_every_row_and_explains_its_words(
+    files: dict[str, Path], needs: dict[str, Need], tmp_path: Path, opened: Any
+) -> None:
+    read = read_rows(files["list"])
+    shown = screens(read, answer_of(read))["si"]
+    assert (len(shown.rows), shown.part) == (17, "")
+    page = opened(write_report(files["nearest"], tmp_path / "page.html"))
+    page.emulate_media(media="print")
+    signs = page.locator(".signs:visible").all_inner_texts()
+    assert [words.partition(":")[0] for words in signs] == ["blocked"]
+    several = boulder_sweep.need(site(height="{from: 2.8 m, to: 3.4 m, count: 5}"))
+    assert several.recommendation is not None
+    n = several.recommendation.qualified
+    assert 1 < n < 4
+    left = f"of the {5 - n + 1} left out, 1 have one"
+    assert need_screen(several, most=n - 1).part == f"{n - 1} of 5, the best of the {n} with an answer first; {left}"
+    assert need_screen(several, most=4).part.endswith(f"the {n} with an answer first; those left out have none")
+
+
 def test_the_first_page_has_both_ends_of_a_mass_that_is_uncertain(files: dict[str, Path]) -> None:
     built = dict(sheet(files["list"]).build)
     low, high = (built[f"mass, {end} end"] for end in ("low", "high"))
@@ -351,7 +379,7 @@ def test_a_pdf_has_todays_date_and_a_page_only_a_given_one(
     assert "<dt>date</dt><dd>2031-02-03</dd>" in pages[0]
     assert "2031-02-03" not in pages[1]
     assert "2031-02-03" not in write_report(files["depth"], tmp_path / "page.html").read_text()
-    for words in ("<dt>to be checked by</dt><dd>E. Fox</dd>", "<dt>revision</dt><dd>A</dd>", "Prepared by C. Day"):
+    for words in ("<dt>checker</dt><dd>E. Fox</dd>", "<dt>revision</dt><dd>A</dd>", "Author C. Day", "Checker E. Fox"):
         assert words in pages[1]
 
 
@@ -411,6 +439,48 @@ def test_what_is_written_beside_figures_is_printed_in_8_pt(files: dict[str, Path
     assert len(beside) > 5
     assert min(beside) >= 10.6
     assert page.complaints == []
+
+
+def test_no_words_of_a_drawing_are_cut_at_its_frame(tmp_path: Path, opened: Any) -> None:
+    large = site(length="7 ft", width="8 ft", height="10 ft", site="embedment_depth: 6 ft", friction="38 deg")
+    boulder_sweep.run(large, tmp_path / "large.sweep")
+    page = opened(write_report(tmp_path / "large.sweep", tmp_path / "page.html", units="us"))
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    page.emulate_media(media="print")
+    cut = page.evaluate("""
+        [...document.querySelectorAll(".chosen .scene svg, .section svg")].map((svg) => {
+            const { x, y, width, height } = svg.viewBox.baseVal;
+            return [...svg.querySelectorAll("text")].filter((text) => {
+                const box = text.getBBox();
+                return box.x < x || box.x + box.width > x + width || box.y < y || box.y + box.height > y + height;
+            }).map((text) => text.textContent);
+        })
+    """)
+    assert cut == [[], []]
+    for whole in (
+        ".chosen",
+        ".settings span",
+    ):  # no heading parts from its figures, no name from its value
+        assert page.evaluate(f"getComputedStyle(document.querySelector('{whole}')).breakInside") == "avoid"
+    assert "step_s: not given" in page.locator(".settings span").all_text_contents()[-2]
+
+
+def test_a_pdf_names_its_author_in_an_update_that_readers_find() -> None:
+    start = b"%PDF-1.4\n1 0 obj\n<</Title (site)>>\nendobj\n"
+    table = b"xref\n0 2\n0000000000 65535 f \n0000000009 00000 n \ntrailer\n<</Size 2\n/Root 2 0 R\n/Info 1 0 R>>\n"
+    pdf = start + table + b"startxref\n%d\n%%%%EOF\n" % len(start)
+    told = writing.with_author(pdf, "C. Dáy")
+    assert told.startswith(pdf)
+    at = int(re.findall(rb"startxref\n(\d+)\n%%EOF", told)[-1])
+    entry = re.fullmatch(
+        rb"xref\n1 1\n(\d{10}) 00000 n \ntrailer\n<</Size 2\n/Root 2 0 R\n/Info 1 0 R\n/Prev (\d+)>>\n",
+        told[at : told.rindex(b"startxref")],
+    )
+    assert entry is not None
+    assert int(entry[2]) == len(start)
+    author = "\ufeffC. Dáy".encode("utf-16-be").hex().encode()
+    assert told[int(entry[1]) : at] == b"1 0 obj\n<</Title (site)\n/Author <%s>>>\nendobj\n" % author
+    assert writing.with_author(pdf, "") == pdf
 
 
 def test_the_browser_that_prints_writes_for_paper(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -55,8 +55,8 @@ class SideView {
     this.shape("first", corners.map(([x, z]) => [x, z - s.depth]));
     this.shape("boulder", corners.map(place));
     this.line("limit", [s.line, 0], [s.line, 2.5]);
-    this.text("limit", s.line + 0.08, 2.5, `${s.rating}: limit`);
-    this.text("limit", s.line + 0.08, 2.04, "of the cargo bed");
+    const words = [`${s.rating}: limit`, "of the", "cargo bed"]; // short lines: there is little room behind the limit
+    words.forEach((line, k) => this.text("limit", s.line + 0.08, 2.5 - 0.46 * k, line));
     this.truck(s, x_v, motion.time.length > 0 ? at("v_v") : s.speed, at("F_v"));
 
     const peak = Math.max(0, ...(motion.columns.F_v ?? []));
