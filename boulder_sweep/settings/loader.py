@@ -36,6 +36,7 @@ from boulder_sweep.settings.sweep import SECTION, UNITS, Axis, Heading, Sweep, w
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, parse, parse_node
 from boulder_sweep.settings.tree import Sequence as List
 from boulder_sweep.settings.units import SYSTEMS
+from boulder_sweep.settings.values import read_input
 from boulder_sweep.stones.rock import ROCK_KG_M3
 
 MAX_DESIGNS = 2**63 - 1
@@ -281,9 +282,11 @@ def _read_heading(entries: Entries) -> Heading:
 
 
 def _read_units(root: Mapping, problems: Problems) -> str:
-    """Return the units named in a file, empty where none are; with ``us`` no number may lack its unit."""
+    """Return the units named in a file, empty where none are; with ``us``, or in feet, no number may lack its unit."""
     node = root.get(UNITS)
     if node is None:
+        if _is_in_feet(root):
+            _need_units(root)
         return ""
     units = node.text.strip() if isinstance(node, Scalar) else ""
     if units not in SYSTEMS:
@@ -291,6 +294,18 @@ def _read_units(root: Mapping, problems: Problems) -> str:
     if units == "us":
         _need_units(root)
     return units
+
+
+def _is_in_feet(root: Mapping) -> bool:
+    """Whether the file itself gives the height of the boulder in feet or inches; an option says nothing of the rest."""
+    field, boulder = fields.BY_NAME["boulder_height_m"], root.get("boulder")
+    height = boulder.get(field.key) if isinstance(boulder, Mapping) else None
+    if height is None or height.position.file in ("--set", *OPTIONS):
+        return False
+    try:
+        return read_input(height, field).system == "us"
+    except SettingsError:
+        return False  # its mistake is reported as the block is read
 
 
 def _need_units(node: Node) -> None:
