@@ -656,6 +656,13 @@ _STEMS: dict[str, Field] = {field.name.removesuffix(name_suffix(field.unit)): fi
 """Inputs by the name of the column without its unit."""
 
 
+_ROCK = ("rock", "boulder_rock", "rock_type")
+_ROCK_REMEDY = (
+    "is not read, for a file has one boulder.rock for its whole list: write a list for each kind of rock, or add a "
+    "column boulder_density_kg_m3"
+)
+
+
 def read_header(names: list[str], positions: list[Position], problems: Problems) -> list[TableColumn | None]:
     """Return what every column is, None for those that cannot be used; mistakes go to `problems`."""
     columns: list[TableColumn | None] = []
@@ -668,6 +675,10 @@ def read_header(names: list[str], positions: list[Position], problems: Problems)
         if isinstance(column, str):
             problems.add(position, column, shorten(name) or "(empty)")
         columns.append(column if isinstance(column, TableColumn) else None)
+    if "boulder_density_kg_m3" not in {_key(column) for column in columns if column}:
+        for column, position in zip(columns, positions, strict=True):
+            if column is not None and _plain(column.name.lower()) in _ROCK:
+                problems.add(position, _ROCK_REMEDY, column.name)
     return columns
 
 
@@ -721,10 +732,15 @@ def check_numbers(column: TableColumn, position: Position, problems: Problems) -
     return False
 
 
+def _plain(name: str) -> str:
+    """Return the words of a name joined by ``_``: a quarry writes ``Length (m)``."""
+    return "_".join(re.findall(r"[^\W_]+", name))
+
+
 def _meant(name: str) -> str:
     """Return the input that a misspelled name stands for, with the unit it was given; empty if there is none near."""
     word = name.lower()
-    plain = "_".join(re.findall(r"[^\W_]+", word))  # a quarry writes "Length (m)"
+    plain = _plain(word)
     for likely in (plain, f"boulder_{plain}"):
         if _input_column(likely):
             return likely

@@ -271,6 +271,16 @@ def test_columns_of_numbers_that_are_not_used(messages_of, name, words):
     assert not any(" _m?" in message for message in messages)
 
 
+@pytest.mark.parametrize("name", ["rock", "boulder_rock", "Rock type"])
+def test_a_column_of_rock_is_refused_unless_there_is_one_of_density(messages_of, load_table, name):
+    rows = f"{HEADER[:-1]},{name}\n1,1,2,1,granite\n1,1,2,1,limestone\n"
+    (message,) = messages_of(rows)
+    assert message.startswith(f"designs.csv:1:{len(HEADER) + 1}: {name}: is not read")
+    assert message.endswith("write a list for each kind of rock, or add a column boulder_density_kg_m3")
+    dense = rows.replace(f",{name}", f",{name},boulder_density_pcf").replace("ite", "ite,165").replace("one", "one,159")
+    assert [*load_table(dense, grid=GRID.replace("density: 2600", "", 1)).table.labels] == [name]
+
+
 def test_text_is_carried_along(load_table):
     header = "boulder_id,Block name," + HEADER.replace("\n", ",remark\n")
     sweep = load_table(header + "7,Ada \x1b[31m,1,1,2,1,first\n8,,1,1,2.5,1,\n9,Ada \x1b[31m,1,1,3,1,first\n")
