@@ -40,6 +40,7 @@ _SHOWN = 10
 """Most names in a line."""
 _UNITS = {"depth": "m", CONE: "MPa"}
 _SAMPLES = {"depth": "Depth (m)", "n": "N", CONE: "qc (MPa)"}
+_US_SAMPLES = {"depth": "Depth (ft)", CONE: "qc (tsf)"}
 _NAMES = {
     "depth": "depth top from depthfrom depthtop topdepth testdepth depthbgl depthbgs depthbelowground",
     "n": "n spt sptn nspt nvalue sptnvalue sptvalue blows blowcount blowcounts sptblows sptblowcount nfield fieldn "
@@ -240,7 +241,7 @@ def _size(unit: str, key: str, position: Position) -> float:
     try:
         return float(factor(_SPELLINGS.get(plain.lower(), plain), _UNITS[key]))
     except UnitError as error:
-        words = str(error) if plain else f"the unit is missing; write {_SAMPLES[key]}"
+        words = str(error) if plain else f"the unit is missing; write {_SAMPLES[key]} or {_US_SAMPLES[key]}"
         raise refuse(position.file, f"{key}: {words}", position.line or 1, position.column) from None
 
 

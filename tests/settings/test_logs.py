@@ -493,8 +493,8 @@ CUT = gef(CONE)[: gef(CONE).rindex("0.02")]
         ("log.csv", "", "is empty", 5),
         ("log.csv", b"\xff\xfe\x00\x01", "is not UTF-8 text", 5),
         ("log.csv", "Depth (m),N\n", "has no rows with a depth and a reading", 5),
-        ("log.csv", "Depth,N\n1,20\n", "the unit is missing; write Depth (m)", 1),
-        ("log.csv", "Depth (m),qc\n1,20\n", "the unit is missing; write qc (MPa)", 1),
+        ("log.csv", "Depth,N\n1,20\n", "the unit is missing; write Depth (m) or Depth (ft)", 1),
+        ("log.csv", "Depth (m),qc\n1,20\n", "the unit is missing; write qc (MPa) or qc (tsf)", 1),
         ("log.csv", "Depth (m),qc (kN)\n1,20\n", "q_c: ", 1),
         ("log.csv", "Depth (m),Blows (per 100 mm)\n1,20\n", "needs a column of depth and one of N or q_c", 1),
         ("log.csv", "z (m),N\n1,20\n", "needs a column of depth and one of N or q_c", 1),  # may be an elevation
