@@ -7,6 +7,7 @@ stop a run.
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
@@ -30,7 +31,7 @@ from boulder_sweep.settings.model import (
 )
 from boulder_sweep.settings.problems import MAX_ALIKE, Position, Problem
 from boulder_sweep.settings.sweep import DesignList, Sweep
-from boulder_sweep.settings.units import range_words
+from boulder_sweep.settings.units import describe, range_words
 from boulder_sweep.settings.values import is_unusual
 from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.text import counted
@@ -71,8 +72,11 @@ def check_complete(entries: Entries) -> None:
     if entries.root.get("table") is not None:
         for name, leaf in entries.leaves.items():
             if leaf.is_axis:
-                message = "must be one value beside a table; lists and ranges are axes of a grid"
-                entries.problems.add(leaf.position, message, BY_NAME[name].path)
+                field = BY_NAME[name]
+                first = describe(float(leaf.values[0]), field.unit, leaf.written)
+                message = "must be one value beside a table; lists and ranges are axes of a grid: ask once for each "
+                message += f"value, --set {field.path}={shlex.quote(first)}"
+                entries.problems.add(leaf.position, message, field.path)
 
 
 def check_usual(entries: Entries) -> None:

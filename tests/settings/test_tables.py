@@ -326,6 +326,7 @@ def test_files_that_are_not_opened(messages_of, tmp_path, content, name, message
     assert message in found
 
 
+ONE_VALUE = "must be one value beside a table; lists and ranges are axes of a grid"
 BOTH = "give embedment_ratio or embedment_depth, not both"
 GIVEN = "boulder.height: is given here and as column boulder_height_m of the table"
 
@@ -339,7 +340,10 @@ GIVEN = "boulder.height: is given here and as column boulder_height_m of the tab
             "2600, height: 3}}\nsite: {{embedment_ratio: 0.5}}\n",
             [f"2:26: {GIVEN}", f"3:1: site.embedment_depth: {BOTH}"],
         ),
-        (HEADER + ROWS, "13.4", "[13.4, 20]", ["4:30: vehicle.speed: must be one value beside a table"]),
+        (
+            *(HEADER + ROWS, "13.4", "[25, 30] mph"),
+            [f"4:30: vehicle.speed: {ONE_VALUE}: ask once for each value, --set vehicle.speed='25 mph'"],
+        ),
         (
             "boulder_length_m,boulder_width_m,embedment_depth_m\n1,1,1\n",
             *("", "", ["2:1: boulder.height: is required and missing"]),
