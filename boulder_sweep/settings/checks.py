@@ -67,7 +67,8 @@ def check_complete(entries: Entries) -> None:
         if field.name == "boulder_density_kg_m3" and entries.gives_mass:
             continue  # the density of most rocks is assumed
         if not field.optional and not table_refused and field.path not in present | entries.misspelled:
-            entries.report(field.path, "is required and missing")
+            column = f"; give it here or as column {field.name} of {table.file}" if (table := entries.table) else ""
+            entries.report(field.path, f"is required and missing{column}")
     _check_embedment(entries, present, table_refused)
     if entries.root.get("table") is not None:
         for name, leaf in entries.leaves.items():
@@ -174,12 +175,18 @@ def _check_mass(entries: Entries) -> None:
     shape = Model(**{name: entries.settings[name] for name in ("profile", "taper") if name in entries.settings}).shape
     box = rock * math.prod(float(side.max()) for side in sides) * shape.filled
     solid = "a solid box of this size" if shape.is_box else "solid rock of this profile"
-    if mass.min() > MOST_SOLIDITY * box:
+    times = float(mass.min()) / box
+    if times > MOST_SOLIDITY:
         message = (
-            f"{mass.min():g} kg is {mass.min() / box:.2f} times the mass of {solid}, {box:.6g} kg at "
+            f"{mass.min():g} kg is {times:.2f} times the mass of {solid}, {box:.6g} kg at "
             f"the density of {rock:g} kg/m^3{assumed}; at most {MOST_SOLIDITY:g} times can be a mistake of measurement"
         )
-        entries.report("boulder.mass", message)
+        if 0.1 < times / 1000 <= MOST_SOLIDITY:
+            message += "; a thousandth of it fits: is it in kg and not in t, or in lb and not in kip?"
+        at, key = entries.position_of("boulder.mass"), "boulder.mass"
+        if entries.table is not None and BOULDER_MASS in entries.listed:
+            at, key = entries.table.position(int(mass.argmin())), entries.table.written[BOULDER_MASS]
+        entries.problems.add(at, message, key)
 
 
 def _check_solver(entries: Entries) -> None:

@@ -444,7 +444,7 @@ def _designs_of(table: TextTable, path: Location, problems: Problems) -> DesignL
             check_numbers(column, position, problems)
     values_of = {name: np.concatenate(parts or [np.empty(0)]) for name, parts in numbers.items()}
     labels = {name: own.label() for name, own in words.items()}
-    return DesignList(path.name, values_of, labels, _system(columns), table.label, np.array(lines))
+    return DesignList(path.name, values_of, labels, _system(columns), table.label, np.array(lines), _written(columns))
 
 
 class _Words:
@@ -574,7 +574,7 @@ def _checked_columns(file: TableFile, path: Location, problems: Problems) -> Des
     if len(names) > MAX_COLUMNS:
         raise refuse(label, f"has {len(names):,} columns; at most {MAX_COLUMNS:,} are read")
     columns = read_header(names, [position] * len(names), problems)
-    designs = DesignList(path.name, {}, units=_system(columns), source=label)
+    designs = DesignList(path.name, {}, units=_system(columns), source=label, written=_written(columns))
     for name, column in zip(names, columns, strict=True):
         if column is None:
             continue
@@ -686,6 +686,11 @@ def _system(columns: Sequence[TableColumn | None]) -> str:
     """Return the units of the column with the heights, see `DesignList`."""
     sizes = (one.factor for one in columns if one and one.field and one.field.name == "boulder_height_m")
     return system_of(next(sizes, 1))
+
+
+def _written(columns: Sequence[TableColumn | None]) -> dict[str, str]:
+    """Return the names of inputs as the file has them, by column name."""
+    return {one.field.name: one.name for one in columns if one and one.field}
 
 
 def _key(column: TableColumn) -> str:

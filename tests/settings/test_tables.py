@@ -326,6 +326,7 @@ def test_files_that_are_not_opened(messages_of, tmp_path, content, name, message
     assert message in found
 
 
+MISSING = "is required and missing; give it here or as column boulder_height_m of designs.csv"
 ONE_VALUE = "must be one value beside a table; lists and ranges are axes of a grid"
 BOTH = "give embedment_ratio or embedment_depth, not both"
 GIVEN = "boulder.height: is given here and as column boulder_height_m of the table"
@@ -346,7 +347,7 @@ GIVEN = "boulder.height: is given here and as column boulder_height_m of the tab
         ),
         (
             "boulder_length_m,boulder_width_m,embedment_depth_m\n1,1,1\n",
-            *("", "", ["2:1: boulder.height: is required and missing"]),
+            *("", "", [f"2:1: boulder.height: {MISSING}"]),
         ),
     ],
 )
@@ -355,6 +356,15 @@ def test_table_and_file_give_every_input_once(messages_of, content, old, new, me
     assert len(found) == len(messages)
     for one, message in zip(found, messages, strict=True):
         assert one.startswith(f"grid.yaml:{message}")
+
+
+def test_masses_that_are_all_too_large_have_their_place_in_the_list(messages_of):
+    text = "boulder_length_m,boulder_width_m,boulder_height_m,boulder_mass_t,embedment_depth_m\n"
+    (message,) = messages_of(f"{text}1.5,1.6,2.5,16000,1.2\n1.5,1.6,2.5,12700,1.2\n")
+    assert message.startswith("designs.csv:3: boulder_mass_t: 1.27e+07 kg is 814.10 times the mass of a solid box")
+    assert message.endswith("; a thousandth of it fits: is it in kg and not in t, or in lb and not in kip?")
+    (message,) = messages_of(f"{text}1.5,1.6,2.5,160,1.2\n")
+    assert "thousandth" not in message
 
 
 def test_a_relative_name_begins_at_the_file_and_behind_set_at_the_working_directory(tmp_path, monkeypatch, load_table):
