@@ -134,7 +134,8 @@ def _check_embedment(entries: Entries, present: set[str], table_refused: bool) -
     if len(given) > 1:
         entries.report(given[1], f"give {keys}, not both")
     elif not given and not table_refused and not {field.path for field in ways} & entries.misspelled:
-        entries.problems.add(entries.position_of(ways[0].path), f"{keys} is required and missing", "site")
+        message = f"{keys} is required and missing; {ways[1].key}: {fields.TO_BE_FOUND} leaves it to 'sweep need'"
+        entries.problems.add(entries.position_of(ways[0].path), message, "site")
 
 
 def check_pairs(entries: Entries) -> None:

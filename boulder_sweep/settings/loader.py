@@ -66,6 +66,9 @@ OPTIONS = {
 SECOND_OPINION, NO_SECOND_OPINION = f"--second-opinion={USUAL_OPINION[0]}", f"--no-second-opinion={NO_OPINION}"
 """Asks for the second opinion that decides, whatever the file says; asks for none."""
 
+LISTS = (".csv", ".xlsx", ".parquet")
+"""Ends of the names of files that a settings file names."""
+
 MAX_OVERRIDE = 20_000
 """Longest option, in characters."""
 
@@ -147,6 +150,9 @@ def _checked(root: Mapping, path: Path, overrides: Sequence[str], problems: Prob
 
 def _read_text(path: Path) -> str:
     """Return the text of a settings file."""
+    if path.suffix.lower() in LISTS and path.is_file():
+        message = "is no settings file; a list of designs is named in one, with what its columns do not give: table: "
+        raise refuse(str(path), message + path.name)
     check_regular_file(path, MAX_BYTES, "Put a long list of designs into a separate file: table: designs.csv")
     return decode(content_of(path, MAX_BYTES), str(path))
 

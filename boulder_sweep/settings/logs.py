@@ -26,7 +26,7 @@ from boulder_sweep.settings.problems import (
     unknown_word,
     wrong,
 )
-from boulder_sweep.settings.soil_readings import CONE, READING_FIELDS, REFUSAL_BLOWS, Log, LogReading
+from boulder_sweep.settings.soil_readings import CONE, READING_FIELDS, REFUSAL_BLOWS, WEIGHT, Log, LogReading
 from boulder_sweep.settings.tables import located, open_table
 from boulder_sweep.settings.tree import Scalar
 from boulder_sweep.settings.units import UnitError, factor, suffix_unit
@@ -246,7 +246,8 @@ def _size(unit: str, key: str, position: Position) -> float:
 
 
 def count_of(text: str) -> str:
-    """Return the blows of a count in increments, ``5-6-7`` as 13 without the first; anything else as it is."""
+    """Return the blows of a count in increments, ``WOH-6-7`` as 13 without the first; anything else as it is."""
+    text = re.sub(rf"\b{WEIGHT.pattern}\b(\s*/.*)?", "0", text, flags=re.IGNORECASE)
     match = _INCREMENTS.fullmatch(text)
     if match is None:
         return "" if text in ("-", "–", "—") else text
