@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import re
+import warnings
 from collections.abc import Mapping as MappingABC
 from collections.abc import Sequence
 from dataclasses import fields as fields_of
@@ -17,6 +18,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from boulder_sweep import elementary
+from boulder_sweep.errors import SettingsWarning
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.checks import check_complete, check_pairs, check_usual, notes_on
 from boulder_sweep.settings.entries import NAME, NAME_RULE, TOP_KEYS, Entries
@@ -102,11 +104,22 @@ def load(settings: str | Path | MappingABC[str, Any], overrides: Sequence[str] =
     ------
     SettingsError
         With every mistake of the file and of the overrides.
+
+    Warns
+    -----
+    SettingsWarning
+        Each note on the settings, which are read all the same.
     """
+    if isinstance(overrides, str):
+        raise TypeError(f"overrides must be a list of strings, such as [{overrides!r}]")
     if isinstance(settings, MappingABC):
-        return _load_mapping(settings, overrides)
-    path = Path(settings)
-    return load_text(_read_text(path), path, overrides)
+        sweep = _load_mapping(settings, overrides)
+    else:
+        path = Path(settings)
+        sweep = load_text(_read_text(path), path, overrides)
+    for note in sweep.notes:
+        warnings.warn(str(note), SettingsWarning, stacklevel=2)
+    return sweep
 
 
 def load_text(text: str, path: Path, overrides: Sequence[str] = ()) -> Sweep:

@@ -676,9 +676,9 @@ def read_header(names: list[str], positions: list[Position], problems: Problems)
             problems.add(position, column, shorten(name) or "(empty)")
         columns.append(column if isinstance(column, TableColumn) else None)
     if "boulder_density_kg_m3" not in {_key(column) for column in columns if column}:
-        for column, position in zip(columns, positions, strict=True):
-            if column is not None and _plain(column.name.lower()) in _ROCK:
-                problems.add(position, _ROCK_REMEDY, column.name)
+        for one, position in zip(columns, positions, strict=True):
+            if one is not None and _plain(one.name.lower()) in _ROCK:
+                problems.add(position, _ROCK_REMEDY, one.name)
     return columns
 
 

@@ -374,7 +374,7 @@ def test_what_makes_no_sense_is_refused(the_problem, text, words):
 
 def test_both_ends_of_a_range_are_reported(problems_of, minimal):
     problems = problems_of(minimal.replace("height: 3.44", "height: {from: 0, to: 100, count: 2}"))
-    assert [(problem.line, problem.column) for problem in problems] == [(4, 18), (4, 26)]
+    assert [(problem.line, problem.column) for problem in problems] == [(4, 18), (4, 25)]
     assert all("admitted range of 0.01 to 20 m" in problem.message for problem in problems)
 
 
