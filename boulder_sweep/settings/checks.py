@@ -36,6 +36,8 @@ from boulder_sweep.settings.values import is_unusual
 from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.text import counted
 
+_OWN_NAMES = ("id", "name", "no", "boulder", "stone")
+"""Ends of the names of columns that tell boulders apart."""
 SLIDES = "or the ground slides"
 """What becomes of ground that falls as steeply as its friction angle; the page of a report says the same."""
 FLOATS = "soil of {value} would float; give the density of the saturated soil below it"
@@ -320,7 +322,7 @@ def _on_list(sweep: Sweep, table: DesignList) -> Iterator[Problem]:
         words += f"{MOST_SOLIDITY:.0%} a size or the mass is wrong; not computed (error)"
         words += f" ({len(heavy)} boulders like it)" if len(heavy) > MAX_ALIKE else ""
         yield Problem(table.position(row), words, "boulder.mass")
-    ids = [(name, one) for name, one in table.labels.items() if name.lower().endswith("id")]
+    ids = [(name, one) for name, one in table.labels.items() if name.lower().endswith(_OWN_NAMES)]
     for name, one in ids if all(BY_NAME[name].section == "boulder" for name in table.columns) else ():
         again = np.setdiff1d(np.arange(len(table)), np.unique(one.codes, return_index=True)[1])
         if twice := [row for row in again.tolist() if one.words[one.codes[row]]]:  # which it may with several soils
