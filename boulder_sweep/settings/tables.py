@@ -16,7 +16,7 @@ import re
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import chain
 from pathlib import Path
@@ -703,7 +703,7 @@ def _column(name: str) -> TableColumn | str:
         return "designs are numbered in their order; rename or remove this column"
     if name in OUTCOME_COLUMNS:
         return f"is an outcome of a run ({TABLE_COLUMNS[name].meaning}), not an input; remove this column"
-    if column := _input_column(name):
+    if column := _input_column(name) or _headed(name):
         return column
     if name in _STEMS:
         return f"the unit is missing at the end of the name, such as {name}{name_suffix(_STEMS[name].unit)}"
@@ -727,6 +727,13 @@ def _input_column(name: str) -> TableColumn | None:
     return None
 
 
+def _headed(name: str) -> TableColumn | None:
+    """Return the column of an input by a heading with its unit in brackets: a quarry writes ``Length (m)``."""
+    plain = _plain(name.lower())
+    column = _input_column(plain) or _input_column(f"boulder_{plain}")
+    return replace(column, name=name) if column and re.search(r"[(\[]", name) else None
+
+
 def check_numbers(column: TableColumn, position: Position, problems: Problems) -> bool:
     """Report an unknown column that holds nothing but numbers; return whether it may be carried along."""
     if _ID.fullmatch(column.name):
@@ -738,7 +745,7 @@ def check_numbers(column: TableColumn, position: Position, problems: Problems) -
 
 
 def _plain(name: str) -> str:
-    """Return the words of a name joined by ``_``: a quarry writes ``Length (m)``."""
+    """Return the words of a name joined by ``_``."""
     return "_".join(re.findall(r"[^\W_]+", name))
 
 

@@ -221,6 +221,8 @@ def test_mistakes_of_one_kind_are_counted(messages_of):
     ("name", "value", "column", "expected"),
     [
         ("boulder_length_ft", "5.5", "boulder_length_m", 1.6764),
+        ("Width [ft]", "5", "boulder_width_m", 1.524),
+        ("Mass (t)", "15.2", "boulder_mass_kg", 15200.0),
         ("boulder_density_pcf", "162", "boulder_density_kg_m3", 162 * 0.45359237 / 0.3048**3),
         ("boulder_density_lb_ft3", "162", "boulder_density_kg_m3", 162 * 0.45359237 / 0.3048**3),
         ("soil_density_kN_m3", "18.2", "soil_density_kg_m3", 18200 / 9.80665),
@@ -250,8 +252,9 @@ def test_a_column_may_be_in_any_unit_that_fits(load_table, name, value, column, 
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("Length (m)", "did you mean boulder_length_m?"),
-        ("mass [t]", "did you mean boulder_mass_t?"),
+        ("Length (m)", "gives the same as column boulder_length_m"),
+        ("mass t", "did you mean boulder_mass_t?"),
+        ("Width (kg)", "is not an input"),
         ("boulder_lenght_ft", "did you mean boulder_length_ft?"),
         ("boulder_lenght_m", "did you mean boulder_length_m?"),
         ("impact_spede_mph", "did you mean impact_speed_mph?"),
