@@ -36,6 +36,10 @@ class OlderRulesWarning(UserWarning):
     """Other rules than this version's judged a table; it is read all the same."""
 
 
+class SettingsWarning(UserWarning):
+    """A note on settings that are valid; the command line prints it as a note."""
+
+
 class BackendError(BoulderSweepError):
     """Workers are not available; the text says why and what to do."""
 

@@ -34,6 +34,7 @@ from boulder_sweep.errors import (
     BoulderSweepError,
     Interrupted,
     OlderRulesWarning,
+    SettingsWarning,
 )
 from boulder_sweep.locations import gather_temporary_files
 from boulder_sweep.signals import install, noted_signals
@@ -195,6 +196,7 @@ def _report_warnings() -> Iterator[None]:
     said: set[str] = set()
     with warnings.catch_warnings():
         warnings.simplefilter("always", OlderRulesWarning)
+        warnings.simplefilter("ignore", SettingsWarning)  # commands print these notes themselves
         usual = warnings.showwarning
 
         def showwarning(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from boulder_kernels.control import control_for
 from boulder_kernels.dynamics import BOX, constants_in
 from boulder_kernels.outcomes import FINER, NONE_NEEDED
 from boulder_kernels.table import is_layered, is_paired, problem_at, step_of_solution
-from boulder_sweep.columns import BOULDER_MASS, INPUT_COLUMNS, OPTIONAL_COLUMNS, SHAPES
+from boulder_sweep.columns import BOULDER_MASS, BY_NAME, INPUT_COLUMNS, OPTIONAL_COLUMNS, SHAPES
 from boulder_sweep.impact.history import Motion
 from boulder_sweep.impact.trajectory import Trajectory
 from boulder_sweep.judge.accuracy import accuracy_of, finer_controls, reported_step_s
@@ -26,8 +27,9 @@ from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import Judged, worst_case, worst_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.settings import Sweep, load
-from boulder_sweep.settings.fields import FIELDS
+from boulder_sweep.settings.fields import FIELDS, INPUTS
 from boulder_sweep.settings.model import Model, ReadingChoice, SolverSettings
+from boulder_sweep.settings.problems import nearest
 from boulder_sweep.stones.rock import ROCK_KG_M3
 
 __all__ = ["Trajectory", "simulate"]
@@ -158,6 +160,12 @@ def _as_sweep(design: Sweep | str | Path | Mapping[str, Any]) -> Sweep:
         return load(design)
     given = dict(design.items())
     names = (*INPUT_COLUMNS, *OPTIONAL_COLUMNS, "embedment_ratio")
+    meant = dict.fromkeys(names) | {field.key: field.name for field in INPUTS}
+    for key, value in given.items():  # a row may have labels, too
+        if key in (*BY_NAME, *names) or isinstance(value, str) or str(key).lower().endswith(("id", "name")):
+            continue
+        if near := nearest(str(key), meant, cutoff=0.8):
+            raise ValueError(f"'{key}' is no column of a design; did you mean {meant[near] or near}?")
     constants = _DEFAULTS | {name: float(given[name]) for name in names if name in given}
     if "embedment_depth_m" in constants:
         constants.pop("embedment_ratio", None)
@@ -191,6 +199,8 @@ def _changed(
         model = dataclasses.replace(model, soil_elements=soil_elements)
     if step_s is not None or horizon_s is not None:
         for name, value in (("step_s", step_s), ("horizon_s", horizon_s)):
+            if not isinstance(value, Real | None):
+                raise TypeError(f"{name} must be a number of seconds, not {value!r}")
             if value is not None and not 0.0 < value < math.inf:
                 raise ValueError(f"{name} must be a positive time in seconds, not {value}")
         solver = SolverSettings(

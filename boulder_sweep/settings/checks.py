@@ -7,6 +7,7 @@ stop a run.
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
@@ -30,11 +31,13 @@ from boulder_sweep.settings.model import (
 )
 from boulder_sweep.settings.problems import MAX_ALIKE, Position, Problem
 from boulder_sweep.settings.sweep import DesignList, Sweep
-from boulder_sweep.settings.units import range_words
+from boulder_sweep.settings.units import describe, range_words
 from boulder_sweep.settings.values import is_unusual
 from boulder_sweep.stones.rock import ROCK_KG_M3
 from boulder_sweep.text import counted
 
+_OWN_NAMES = ("id", "name", "no", "boulder", "stone")
+"""Ends of the names of columns that tell boulders apart."""
 SLIDES = "or the ground slides"
 """What becomes of ground that falls as steeply as its friction angle; the page of a report says the same."""
 FLOATS = "soil of {value} would float; give the density of the saturated soil below it"
@@ -66,13 +69,17 @@ def check_complete(entries: Entries) -> None:
         if field.name == "boulder_density_kg_m3" and entries.gives_mass:
             continue  # the density of most rocks is assumed
         if not field.optional and not table_refused and field.path not in present | entries.misspelled:
-            entries.report(field.path, "is required and missing")
+            column = f"; give it here or as column {field.name} of {table.file}" if (table := entries.table) else ""
+            entries.report(field.path, f"is required and missing{column}")
     _check_embedment(entries, present, table_refused)
     if entries.root.get("table") is not None:
         for name, leaf in entries.leaves.items():
             if leaf.is_axis:
-                message = "must be one value beside a table; lists and ranges are axes of a grid"
-                entries.problems.add(leaf.position, message, BY_NAME[name].path)
+                field = BY_NAME[name]
+                first = describe(float(leaf.values[0]), field.unit, leaf.written)
+                message = "must be one value beside a table; lists and ranges are axes of a grid: ask once for each "
+                message += f"value, --set {field.path}={shlex.quote(first)}"
+                entries.problems.add(leaf.position, message, field.path)
 
 
 def check_usual(entries: Entries) -> None:
@@ -129,7 +136,8 @@ def _check_embedment(entries: Entries, present: set[str], table_refused: bool) -
     if len(given) > 1:
         entries.report(given[1], f"give {keys}, not both")
     elif not given and not table_refused and not {field.path for field in ways} & entries.misspelled:
-        entries.problems.add(entries.position_of(ways[0].path), f"{keys} is required and missing", "site")
+        message = f"{keys} is required and missing; {ways[1].key}: {fields.TO_BE_FOUND} leaves it to 'sweep need'"
+        entries.problems.add(entries.position_of(ways[0].path), message, "site")
 
 
 def check_pairs(entries: Entries) -> None:
@@ -170,12 +178,18 @@ def _check_mass(entries: Entries) -> None:
     shape = Model(**{name: entries.settings[name] for name in ("profile", "taper") if name in entries.settings}).shape
     box = rock * math.prod(float(side.max()) for side in sides) * shape.filled
     solid = "a solid box of this size" if shape.is_box else "solid rock of this profile"
-    if mass.min() > MOST_SOLIDITY * box:
+    times = float(mass.min()) / box
+    if times > MOST_SOLIDITY:
         message = (
-            f"{mass.min():g} kg is {mass.min() / box:.2f} times the mass of {solid}, {box:.6g} kg at "
+            f"{mass.min():g} kg is {times:.2f} times the mass of {solid}, {box:.6g} kg at "
             f"the density of {rock:g} kg/m^3{assumed}; at most {MOST_SOLIDITY:g} times can be a mistake of measurement"
         )
-        entries.report("boulder.mass", message)
+        if 0.1 < times / 1000 <= MOST_SOLIDITY:
+            message += "; a thousandth of it fits: is it in kg and not in t, or in lb and not in kip?"
+        at, key = entries.position_of("boulder.mass"), "boulder.mass"
+        if entries.table is not None and BOULDER_MASS in entries.listed:
+            at, key = entries.table.position(int(mass.argmin())), entries.table.written[BOULDER_MASS]
+        entries.problems.add(at, message, key)
 
 
 def _check_solver(entries: Entries) -> None:
@@ -308,7 +322,7 @@ def _on_list(sweep: Sweep, table: DesignList) -> Iterator[Problem]:
         words += f"{MOST_SOLIDITY:.0%} a size or the mass is wrong; not computed (error)"
         words += f" ({len(heavy)} boulders like it)" if len(heavy) > MAX_ALIKE else ""
         yield Problem(table.position(row), words, "boulder.mass")
-    ids = [(name, one) for name, one in table.labels.items() if name.lower().endswith("id")]
+    ids = [(name, one) for name, one in table.labels.items() if name.lower().endswith(_OWN_NAMES)]
     for name, one in ids if all(BY_NAME[name].section == "boulder" for name in table.columns) else ():
         again = np.setdiff1d(np.arange(len(table)), np.unique(one.codes, return_index=True)[1])
         if twice := [row for row in again.tolist() if one.words[one.codes[row]]]:  # which it may with several soils

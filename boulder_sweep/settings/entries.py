@@ -49,7 +49,7 @@ from boulder_sweep.settings.soil_readings import (
 )
 from boulder_sweep.settings.sweep import SECTION, UNITS, DesignList
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence, block_of
-from boulder_sweep.settings.units import SYSTEMS, UnitError, factor, system_of
+from boulder_sweep.settings.units import SYSTEMS, UnitError, factor
 from boulder_sweep.settings.values import (
     Leaf,
     meant_by,
@@ -411,7 +411,7 @@ class Entries:
         if self.table is not None and height.name in self.table.columns:
             return self.table.units
         leaf = self.leaves.get(height.name)
-        return system_of(factor(leaf.written, height.unit)) if leaf is not None and leaf.written else SYSTEMS[0]
+        return SYSTEMS[0] if leaf is None else leaf.system
 
     @property
     def gives_mass(self) -> bool:

@@ -377,6 +377,9 @@ _HEAD = """\
 # Every entry takes one value, a list [a, b], or a range {{from, to, step}} or {{from, to, count}}, in SI or US units.
 # Every combination of lists and ranges is a design. Lines that begin with # are optional: what they show is the
 # default, or an example. Soil and truck are examples, too: replace them with your own.
+#
+# table: yard.csv in place of sizes and mass reads a list of boulders, one a row (boulder_height_{length}, ...).
+# log: borehole.csv under soil, in place of its constants, reads blow counts or a cone over the depth.
 """
 
 
@@ -395,7 +398,7 @@ def starter(name: str, vehicle: str = "M30", units: Literal["si", "us"] = "si", 
         Name of the file, for its first lines.
     """
     quoted = printable(shlex.quote(file))
-    lines = [*_HEAD.format(name=name, file=quoted).splitlines(), f"name: {name}"]
+    lines = [*_HEAD.format(name=name, file=quoted, length="ft" if units == "us" else "m").splitlines(), f"name: {name}"]
     for section, words in SECTIONS.items():
         lines += ["", f"{section}:".ljust(60) + f"# {words}"]
         for field in fields_of(section):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import re
+import warnings
 from collections.abc import Mapping as MappingABC
 from collections.abc import Sequence
 from dataclasses import fields as fields_of
@@ -17,6 +18,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from boulder_sweep import elementary
+from boulder_sweep.errors import SettingsWarning
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.checks import check_complete, check_pairs, check_usual, notes_on
 from boulder_sweep.settings.entries import NAME, NAME_RULE, TOP_KEYS, Entries
@@ -36,6 +38,7 @@ from boulder_sweep.settings.sweep import SECTION, UNITS, Axis, Heading, Sweep, w
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, parse, parse_node
 from boulder_sweep.settings.tree import Sequence as List
 from boulder_sweep.settings.units import SYSTEMS
+from boulder_sweep.settings.values import read_input
 from boulder_sweep.stones.rock import ROCK_KG_M3
 
 MAX_DESIGNS = 2**63 - 1
@@ -64,6 +67,9 @@ OPTIONS = {
 
 SECOND_OPINION, NO_SECOND_OPINION = f"--second-opinion={USUAL_OPINION[0]}", f"--no-second-opinion={NO_OPINION}"
 """Asks for the second opinion that decides, whatever the file says; asks for none."""
+
+LISTS = (".csv", ".xlsx", ".parquet")
+"""Ends of the names of files that a settings file names."""
 
 MAX_OVERRIDE = 20_000
 """Longest option, in characters."""
@@ -98,11 +104,22 @@ def load(settings: str | Path | MappingABC[str, Any], overrides: Sequence[str] =
     ------
     SettingsError
         With every mistake of the file and of the overrides.
+
+    Warns
+    -----
+    SettingsWarning
+        Each note on the settings, which are read all the same.
     """
+    if isinstance(overrides, str):
+        raise TypeError(f"overrides must be a list of strings, such as [{overrides!r}]")
     if isinstance(settings, MappingABC):
-        return _load_mapping(settings, overrides)
-    path = Path(settings)
-    return load_text(_read_text(path), path, overrides)
+        sweep = _load_mapping(settings, overrides)
+    else:
+        path = Path(settings)
+        sweep = load_text(_read_text(path), path, overrides)
+    for note in sweep.notes:
+        warnings.warn(str(note), SettingsWarning, stacklevel=2)
+    return sweep
 
 
 def load_text(text: str, path: Path, overrides: Sequence[str] = ()) -> Sweep:
@@ -146,6 +163,9 @@ def _checked(root: Mapping, path: Path, overrides: Sequence[str], problems: Prob
 
 def _read_text(path: Path) -> str:
     """Return the text of a settings file."""
+    if path.suffix.lower() in LISTS and path.is_file():
+        message = "is no settings file; a list of designs is named in one, with what its columns do not give: table: "
+        raise refuse(str(path), message + path.name)
     check_regular_file(path, MAX_BYTES, "Put a long list of designs into a separate file: table: designs.csv")
     return decode(content_of(path, MAX_BYTES), str(path))
 
@@ -281,9 +301,11 @@ def _read_heading(entries: Entries) -> Heading:
 
 
 def _read_units(root: Mapping, problems: Problems) -> str:
-    """Return the units named in a file, empty where none are; with ``us`` no number may lack its unit."""
+    """Return the units named in a file, empty where none are; with ``us``, or in feet, no number may lack its unit."""
     node = root.get(UNITS)
     if node is None:
+        if _is_in_feet(root):
+            _need_units(root)
         return ""
     units = node.text.strip() if isinstance(node, Scalar) else ""
     if units not in SYSTEMS:
@@ -291,6 +313,18 @@ def _read_units(root: Mapping, problems: Problems) -> str:
     if units == "us":
         _need_units(root)
     return units
+
+
+def _is_in_feet(root: Mapping) -> bool:
+    """Whether the file itself gives the height of the boulder in feet or inches; an option says nothing of the rest."""
+    field, boulder = fields.BY_NAME["boulder_height_m"], root.get("boulder")
+    height = boulder.get(field.key) if isinstance(boulder, Mapping) else None
+    if height is None or height.position.file in ("--set", *OPTIONS):
+        return False
+    try:
+        return read_input(height, field).system == "us"
+    except SettingsError:
+        return False  # its mistake is reported as the block is read
 
 
 def _need_units(node: Node) -> None:

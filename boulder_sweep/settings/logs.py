@@ -26,7 +26,7 @@ from boulder_sweep.settings.problems import (
     unknown_word,
     wrong,
 )
-from boulder_sweep.settings.soil_readings import CONE, READING_FIELDS, REFUSAL_BLOWS, Log, LogReading
+from boulder_sweep.settings.soil_readings import CONE, READING_FIELDS, REFUSAL_BLOWS, WEIGHT, Log, LogReading
 from boulder_sweep.settings.tables import located, open_table
 from boulder_sweep.settings.tree import Scalar
 from boulder_sweep.settings.units import UnitError, factor, suffix_unit
@@ -40,6 +40,7 @@ _SHOWN = 10
 """Most names in a line."""
 _UNITS = {"depth": "m", CONE: "MPa"}
 _SAMPLES = {"depth": "Depth (m)", "n": "N", CONE: "qc (MPa)"}
+_US_SAMPLES = {"depth": "Depth (ft)", CONE: "qc (tsf)"}
 _NAMES = {
     "depth": "depth top from depthfrom depthtop topdepth testdepth depthbgl depthbgs depthbelowground",
     "n": "n spt sptn nspt nvalue sptnvalue sptvalue blows blowcount blowcounts sptblows sptblowcount nfield fieldn "
@@ -240,12 +241,13 @@ def _size(unit: str, key: str, position: Position) -> float:
     try:
         return float(factor(_SPELLINGS.get(plain.lower(), plain), _UNITS[key]))
     except UnitError as error:
-        words = str(error) if plain else f"the unit is missing; write {_SAMPLES[key]}"
+        words = str(error) if plain else f"the unit is missing; write {_SAMPLES[key]} or {_US_SAMPLES[key]}"
         raise refuse(position.file, f"{key}: {words}", position.line or 1, position.column) from None
 
 
 def count_of(text: str) -> str:
-    """Return the blows of a count in increments, ``5-6-7`` as 13 without the first; anything else as it is."""
+    """Return the blows of a count in increments, ``WOH-6-7`` as 13 without the first; anything else as it is."""
+    text = re.sub(rf"\b{WEIGHT.pattern}\b(\s*/.*)?", "0", text, flags=re.IGNORECASE)
     match = _INCREMENTS.fullmatch(text)
     if match is None:
         return "" if text in ("-", "–", "—") else text

@@ -61,12 +61,15 @@ READING_FIELDS = {
 """Entries of a reading by kind of test and key."""
 BLOW_KEYS = ("n", "n60")
 LEAST_KEYS = (*BLOW_KEYS, "n1_60", "q_c")
-"""Entries that may be ``>50`` or ``50+``, at least so much; blows may be a refusal, too: ``50/75mm`` or ``R``."""
+"""Entries that may be ``>50`` or ``50+``, at least so much; blows may be a refusal, too, ``50/75mm`` or ``R``, or none,
+``WOH``."""
 _AT_LEAST = re.compile(
     r"(?:>=?|≥)\s*(?P<above>[\d.].*)|(?P<plus>\d[\d.]*)\s*\+(?P<unit>[^\d]*)"
     r"|(?P<blows>\d+)\s*(?:/|\b(?:blows?\s+)?(?:for|in)\b)\s*(?P<driven>[\d.].*)|(?P<refusal>R|ref\.?|refusal)",
     re.IGNORECASE | re.ASCII,
 )
+WEIGHT = re.compile(r"WO?[HR]", re.IGNORECASE)
+"""The sampler sank under the weight of the hammer or of the rods: no blow."""
 _FIRST_M = 1.0
 """Depth above which the first reading of a log is expected."""
 REFUSAL_BLOWS = 50
@@ -157,6 +160,9 @@ def _without_signs(node: Node) -> tuple[Node, bool]:
     entries, is_least = dict(node.entries), False
     for key in LEAST_KEYS:
         value = node.get(key)
+        if key in BLOW_KEYS and isinstance(value, Scalar) and WEIGHT.fullmatch(value.text.strip()):
+            entries[key] = Entry(key, entries[key].position, Scalar(value.position, "0"))
+            continue
         match = _AT_LEAST.fullmatch(value.text.strip()) if isinstance(value, Scalar) else None
         if value is None or match is None or (key not in BLOW_KEYS and not (match["above"] or match["plus"])):
             continue
@@ -618,14 +624,17 @@ def strength(reading: dict[str, Any]) -> float:
 def _log_words(data: dict[str, Any], units: str) -> list[str]:
     """Return what is taken of the layers of a log."""
     layers = data["layers"]
-    kind = f"means of the cone over {quantity_text('m', units, WINDOW_M)}" if data["method"] == "cpt" else "blow counts"
+    window = quantity_text("m", units, WINDOW_M)
+    kind, kinds = "blow count", "blow counts"
+    if data["method"] == "cpt":
+        kind, kinds = f"mean of the cone over {window}", f"means of the cone over {window}"
     parts = [log_title(data)]
     if "weakest_layer" in data:
         parts.append(f"the weakest of {len(layers)} layers stands for all depths")
         layers = [layers[data["weakest_layer"]]]
     for layer in layers:
         count, ends = layer["readings"], [layer["from_m"], layer["to_m"]]
-        of = f"{count} {kind} at {quantity_text('m', units, *ends, digits='.3g')}"
+        of = f"{count} {kind if count == 1 else kinds} at {quantity_text('m', units, *ends, digits='.3g')}"
         if count >= FEWEST:
             correlation, mean = layer["correlation_sd_deg"], layer["scatter_sd_deg"]
             of += f", sd {correlation:.3g} deg of the correlation with {mean:.2g} deg of their mean"
@@ -774,7 +783,10 @@ def _nodes_of(log: Log, position: Position, energy: Entry | None, topsoil_m: flo
     if energy is not None:
         if log.key != "n":
             raise wrong(energy.position, f"{log.file} gives {log.key}, which needs no energy ratio; remove it")
-        ratio = f"{read_single(energy.value, READING_FIELDS['spt'][ENERGY])!r}"
+        problems = Problems()
+        with problems.under(ENERGY):
+            ratio = f"{read_single(energy.value, READING_FIELDS['spt'][ENERGY])!r}"
+        problems.raise_if_any()
     if log.key == "n" and not ratio and not all(reading.energy_ratio for reading in log.readings):
         message = f"{log.file} does not give the energy ratio of the hammer for every count; write energy_ratio beside "
         raise wrong(position, f"{message}log (60 % is usual), or name counts at 60 % N60")

@@ -124,6 +124,8 @@ class DesignList:
         The file, for messages.
     lines : ndarray of int, shape (n,)
         Lines of the rows in it; of shape (0,) where it has none.
+    written : dict of str to str
+        Names of its columns as the file has them, by column name.
     """
 
     file: str
@@ -132,6 +134,7 @@ class DesignList:
     units: str = SYSTEMS[0]
     source: str = ""
     lines: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))
+    written: dict[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))

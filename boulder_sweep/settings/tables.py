@@ -16,7 +16,7 @@ import re
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import chain
 from pathlib import Path
@@ -444,7 +444,7 @@ def _designs_of(table: TextTable, path: Location, problems: Problems) -> DesignL
             check_numbers(column, position, problems)
     values_of = {name: np.concatenate(parts or [np.empty(0)]) for name, parts in numbers.items()}
     labels = {name: own.label() for name, own in words.items()}
-    return DesignList(path.name, values_of, labels, _system(columns), table.label, np.array(lines))
+    return DesignList(path.name, values_of, labels, _system(columns), table.label, np.array(lines), _written(columns))
 
 
 class _Words:
@@ -574,7 +574,7 @@ def _checked_columns(file: TableFile, path: Location, problems: Problems) -> Des
     if len(names) > MAX_COLUMNS:
         raise refuse(label, f"has {len(names):,} columns; at most {MAX_COLUMNS:,} are read")
     columns = read_header(names, [position] * len(names), problems)
-    designs = DesignList(path.name, {}, units=_system(columns), source=label)
+    designs = DesignList(path.name, {}, units=_system(columns), source=label, written=_written(columns))
     for name, column in zip(names, columns, strict=True):
         if column is None:
             continue
@@ -656,6 +656,13 @@ _STEMS: dict[str, Field] = {field.name.removesuffix(name_suffix(field.unit)): fi
 """Inputs by the name of the column without its unit."""
 
 
+_ROCK = ("rock", "boulder_rock", "rock_type")
+_ROCK_REMEDY = (
+    "is not read, for a file has one boulder.rock for its whole list: write a list for each kind of rock, or add a "
+    "column boulder_density_kg_m3"
+)
+
+
 def read_header(names: list[str], positions: list[Position], problems: Problems) -> list[TableColumn | None]:
     """Return what every column is, None for those that cannot be used; mistakes go to `problems`."""
     columns: list[TableColumn | None] = []
@@ -668,6 +675,10 @@ def read_header(names: list[str], positions: list[Position], problems: Problems)
         if isinstance(column, str):
             problems.add(position, column, shorten(name) or "(empty)")
         columns.append(column if isinstance(column, TableColumn) else None)
+    if "boulder_density_kg_m3" not in {_key(column) for column in columns if column}:
+        for one, position in zip(columns, positions, strict=True):
+            if one is not None and _plain(one.name.lower()) in _ROCK:
+                problems.add(position, _ROCK_REMEDY, one.name)
     return columns
 
 
@@ -675,6 +686,11 @@ def _system(columns: Sequence[TableColumn | None]) -> str:
     """Return the units of the column with the heights, see `DesignList`."""
     sizes = (one.factor for one in columns if one and one.field and one.field.name == "boulder_height_m")
     return system_of(next(sizes, 1))
+
+
+def _written(columns: Sequence[TableColumn | None]) -> dict[str, str]:
+    """Return the names of inputs as the file has them, by column name."""
+    return {one.field.name: one.name for one in columns if one and one.field}
 
 
 def _key(column: TableColumn) -> str:
@@ -687,7 +703,7 @@ def _column(name: str) -> TableColumn | str:
         return "designs are numbered in their order; rename or remove this column"
     if name in OUTCOME_COLUMNS:
         return f"is an outcome of a run ({TABLE_COLUMNS[name].meaning}), not an input; remove this column"
-    if column := _input_column(name):
+    if column := _input_column(name) or _headed(name):
         return column
     if name in _STEMS:
         return f"the unit is missing at the end of the name, such as {name}{name_suffix(_STEMS[name].unit)}"
@@ -711,6 +727,13 @@ def _input_column(name: str) -> TableColumn | None:
     return None
 
 
+def _headed(name: str) -> TableColumn | None:
+    """Return the column of an input by a heading with its unit in brackets: a quarry writes ``Length (m)``."""
+    plain = _plain(name.lower())
+    column = _input_column(plain) or _input_column(f"boulder_{plain}")
+    return replace(column, name=name) if column and re.search(r"[(\[]", name) else None
+
+
 def check_numbers(column: TableColumn, position: Position, problems: Problems) -> bool:
     """Report an unknown column that holds nothing but numbers; return whether it may be carried along."""
     if _ID.fullmatch(column.name):
@@ -721,10 +744,15 @@ def check_numbers(column: TableColumn, position: Position, problems: Problems) -
     return False
 
 
+def _plain(name: str) -> str:
+    """Return the words of a name joined by ``_``."""
+    return "_".join(re.findall(r"[^\W_]+", name))
+
+
 def _meant(name: str) -> str:
     """Return the input that a misspelled name stands for, with the unit it was given; empty if there is none near."""
     word = name.lower()
-    plain = "_".join(re.findall(r"[^\W_]+", word))  # a quarry writes "Length (m)"
+    plain = _plain(word)
     for likely in (plain, f"boulder_{plain}"):
         if _input_column(likely):
             return likely

@@ -36,6 +36,7 @@ from boulder_sweep.settings.units import (
     range_words,
     shown_unit,
     suffix_unit,
+    system_of,
 )
 
 MAX_AXIS = 1_000_000
@@ -111,6 +112,11 @@ class Leaf:
     written: str = ""
     positions: tuple[Position, ...] = ()
     distribution: Distribution | SetDistributions | None = None
+
+    @property
+    def system(self) -> str:
+        """The system of the unit in which a length is written; ``si`` of a bare number."""
+        return system_of(factor(self.written, "m")) if self.written else SYSTEMS[0]
 
 
 def read_leaf(node: Node, field: Field) -> Leaf:
@@ -247,8 +253,13 @@ def outside(value: float, field: Field, written: str = "") -> str:
     bound = field.admitted
     if bound is None or bound.low <= value <= bound.high:
         return ""
-    low, high = range_words(bound.low, bound.high, field.unit, written).split(" to ")
-    return OUTSIDE.format(value=describe(value, field.unit, written), low=low, high=high, reason=bound.reason)
+    given = describe(value, field.unit, written)
+    if value < 0.0 <= bound.low:
+        return f"{given} must be {'more than 0' if bound.low > 0.0 else '0 or more'}"
+    low, high = range_words(bound.low, bound.high, field.unit, written, digits=3).split(" to ")
+    as_percent = field.unit == "1" and not written and bound.low <= value / 100.0 <= bound.high <= 1.0
+    remedy = f"; write {value:g} %" if as_percent else ""
+    return OUTSIDE.format(value=given, low=low, high=high, reason=bound.reason) + remedy
 
 
 def is_unusual(values: np.ndarray, field: Field) -> np.ndarray:
@@ -413,8 +424,9 @@ def read_quantity(node: Node, unit: str, outer_unit: Scalar | None = None, sampl
                 )
             unit_text = outer_unit.text
         if node.needs_unit and not unit_text and unit not in WITHOUT_UNIT:
-            meant = f"{node.text.strip()} {shown_unit(unit, 'us').unit}"
-            raise NumberError(f"{quoted(node)} has no unit, and 'units: us' asks for one; did you mean {meant}?")
+            units = dict.fromkeys(shown_unit(unit, system).unit for system in reversed(SYSTEMS))
+            meant = " or ".join(f"{shorten(node.text.strip())} {one}" for one in units)
+            raise NumberError(f"{quoted(node)} has no unit; this file is in US units: write {meant}")
         value = number * factor(unit_text, unit) if unit_text else number
         return Quantity(value, " ".join(unit_text.split()))
     except (NumberError, UnitError) as error:

@@ -399,6 +399,8 @@ def _read(folder: Location, columns: Sequence[str] | None, verify: bool) -> tupl
     """Return the finished parts, in the order of the designs, and what is known of them."""
     import pyarrow as pa  # heavy, and only readers need it
 
+    if isinstance(columns, str):
+        raise TypeError(f"columns must be a list of names, such as [{columns!r}]")
     finished = FinishedRows(folder)
     if unknown := [name for name in columns or () if name not in finished.columns]:
         raise ValueError(f"{folder} has no column {unknown[0]!r}; its columns are {', '.join(finished.columns)}")

@@ -39,6 +39,23 @@ def test_numbers_of_numpy_and_bare_ones_are_values(site):
     assert (sweep.constants["boulder_length_m"], sweep.name) == (1.65, "Straße")
 
 
+def test_notes_are_warnings_in_python_and_notes_at_the_terminal(site, sweep, tmp_path):
+    site["vehicle"]["speed"] = 30
+    note = "30 m/s is outside the usual range"
+    with pytest.warns(UserWarning, match=f"settings: vehicle.speed: {note}"):
+        boulder_sweep.load(site)
+    path = tmp_path / "fast.yaml"
+    path.write_text((CONFIGS / "site.yaml").read_text(encoding="utf-8").replace("30 mph", "30 m/s"), encoding="utf-8")
+    with pytest.warns(UserWarning, match=note), pytest.raises(QuestionError, match="to be found"):
+        boulder_sweep.capacity(path)
+    assert " ".join(sweep("check", path)[2].split()).count(note) == 1
+
+
+def test_overrides_are_a_list(site):
+    with pytest.raises(TypeError, match=r"overrides must be a list of strings, such as \['vehicle.speed=40 mph'\]"):
+        boulder_sweep.load(site, "vehicle.speed=40 mph")
+
+
 def test_mistakes_of_a_mapping_are_named_by_their_entries(site):
     site["soil"]["friction_angle"] = 432
     site["boulder"]["heights"] = "3 m"

@@ -52,6 +52,8 @@ def test_other_vehicles_have_mass_and_speed_and_ask_for_what_is_not_published(tm
 def test_every_entry_is_in_it_and_every_optional_line_holds(tmp_path, units):
     text = starter("new", units=units)
     path = tmp_path / "new.yaml"
+    assert "# table: yard.csv" in text
+    assert "# log: borehole.csv" in text
     for field in FIELDS:
         (line,) = re.findall(rf"^  (?:# )?{field.key}: \S.*# {re.escape(field.meaning)}$", text, re.MULTILINE)
         if line.startswith("  #"):

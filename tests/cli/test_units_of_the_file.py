@@ -114,20 +114,27 @@ def test_a_list_of_designs_is_shown_in_the_units_of_its_heights():
 @pytest.mark.parametrize(
     ("before", "after", "what"),
     [
-        ("width: 6 ft", "width: 6", "'6' has no unit, and 'units: us' asks for one; did you mean 6 ft?"),
+        ("mass: 15000 lb", "mass: 15000", "'15000' has no unit; this file is in US units: write 15000 lb or 15000 kg"),
+        ("width: 6 ft", "width: 6", "'6' has no unit; this file is in US units: write 6 ft or 6 m"),
         ("[10 ft, 11 ft]", "[10, 11]", "'10' has no unit"),
         ("[10 ft, 11 ft]", "{from: 10, to: 11, count: 2}", "'10' has no unit"),
-        ("mass: 15000 lb", "mass: {mean: 15000, cov: 5 %}", "did you mean 15000 lb?"),
-        ("water_table: 6 ft", "water_table: 6", "did you mean 6 ft?"),
+        ("mass: 15000 lb", "mass: {mean: 15000, cov: 5 %}", "write 15000 lb or 15000 kg"),
+        ("water_table: 6 ft", "water_table: 6", "write 6 ft or 6 m"),
     ],
 )
-def test_with_us_units_a_bare_number_with_a_dimension_is_refused(before, after, what):
+def test_in_us_units_or_in_feet_a_bare_number_with_a_dimension_is_refused(before, after, what):
     text = FEET.replace(before, after)
-    assert load_text(text, Path("some.yaml")).n_designs > 0
-    with pytest.raises(SettingsError) as refused:
-        load_text(f"{text}units: us\n", Path("some.yaml"))
-    assert what in refused.value.problems[0].message
-    assert refused.value.problems[0].line == text[: text.index(after)].count("\n") + 1
+    assert load_text(f"{text}units: si\n", Path("some.yaml")).n_designs > 0
+    for units in ("units: us\n", *([""] if "10 ft" in text else [])):
+        with pytest.raises(SettingsError) as refused:
+            load_text(text + units, Path("some.yaml"))
+        assert what in refused.value.problems[0].message
+        assert refused.value.problems[0].line == text[: text.index(after)].count("\n") + 1
+
+
+def test_a_height_in_feet_behind_an_option_says_nothing_of_the_file():
+    text = FEET.replace("[10 ft, 11 ft]", "3.4").replace("width: 6 ft", "width: 1.8")
+    assert load_text(text, Path("some.yaml"), ["boulder.height=11 ft"]).n_designs == 1
 
 
 def test_angles_and_ratios_need_no_unit():

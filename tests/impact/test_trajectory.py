@@ -245,6 +245,22 @@ def test_a_mapping_that_lacks_something_is_refused() -> None:
         simulate({"boulder_length_m": 1.0})
 
 
+@pytest.mark.parametrize(
+    ("key", "meant"),
+    [("hieght", "boulder_height_m"), ("speed", "impact_speed_m_s"), ("hood_hieght_m", "hood_height_m")],
+)
+def test_a_key_that_is_nearly_a_column_is_refused_and_labels_are_not(key: str, meant: str) -> None:
+    row = from_sweep_inputs(boulder_sweep.load(CONFIGS / "crash_tests.yaml"))
+    assert simulate(row | {"boulder_id": 3, "remark": "dry"}).summary() == simulate(row).summary()
+    with pytest.raises(ValueError, match=f"'{key}' is no column of a design; did you mean {meant}\\?"):
+        simulate(row | {key: 3.0})
+
+
+def test_a_step_in_words_is_refused() -> None:
+    with pytest.raises(TypeError, match="step_s must be a number of seconds, not '4 ms'"):
+        simulate(crash_test("rwg"), step_s="4 ms")  # a string as people write it
+
+
 def test_readings_soil_step_and_horizon_can_be_changed() -> None:
     sweep = crash_test("rwg")
     single = simulate(sweep, readings=ReadingChoice(impact_arm="printed"))

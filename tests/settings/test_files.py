@@ -64,6 +64,12 @@ def test_files_that_are_none(tmp_path, make, words):
     assert "\n" not in message
 
 
+def test_a_list_of_designs_in_the_place_of_settings_is_told_where_it_belongs(tmp_path):
+    path = tmp_path / "yard.csv"
+    path.write_text("boulder_height_m\n3\n")
+    assert _error(path).endswith("with what its columns do not give: table: yard.csv")
+
+
 @pytest.mark.parametrize("name", ["a\x00b", "x" * 5000])
 def test_impossible_names(name):
     assert "cannot be opened" in _error(name)

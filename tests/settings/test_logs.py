@@ -155,6 +155,9 @@ def test_a_url_is_opened_as_that_of_a_list_of_designs(site, tmp_path):
         ("50/75mm", "50/75mm"),
         ("5-6", "5-6"),
         ("R", "R"),
+        ("WOH", "0"),
+        ("woh/18 in", "0"),
+        ("WR-WOH-2", "2"),
         (">50", ">50"),
         ("-", ""),
     ],
@@ -203,6 +206,18 @@ def test_the_energy_of_the_file_counts_before_that_of_the_settings(site):
 @pytest.mark.parametrize(("column", "name"), [("N60", "n"), ("(N1)60", "n1_60")])
 def test_corrected_counts_need_no_energy(site, column, name):
     assert readings_of(site("log: log.csv", "log.csv", table(f"Depth (m),{column}", COUNTS)), name) == COUNTS
+
+
+def test_an_energy_that_is_no_share_is_told_the_percent(refusal):
+    problem = refusal("log.csv", table("Depth (m),N", COUNTS), "log: FILE\n  energy_ratio: 70")
+    assert problem.message == "energy_ratio: 70 is outside the admitted range of 0.3 to 1 (60 % is usual); write 70 %"
+
+
+def test_one_count_is_no_plural(site):
+    words = derived_words(
+        site("log: log.csv\n  energy_ratio: 60 %", "log.csv", table("Depth (m),N", [(1, 20)])).derived
+    )
+    assert "by 1 blow count at 0 to" in words[0]
 
 
 def test_what_is_not_used_is_said_in_one_line(site):
@@ -508,8 +523,8 @@ CUT = gef(CONE)[: gef(CONE).rindex("0.02")]
         ("log.csv", "", "is empty", 5),
         ("log.csv", b"\xff\xfe\x00\x01", "is not UTF-8 text", 5),
         ("log.csv", "Depth (m),N\n", "has no rows with a depth and a reading", 5),
-        ("log.csv", "Depth,N\n1,20\n", "the unit is missing; write Depth (m)", 1),
-        ("log.csv", "Depth (m),qc\n1,20\n", "the unit is missing; write qc (MPa)", 1),
+        ("log.csv", "Depth,N\n1,20\n", "the unit is missing; write Depth (m) or Depth (ft)", 1),
+        ("log.csv", "Depth (m),qc\n1,20\n", "the unit is missing; write qc (MPa) or qc (tsf)", 1),
         ("log.csv", "Depth (m),qc (kN)\n1,20\n", "q_c: ", 1),
         ("log.csv", "Depth (m),Blows (per 100 mm)\n1,20\n", "needs a column of depth and one of N or q_c", 1),
         ("log.csv", "z (m),N\n1,20\n", "needs a column of depth and one of N or q_c", 1),  # may be an elevation
@@ -517,8 +532,8 @@ CUT = gef(CONE)[: gef(CONE).rindex("0.02")]
         ("log.csv", "Depth (m),N60\n1,abc\n", "'abc' is not a number", 2),
         ("log.csv", "Depth (m),N60\n1,5-6\n", "'5-6'", 2),
         ("log.csv", "Depth (m),N60\n1,nan\n", "'nan' is not a finite number", 2),
-        ("log.csv", "Depth (m),N60\n-1,20\n", "depth: -1 m is outside", 2),
-        ("log.csv", "Depth (m),qc (MPa)\n1,9\n2,-999.99\n", "q_c: -999.99 MPa is outside", 3),
+        ("log.csv", "Depth (m),N60\n-1,20\n", "depth: -1 m must be 0 or more", 2),
+        ("log.csv", "Depth (m),qc (MPa)\n1,9\n2,-999.99\n", "q_c: -999.99 MPa must be 0 or more", 3),
         ("log.csv", "Depth (m),qc (kPa)\n1,9000\n2,9e6\n", "q_c: 9000 MPa is outside", 3),
         ("log.gef", gef([(0.5, 9), (1e9, 9)]), "depth: 1e+09 m is outside", 14),
         ("log.csv", "Depth (m),N60\nx,20\n", "depth: 'x' is not a number", 2),

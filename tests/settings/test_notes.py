@@ -85,6 +85,7 @@ ROCK = "boulder.rock=granite"
         ((ROCK,), "yard.csv: boulder.mass: by its mass a boulder fills 60% to 101% (stone_id 2) of the box"),
         ((ROCK,), "yard.csv:5: boulder.mass: stone_id 3 fills 1013% of the box of its sizes by its mass: above 115%"),
         ((ROCK,), "yard.csv:5: stone_id: 3 stands twice"),
+        (("table=named.csv", ROCK), "named.csv:5: Boulder: G03 stands twice"),
         (
             ("table=rates.csv", ROCK),
             "rates.csv:2: soil.strain_rate_factor: row 1: 5 is outside the usual range of 1 to",
@@ -97,6 +98,7 @@ def test_remarks_on_a_list_stand_at_its_rows(tmp_path, monkeypatch, overrides, n
     (tmp_path / "yard.csv").write_text(YARD)
     sides = "boulder_length_m,boulder_width_m,boulder_height_m"
     (tmp_path / "rates.csv").write_text(f"{sides},strain_rate_factor\n1.5,1.5,3,5\n")
+    (tmp_path / "named.csv").write_text(YARD.replace("stone_id", "Boulder").replace("\n3,", "\nG03,"))
     (tmp_path / "tape.csv").write_text("".join(f"{line.rpartition(',')[0]}\n" for line in YARD.splitlines()))
     (tmp_path / "yard.yaml").write_text(
         f"table: yard.csv\nboulder: {{}}\n{LIST.partition('density: 2596 kg/m^3}')[2]}".replace(

@@ -114,8 +114,8 @@ def test_units_in_any_common_form(load_with, override, column, expected):
         ("boulder.length=", "is empty"),
         ("boulder.length=~", "is empty"),
         ("boulder.length=null", "is empty"),
-        ("boulder.length=-1.65 m", "-1.65 m is outside the admitted range of 0.01 to 20 m"),
-        ("boulder.length=80 ft", "80 ft is outside the admitted range of 0.0328084 to 65.6168 ft"),
+        ("boulder.length=-1.65 m", "-1.65 m must be more than 0"),
+        ("boulder.length=80 ft", "80 ft is outside the admitted range of 0.0328 to 65.6 ft"),
         ("boulder.length='80  ft'", "80 ft is outside"),
         ("boulder.length=[5, 80] ft", "80 ft is outside"),
         ("site.embedment_ratio=110 %", "110 % is outside the admitted range of 0.0001 to 100 %"),
@@ -128,7 +128,10 @@ def test_units_in_any_common_form(load_with, override, column, expected):
         ("vehicle.mass=5 ft 6 in", "'ft' is a length; a mass is needed"),
         ("soil.friction_angle=34, 38 deg", "write a list in brackets, such as [34, 38] deg"),
         ("soil.friction_angle=34; 38", "write a list in brackets"),
-        ("vehicle.mass=-6800", "outside the admitted range"),
+        ("vehicle.mass=-15000 lb", "-15000 lb must be more than 0"),
+        ("vehicle.speed=-30 mph", "-30 mph must be 0 or more"),
+        ("vehicle.speed=300 mph", "300 mph is outside the admitted range of 0 to 224 mph (up to 360 km/h)"),
+        ("site.embedment_ratio=55", "0.55 or 55 %); write 55 %"),
         ("soil.friction_angle=0", "outside the admitted range of 1 to 60 deg"),
         ("site.embedment_ratio=55", "0.55 or 55 %"),
         ("model.soil={elements: 0}", "whole number from 1 to 1000000"),
@@ -144,7 +147,7 @@ def test_units_in_any_common_form(load_with, override, column, expected):
         ("criterion.max_rotation=20 m", "an angle is needed"),
         ("solver.accuracy=blanced", "did you mean balanced?"),
         ("solver.accuracy=0.01 deg", "is not an accuracy: fast, balanced, fine"),
-        ("solver.horizon=-1", "outside the admitted range"),
+        ("solver.horizon=-1", "must be more than 0"),
         ("solver.horizon=1 m", "a time is needed (s or ms)"),
         ("solver.step=2 s", "admitted range"),
         ("name=a/b", "letters, digits"),
@@ -370,8 +373,8 @@ def test_what_makes_no_sense_is_refused(the_problem, text, words):
 
 
 def test_both_ends_of_a_range_are_reported(problems_of, minimal):
-    problems = problems_of(minimal.replace("height: 3.44", "height: {from: -1, to: 100, count: 2}"))
-    assert [(problem.line, problem.column) for problem in problems] == [(4, 18), (4, 26)]
+    problems = problems_of(minimal.replace("height: 3.44", "height: {from: 0, to: 100, count: 2}"))
+    assert [(problem.line, problem.column) for problem in problems] == [(4, 18), (4, 25)]
     assert all("admitted range of 0.01 to 20 m" in problem.message for problem in problems)
 
 

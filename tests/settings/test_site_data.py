@@ -483,6 +483,8 @@ def test_a_test_that_was_given_up_has_at_least_its_blows(site, key, written, lea
         ("n: 50/75, energy_ratio: 60 %, depth: 2 m", "5:12", "write it as in 50/75mm"),
         ("n: 50/450mm, energy_ratio: 60 %, depth: 2 m", "5:12", "is no count of the last 300 mm (1 ft)"),
         ("n: 50/75 kg, energy_ratio: 60 %, depth: 2 m", "5:12", "a length is needed"),
+        ("n: WOH, energy_ratio: 60 %, depth: 2 m", "5:8", "(N1)60 is 0; the correlation holds from"),
+        ("n: 20, energy_ratio: 70, depth: 2 m", "5:30", "energy_ratio: 70 is outside the admitted range of 0.3 to 1"),
         ("n: X, energy_ratio: 60 %, depth: 2 m", "5:12", "'X' is not a number"),
         ("n1_60: R", "5:16", "'R' is not a number"),
         ("n: >50, energy_ratio: 60 %, depth: 2 m", "5:12", "put the text in quotation marks"),

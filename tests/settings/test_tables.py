@@ -113,7 +113,7 @@ def test_cells_are_reported_with_line_and_column_all_at_once(messages_of):
         "designs.csv:2:7: boulder_width_m: 'x' is not a number",
         "designs.csv:3:11: boulder_height_m: 'nan' is not a finite number",
         "designs.csv:3:15: embedment_depth_m: is empty",
-        "designs.csv:4:6: boulder_width_m: -1 m is outside the admitted range of 0.01 to 20 m",
+        "designs.csv:4:6: boulder_width_m: -1 m must be more than 0",
         "designs.csv:5:1: has 2 cells; the first line has 4",
         "designs.csv:6: boulder_height_m: '3,44' is not a plain number; write 3.44",
         "designs.csv:6: boulder_length_m: '1.65 m' is not a plain number; a unit belongs in the column's name",
@@ -221,6 +221,8 @@ def test_mistakes_of_one_kind_are_counted(messages_of):
     ("name", "value", "column", "expected"),
     [
         ("boulder_length_ft", "5.5", "boulder_length_m", 1.6764),
+        ("Width [ft]", "5", "boulder_width_m", 1.524),
+        ("Mass (t)", "15.2", "boulder_mass_kg", 15200.0),
         ("boulder_density_pcf", "162", "boulder_density_kg_m3", 162 * 0.45359237 / 0.3048**3),
         ("boulder_density_lb_ft3", "162", "boulder_density_kg_m3", 162 * 0.45359237 / 0.3048**3),
         ("soil_density_kN_m3", "18.2", "soil_density_kg_m3", 18200 / 9.80665),
@@ -250,8 +252,9 @@ def test_a_column_may_be_in_any_unit_that_fits(load_table, name, value, column, 
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("Length (m)", "did you mean boulder_length_m?"),
-        ("mass [t]", "did you mean boulder_mass_t?"),
+        ("Length (m)", "gives the same as column boulder_length_m"),
+        ("mass t", "did you mean boulder_mass_t?"),
+        ("Width (kg)", "is not an input"),
         ("boulder_lenght_ft", "did you mean boulder_length_ft?"),
         ("boulder_lenght_m", "did you mean boulder_length_m?"),
         ("impact_spede_mph", "did you mean impact_speed_mph?"),
@@ -269,6 +272,16 @@ def test_columns_of_numbers_that_are_not_used(messages_of, name, words):
     messages = messages_of(HEADER.replace("\n", f",{name}\n") + "1,1,2,1,7\n")
     assert words in messages[0]
     assert not any(" _m?" in message for message in messages)
+
+
+@pytest.mark.parametrize("name", ["rock", "boulder_rock", "Rock type"])
+def test_a_column_of_rock_is_refused_unless_there_is_one_of_density(messages_of, load_table, name):
+    rows = f"{HEADER[:-1]},{name}\n1,1,2,1,granite\n1,1,2,1,limestone\n"
+    (message,) = messages_of(rows)
+    assert message.startswith(f"designs.csv:1:{len(HEADER) + 1}: {name}: is not read")
+    assert message.endswith("write a list for each kind of rock, or add a column boulder_density_kg_m3")
+    dense = rows.replace(f",{name}", f",{name},boulder_density_pcf").replace("ite", "ite,165").replace("one", "one,159")
+    assert [*load_table(dense, grid=GRID.replace("density: 2600", "", 1)).table.labels] == [name]
 
 
 def test_text_is_carried_along(load_table):
@@ -316,6 +329,8 @@ def test_files_that_are_not_opened(messages_of, tmp_path, content, name, message
     assert message in found
 
 
+MISSING = "is required and missing; give it here or as column boulder_height_m of designs.csv"
+ONE_VALUE = "must be one value beside a table; lists and ranges are axes of a grid"
 BOTH = "give embedment_ratio or embedment_depth, not both"
 GIVEN = "boulder.height: is given here and as column boulder_height_m of the table"
 
@@ -329,10 +344,13 @@ GIVEN = "boulder.height: is given here and as column boulder_height_m of the tab
             "2600, height: 3}}\nsite: {{embedment_ratio: 0.5}}\n",
             [f"2:26: {GIVEN}", f"3:1: site.embedment_depth: {BOTH}"],
         ),
-        (HEADER + ROWS, "13.4", "[13.4, 20]", ["4:30: vehicle.speed: must be one value beside a table"]),
+        (
+            *(HEADER + ROWS, "13.4", "[25, 30] mph"),
+            [f"4:30: vehicle.speed: {ONE_VALUE}: ask once for each value, --set vehicle.speed='25 mph'"],
+        ),
         (
             "boulder_length_m,boulder_width_m,embedment_depth_m\n1,1,1\n",
-            *("", "", ["2:1: boulder.height: is required and missing"]),
+            *("", "", [f"2:1: boulder.height: {MISSING}"]),
         ),
     ],
 )
@@ -341,6 +359,15 @@ def test_table_and_file_give_every_input_once(messages_of, content, old, new, me
     assert len(found) == len(messages)
     for one, message in zip(found, messages, strict=True):
         assert one.startswith(f"grid.yaml:{message}")
+
+
+def test_masses_that_are_all_too_large_have_their_place_in_the_list(messages_of):
+    text = "boulder_length_m,boulder_width_m,boulder_height_m,boulder_mass_t,embedment_depth_m\n"
+    (message,) = messages_of(f"{text}1.5,1.6,2.5,16000,1.2\n1.5,1.6,2.5,12700,1.2\n")
+    assert message.startswith("designs.csv:3: boulder_mass_t: 1.27e+07 kg is 814.10 times the mass of a solid box")
+    assert message.endswith("; a thousandth of it fits: is it in kg and not in t, or in lb and not in kip?")
+    (message,) = messages_of(f"{text}1.5,1.6,2.5,160,1.2\n")
+    assert "thousandth" not in message
 
 
 def test_a_relative_name_begins_at_the_file_and_behind_set_at_the_working_directory(tmp_path, monkeypatch, load_table):
@@ -383,7 +410,7 @@ def test_mistakes_in_parquet(write_parquet, messages_of):
     assert len(messages) == 6
     for start in (
         "designs.parquet: margin: is an outcome of a run",
-        "designs.parquet: boulder_length_m: row 2: -2 m is outside",
+        "designs.parquet: boulder_length_m: row 2: -2 m must be more than 0",
         "designs.parquet: boulder_width_m: holds text, not numbers",
         "designs.parquet: boulder_height_m: has 1 empty cells",
         *(f"designs.parquet: embedment_depth_m: row {row}: is not a finite number" for row in (1, 2)),

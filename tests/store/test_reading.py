@@ -74,6 +74,8 @@ def test_some_columns(out):
     frame = read(str(out), columns=["margin", "design_id"])
     assert list(frame.columns) == ["margin", "design_id"]
     assert frame.attrs["units"] == {"margin": "1", "design_id": ""}
+    with pytest.raises(TypeError, match=r"columns must be a list of names, such as \['margin'\]"):
+        read(str(out), "margin")
     with pytest.raises(ValueError, match=r"has no column 'nope'; its columns are design_id, "):
         read(out, columns=["margin", "nope"])
 
