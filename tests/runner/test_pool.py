@@ -79,10 +79,10 @@ def test_a_failure_on_a_cluster_is_told_in_one_line(fails, words):
 
 def test_a_cluster_of_others_is_used_and_no_client_becomes_the_default():
     with (
-        LocalCluster(processes=False, n_workers=1, threads_per_worker=2, dashboard_address="127.0.0.1:0") as there,
+        LocalCluster(processes=False, n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0") as there,
         cluster(None, there.scheduler_address) as workers,
     ):
-        assert workers.jobs == 2
+        assert workers.jobs == 1
         assert list(workers([call(times, 4)])) == [8]
         with pytest.raises(ValueError, match="No client"):
             default_client()
