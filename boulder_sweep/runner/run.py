@@ -159,7 +159,6 @@ def run(
     if resume and overwrite:
         raise failures.StoreError("--resume and --overwrite cannot be used together")
     sweep = at_values(sweep)
-    sweep.need_depth()
     check_backend(backend, scheduler)
     again = resuming(sweep, out, jobs, backend, scheduler)
     jobs = jobs or (1 if sweep.n_designs == 1 else available_cores())
@@ -450,7 +449,6 @@ def estimate(
     """
     check_jobs(jobs)
     sweep = at_values(sweep)
-    sweep.need_depth()
     plan = _planned(sweep, simulate)
     if resume and out is not None:
         plan.there = _same(plan, location_of(out))

@@ -11,13 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from boulder_kernels import Status
 from boulder_sweep.columns import OUTCOME_COLUMNS, REASONS, VERDICTS
 from boulder_sweep.judge.accuracy import accuracy_of, control_of, readings_of
 from boulder_sweep.judge.evaluation import by_kernels, evaluation_of
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.judged import ERROR, PASS, joined, not_computed, worst_of
 from boulder_sweep.store.part import verdict_counts
-from tests.runner.grids import grid, grid_of, partly_impossible, plausible
+from tests.runner.grids import grid, grid_of, partly_impossible, plausible, settled
 
 
 def test_the_kernels_get_si_and_radians():
@@ -43,6 +44,8 @@ def test_readings_and_control_are_those_of_the_settings():
     longer = replace(sweep, solver=replace(sweep.solver, horizon_s=2.0, accuracy="balanced", step_s=None))
     assert (control.horizon, control_of(longer, accuracy_of(longer)).longest_horizon) == (1.0, 20.0)
     assert control.theta_limit == pytest.approx(np.radians(10.0))
+    alone = replace(sweep, solver=replace(sweep.solver, horizon_s=2.0))  # of second opinions, which go on all the same
+    assert evaluation_of(alone, accuracy_of(alone)).longest_s == 20.0
 
 
 def test_impossible_rows_never_enter_the_kernels_and_keep_their_place():
@@ -76,6 +79,25 @@ def test_a_pass_of_several_cases_stands_under_what_all_of_them_do():
         columns = {name: np.broadcast_to(value, 3).astype(own[name].dtype) for name, value in given.items()}
         cases.append(replace(own, columns=own.columns | columns))
     assert worst_of(cases)["stands_under"].tolist() == [0, 1, -1]
+
+
+def test_a_margin_counts_where_the_boulder_stands_below_the_reduced_limit_too():
+    """Where the subgrade is soft it turns further than was simulated until its verdict was proved."""
+    sweep = grid()
+    block = sweep.block(0, sweep.n_designs)
+
+    def simulate(table, readings, control):
+        found = settled(table, readings, control)
+        if control.theta_limit < np.radians(19.0):
+            found.status[table.beta < 50.0] = Status.LIMIT
+        return found
+
+    evaluation = evaluation_of(sweep, accuracy_of(sweep), simulate)
+    plain, careful = evaluation(block), replace(evaluation, least_margin=0.4)(block)
+    soft = (block.columns["subgrade_reaction_MN_m3"].to_numpy() < 50.0) & (plain.verdict == PASS)
+    assert 0 < np.count_nonzero(soft) < np.count_nonzero(plain.verdict == PASS)
+    assert np.array_equal(careful.verdict, plain.verdict)
+    assert np.array_equal(careful["margin"], np.where(soft, np.nextafter(0.4, 0.0), plain["margin"]), equal_nan=True)
 
 
 def test_a_block_of_impossible_rows_only():

@@ -245,6 +245,14 @@ def test_the_vehicle_strikes_the_near_face_of_an_outline_at_the_impact_height():
     table = designs.table
     shaped = designs._replace(table=with_soil(table, "kp_squared", Ground(), shape=tapered(0.5)))
     assert shaped.length == pytest.approx(table.L * (1.0 - (table.d + table.e) / table.H / 4.0))
+    assert shaped.narrowest == pytest.approx(0.5 * table.W)
+
+
+def test_where_a_boulder_is_narrowest_does_not_depend_on_its_neighbours():
+    sweep = sweep_of(f"mass: [{0.6 * 2600 * BOX}, {2600 * BOX}] kg, density: 2600 kg/m^3")
+    designs = designs_of(sweep.block(0, 2), model=sweep.model)
+    assert designs.taped.tolist() == [True, False]
+    assert designs.narrowest[0] < 1.5 < designs.narrowest[1] == 1.68
 
 
 def test_a_small_foot_is_never_a_pass(tmp_path):

@@ -48,6 +48,13 @@ def test_costs_grow_with_the_work_by_a_fixed_table(changes, model, cost_us):
     assert planned(sweep, evaluation).rows == 441
 
 
+def test_a_row_whose_steps_end_at_the_yield_costs_three_times_as_much():
+    sweep = grid()
+    sweep = replace(sweep, solver=replace(sweep.solver, accuracy="fine", step_s=None))
+    evaluation = evaluation_of(sweep, accuracy_of(sweep), plausible)
+    assert seconds_per_row(sweep, evaluation) == pytest.approx(1e-6 * (3 * 5 + 10))
+
+
 def test_a_range_takes_the_work_that_it_should():
     sweep = grid_of(10**6)
     evaluation = evaluation_of(sweep, accuracy_of(sweep), plausible)

@@ -9,8 +9,8 @@ from distributed import LocalCluster, default_client
 
 from boulder_sweep.errors import BackendError, QuestionError
 from boulder_sweep.runner.pool import Pool, call, cluster
-from boulder_sweep.runner.run import estimate
-from tests.runner.grids import grid_of
+from boulder_sweep.runner.run import estimate, run
+from tests.runner.grids import grid_of, plausible
 
 
 def times(number, *, by=2):
@@ -77,13 +77,15 @@ def test_a_failure_on_a_cluster_is_told_in_one_line(fails, words):
         list(workers([call(globals()[fails], 1)]))
 
 
-def test_a_cluster_of_others_is_used_and_no_client_becomes_the_default():
+def test_a_cluster_of_others_is_used_and_no_client_becomes_the_default(tmp_path):
     with (
-        LocalCluster(processes=False, n_workers=1, threads_per_worker=2, dashboard_address="127.0.0.1:0") as there,
+        LocalCluster(processes=False, n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0") as there,
         cluster(None, there.scheduler_address) as workers,
     ):
-        assert workers.jobs == 2
+        assert workers.jobs == 1
         assert list(workers([call(times, 4)])) == [8]
+        how = {"backend": "dask", "scheduler": there.scheduler_address, "simulate": plausible}
+        assert run(grid_of(10), tmp_path / "out", jobs=3, **how).jobs == 1
         with pytest.raises(ValueError, match="No client"):
             default_client()
 

@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import duckdb
@@ -48,6 +49,7 @@ def test_summary(finished):
     assert summary.verdicts["pass"] > 20
     assert summary.verdicts["fail"] > 20
     assert summary.exit_code == 0
+    assert replace(summary, rows_computed=30, seconds=0.5).rows_per_second == 60.0
     assert summary.bytes == sum(len(content) for content in part_files(out).values())
     json.dumps(summary.to_dict())
 
@@ -169,6 +171,13 @@ def test_output_that_exists_is_refused_unless_told(finished):
     with pytest.raises(StoreError, match="cannot be used together"):
         run(grid(), out, resume=True, overwrite=True)
     assert part_files(out) == before
+
+
+def test_output_that_is_unfinished_is_refused_with_how_to_continue_it(tmp_path):
+    run(grid(), tmp_path / "out", simulate=plausible)
+    min((tmp_path / "out").iterdir()).unlink()
+    with pytest.raises(OutputExistsError, match="holds 331 of 441 rows: use --resume"):
+        run(grid(), tmp_path / "out", simulate=plausible)
 
 
 def test_resuming_a_finished_run_computes_nothing(finished):
