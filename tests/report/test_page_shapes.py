@@ -85,12 +85,13 @@ def check_answer(page, table):
     passing = table.verdict == "pass"
     if len(table) == 1:
         said, first = page.inner_text(".sheet"), table.iloc[0]
-        chance = "p_pass" in table
-        enough = first.p_pass >= 0.95 if chance else first.verdict == "pass" and first.margin >= 0.25
+        if "p_pass" in table:  # nobody asked how probable it must be
+            assert f"The boulder passes with a probability of {first.p_pass:.1%} (" in said
+            return
+        enough = first.verdict == "pass" and first.margin >= 0.25
         assert ("bury the boulder" in said.lower(), "The boulder does not pass" in said) == (enough, not enough)
         if enough:
-            says = f"{100 * first.p_pass:.1f}\u00a0%" if chance else f"{100 * first.margin:.0f}\u00a0% to spare"
-            assert says in said
+            assert f"{100 * first.margin:.0f}\u00a0% to spare" in said
         return
     said = page.inner_text(".answer")
     counts = re.search(r"^(\d+) of (\d+) designs pass(?:es)? \((.*)%\)", said, re.MULTILINE)

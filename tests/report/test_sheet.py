@@ -457,10 +457,19 @@ def test_no_words_of_a_drawing_are_cut_at_its_frame(tmp_path: Path, opened: Any)
         })
     """)
     assert cut == [[], []]
-    for whole in (
-        ".chosen",
-        ".settings span",
-    ):  # no heading parts from its figures, no name from its value
+    touching = page.evaluate("""
+        [...document.querySelectorAll(".sheet tr")].filter((row) => {
+            const boxes = [...row.cells].filter((cell) => cell.textContent.trim()).map((cell) => {
+                const words = document.createRange();
+                words.selectNodeContents(cell);
+                return words.getBoundingClientRect();
+            });
+            return boxes.some((box, k) => k > 0 && box.left < boxes[k - 1].right + 2);
+        }).map((row) => row.textContent)
+    """)
+    assert touching == []
+    # No heading parts from its figures, no name from its value.
+    for whole in (".chosen", ".settings span"):
         assert page.evaluate(f"getComputedStyle(document.querySelector('{whole}')).breakInside") == "avoid"
     assert "step_s: not given" in page.locator(".settings span").all_text_contents()[-2]
 
