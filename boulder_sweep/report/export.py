@@ -180,7 +180,7 @@ def _without_tried(table: pa.Table, answers: Need) -> pa.Table:
     import pyarrow.compute as pc
 
     names, key = table.column_names, answers.key.name
-    tried = {key, *answers.derived, *names[names.index("passes_within") :]}
+    tried = {key, *answers.derived, *names[names.index("passes_within") :]} - {*answers.sweep.plan.labels}
     tried -= set() if key.startswith("boulder_") else {BOULDER_MASS}
     passes = table["passes_at"].is_valid()
     told = pc.or_(passes, pc.equal(table["verdict"].cast("string"), "error"))  # why a row cannot be computed

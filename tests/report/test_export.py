@@ -450,6 +450,17 @@ def place_of_tried(name, column):
     return name == "need" and column in {"embedment_depth_m", "impact_height_m", *built, *OUTCOME_COLUMNS}
 
 
+def test_boulders_of_a_list_keep_their_names_where_none_passes(tmp_path):
+    (tmp_path / "yard.csv").write_text("boulder_id,boulder_height_m\nlow,2.6\nhigh,3.4\n")
+    listed = ONE_SITE.replace("SPEED", "30 mph").replace("height: [2.6, 3.2, 3.4] m, ", "")
+    answers = bare_need(load_text(f"table: yard.csv\n{listed}", tmp_path / "yard.yaml"))
+    answers.write(tmp_path / "yard.parquet")
+    export(tmp_path / "yard.parquet", tmp_path / "out.csv")
+    found = pd.read_csv(tmp_path / "out.csv")
+    assert list(found["found"]) == ["blocked_by_overlap", "found"]
+    assert list(found["boulder_id"]) == ["low", "high"]
+
+
 @pytest.mark.parametrize("name", ["need", "capacity", "uncertainty", "simulate"])
 @pytest.mark.parametrize("kind", ["csv", "xlsx", "parquet"])
 def test_files_of_answers_are_exported_like_results(answers, tmp_path, name, kind):
