@@ -253,13 +253,10 @@ def outside(value: float, field: Field, written: str = "") -> str:
     bound = field.admitted
     if bound is None or bound.low <= value <= bound.high:
         return ""
-    given = describe(value, field.unit, written)
-    if value < 0.0 <= bound.low:
-        return f"{given} must be {'more than 0' if bound.low > 0.0 else '0 or more'}"
-    low, high = range_words(bound.low, bound.high, field.unit, written, digits=3).split(" to ")
+    low, high = range_words(bound.low, bound.high, field.unit, written).split(" to ")
     as_percent = field.unit == "1" and not written and bound.low <= value / 100.0 <= bound.high <= 1.0
     remedy = f"; write {value:g} %" if as_percent else ""
-    return OUTSIDE.format(value=given, low=low, high=high, reason=bound.reason) + remedy
+    return OUTSIDE.format(value=describe(value, field.unit, written), low=low, high=high, reason=bound.reason) + remedy
 
 
 def is_unusual(values: np.ndarray, field: Field) -> np.ndarray:

@@ -50,7 +50,7 @@ def test_what_is_read(load_it) -> None:
         (f"layers: [{DEEPER.replace('36 deg', '{mean: 36, cov: 0.1}')}]", "7:60", "takes one value here"),
         (f"layers: [{DEEPER.replace('0.5 m', '0 m')}]", "7:19", "outside the admitted range"),
         ("cohesion: [2, 4]", "7:13", "takes one value here, not a list or a range"),
-        ("water_table: -1 m", "7:16", "-1 m must be 0 or more"),
+        ("water_table: -1 m", "7:16", "outside the admitted range"),
         ("slope: 38 deg", "7:3", "must be less than every friction angle (the least is 38 deg)"),
     ],
 )

@@ -34,7 +34,7 @@ criterion: {rating: P4}
 
 EXPECTED = [
     (3, 3, "boulder.lenght", "did you mean length?"),
-    (4, 10, "boulder.width", "-1.68 m must be more than 0"),
+    (4, 10, "boulder.width", "-1.68 m is outside the admitted range of 0.01 to 20 m"),
     (5, 42, "boulder.height", "goes downwards and the step does not"),
     (6, 12, "boulder.density", "a density is needed (kg/m^3, t/m^3, pcf or kN/m^3)"),
     (8, 31, "site.embedment_ratio", "'.nan' is not a finite number"),

@@ -113,7 +113,7 @@ def test_cells_are_reported_with_line_and_column_all_at_once(messages_of):
         "designs.csv:2:7: boulder_width_m: 'x' is not a number",
         "designs.csv:3:11: boulder_height_m: 'nan' is not a finite number",
         "designs.csv:3:15: embedment_depth_m: is empty",
-        "designs.csv:4:6: boulder_width_m: -1 m must be more than 0",
+        "designs.csv:4:6: boulder_width_m: -1 m is outside the admitted range of 0.01 to 20 m",
         "designs.csv:5:1: has 2 cells; the first line has 4",
         "designs.csv:6: boulder_height_m: '3,44' is not a plain number; write 3.44",
         "designs.csv:6: boulder_length_m: '1.65 m' is not a plain number; a unit belongs in the column's name",
@@ -410,7 +410,7 @@ def test_mistakes_in_parquet(write_parquet, messages_of):
     assert len(messages) == 6
     for start in (
         "designs.parquet: margin: is an outcome of a run",
-        "designs.parquet: boulder_length_m: row 2: -2 m must be more than 0",
+        "designs.parquet: boulder_length_m: row 2: -2 m is outside the admitted range of 0.01 to 20 m",
         "designs.parquet: boulder_width_m: holds text, not numbers",
         "designs.parquet: boulder_height_m: has 1 empty cells",
         *(f"designs.parquet: embedment_depth_m: row {row}: is not a finite number" for row in (1, 2)),
