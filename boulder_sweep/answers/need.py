@@ -242,13 +242,13 @@ def _answered(
     progress: ProgressCallback | None,
 ) -> Need:
     """Return the answers to a question; arguments: see `need`."""
-    judges, key = asked.judges, asked.key
+    judges, key, pool = asked.judges, asked.key, Pool(jobs)
     judges.final.asked().warm_up()
     done = _Progress(progress, asked)
     shared = max(-(-asked.count // (jobs or os.cpu_count() or 1)), WORTH_A_THREAD)
     pieces = list(ranges(asked.count, min(asked.rows_at_once, shared)))
     tables, simulated = [], 0
-    for table, count in Pool(jobs)(call(_table_of, asked, start, stop) for start, stop in pieces):
+    for table, count in pool(call(_table_of, asked, start, stop) for start, stop in pieces):
         tables.append(table)
         simulated += count
         done.answered(len(table))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import re
 import shutil
 import subprocess
 import tempfile
@@ -58,10 +57,6 @@ SETTLED_MS = (30_000, 120_000, 480_000)
 while the simulator is still being compiled. A page that was not ready is printed again, later."""
 UNREADY = "unready"
 """Title of a page to be printed until its script has filled it; the title stands in the PDF."""
-_TRAILER = re.compile(
-    rb"trailer\n<<(?P<entries>/Size \d+\n/Root \d+ 0 R\n/Info (?P<info>\d+) 0 R)>>\nstartxref\n(?P<at>\d+)\n%%EOF\s*$"
-)
-"""The end of a PDF as Chromium writes it."""
 
 
 def write_report(
@@ -149,7 +144,7 @@ def write_report(
         notes=[*notes, *_general_notes(settings, control, units)],
         units=units,
     )
-    return _written(target, text, heading.author or settings.get(SECTION, {}).get("author", ""))
+    return _written(target, text)
 
 
 def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str | None = None, command: str = "") -> Path:
@@ -288,7 +283,7 @@ def _facts(identity: Mapping[str, Any], command: str, out: str = "") -> list[tup
     return [*facts, *((name, printable(text)) for name, text in (("table", out), ("command", command)) if text)]
 
 
-def _written(page: Path, text: str, author: str = "") -> Path:
+def _written(page: Path, text: str) -> Path:
     """Write the page, or print it to PDF, as a whole or not at all.
 
     Raises
@@ -296,27 +291,13 @@ def _written(page: Path, text: str, author: str = "") -> Path:
     ReportError
         The system refuses it; or see `printed`.
     """
-    content = with_author(printed(text), author) if page.suffix.lower() == ".pdf" else text.encode()
+    content = printed(text) if page.suffix.lower() == ".pdf" else text.encode()
     try:
         with replacing(page) as file:
             file.write(content)
     except OSError as problem:
         raise ReportError(f"{page} cannot be written: {why(problem)}") from problem
     return page
-
-
-def with_author(pdf: bytes, author: str) -> bytes:
-    """Return a PDF that names its author, as Chromium does not: what is known of the document, once more at its end."""
-    known = _TRAILER.search(pdf)
-    begin = pdf.find(b"\n%s 0 obj" % known["info"]) + 1 if known and author else 0
-    if not known or not begin:
-        return pdf
-    end = pdf.index(b">>\nendobj", begin)
-    name = f"\ufeff{author}".encode("utf-16-be").hex().encode()
-    whole = pdf + b"\n" * (not pdf.endswith(b"\n"))
-    about = b"%s\n/Author <%s>>>\nendobj\n" % (pdf[begin:end], name)
-    table = b"xref\n%s 1\n%010d 00000 n \ntrailer\n<<%s\n/Prev %s>>\nstartxref\n%d\n%%%%EOF\n"
-    return whole + about + table % (known["info"], len(whole), known["entries"], known["at"], len(whole) + len(about))
 
 
 def browser() -> str:

@@ -286,6 +286,18 @@ IS_PLAIN = bool(SETTINGS.DISABLE_JIT)
 """Whether kernels stay plain Python: NUMBA_DISABLE_JIT is set."""
 LINE = 64
 """Bytes of a line of the fast memory."""
+
+
+def on_lines(size: int) -> np.ndarray:
+    """Return so many bytes, all zero, that begin on a whole line of the fast memory, uint8, shape (size,).
+
+    A vector that lies across two lines takes twice as long to load.
+    """
+    room = np.zeros(size + LINE, np.uint8)
+    first = -room.ctypes.data % LINE
+    return room[first : first + size]
+
+
 _LOCK = threading.RLock()
 announce: Callable[[str], contextlib.AbstractContextManager[Any]] = contextlib.nullcontext
 """Called with the name of a kernel when it must be compiled, which is done within what it returns."""

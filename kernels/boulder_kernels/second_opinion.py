@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import LINE, align_stack, by_types, inlined, is_none, kernel
+from ._jit import align_stack, by_types, inlined, is_none, kernel, on_lines
 from .design import Constants, Design, DesignTable, G, body_with, constants_of, corrected, design_in, is_computable
 from .dormand_prince import displacement_at, slope_at, time_of_limit, turning_point
 from .dynamics import BOX, empty_soil
@@ -545,10 +545,6 @@ def second_opinions(
     soil = None if layers is None else empty_soil(layers.shape[1], points, 0)
     designs = np.stack(table[: len(DesignTable._fields)])
     out = np.full((len(HeaveOutcome._fields), designs.shape[1]), np.nan)
-    kept = record or no_heave_record()
-    # On whole lines of the fast memory: what lies across two of them costs a tenth of the time.
-    room = np.empty(WORKSPACE + LINE // 8)
-    first = -room.ctypes.data % LINE // 8
-    work = room[first : first + WORKSPACE]
+    work, kept = on_lines(8 * WORKSPACE).view(np.float64), record or no_heave_record()
     run_second_opinions(designs, layers, outlines if points else None, soil, form, base, control, work, kept, out)
     return HeaveOutcome(out[0].astype(np.int8), *out[1:])

@@ -23,7 +23,6 @@ import numpy as np
 
 from ._jit import (
     IS_PLAIN,
-    LINE,
     align_stack,
     by_types,
     fields_of,
@@ -31,6 +30,7 @@ from ._jit import (
     is_none,
     kernel,
     load,
+    on_lines,
     plain,
     store,
     taken,
@@ -173,9 +173,7 @@ def empty_groups(pieces: int = 0, *, has_strength: bool = True, has_outline: boo
     Their vectors lie on whole lines of the fast memory.
     """
     kind = group_type(pieces, has_strength, has_outline)
-    room = np.zeros(2 * kind.itemsize + LINE, np.uint8)
-    first = -room.ctypes.data % LINE
-    return room[first : first + 2 * kind.itemsize].view(kind)
+    return on_lines(2 * kind.itemsize).view(kind)
 
 
 def field_of(group: Any, name: str) -> Any:

@@ -56,6 +56,11 @@ def test_overrides_are_a_list(site):
         boulder_sweep.load(site, "vehicle.speed=40 mph")
 
 
+def test_jobs_are_checked_before_anything_is_simulated(site):
+    with pytest.raises(TypeError, match="jobs must be a whole number, not str"):
+        boulder_sweep.need(site, jobs="2")
+
+
 def test_mistakes_of_a_mapping_are_named_by_their_entries(site):
     site["soil"]["friction_angle"] = 432
     site["boulder"]["heights"] = "3 m"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 from math import inf, isinf, nan, radians
 from typing import Any
 
@@ -31,11 +32,13 @@ from boulder_kernels.pieces import PiecewiseTable, table_in_layers, uniform_laye
 from boulder_kernels.runge_kutta import WORKSPACE
 from boulder_kernels.second_opinion import (
     CAUTION,
+    Equilibrium,
     HeaveControl,
     HeaveOutcome,
     HeaveRecord,
     kinetic_energy,
     least_energy,
+    move_to_least_energy,
     potential_energy,
     prepare_in_layers,
     second_opinions,
@@ -226,6 +229,22 @@ def test_no_place_costs_less_than_the_least_energy() -> None:
             nearby = cloud[np.argmin(values)] + rng.normal(size=(100, 2)) * [0.1, 0.02]
             values = np.append(values, [potential_energy(x, theta, y, work, f).u for x, y in nearby])
             assert least - CAUTION * abs(least) <= values.min()
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("theta", [radians(-20.0), radians(20.0)])
+def test_the_search_for_the_least_energy_goes_on_until_it_gains_nothing(theta: float) -> None:
+    """Turns along x_b and y_b come near it slowly beside this boulder: after three, 1.7 % are left."""
+    design, ground = list(some_grounds(25, seed=1009))[24]
+    f, work, _ = prepared(in_ground(design, ground), BOTH, base_in(ground))
+    found = []
+    for x, y in product((-0.5, 0.0, 0.2, 0.4, 0.8), (-0.2, 0.5)):
+        place = Equilibrium(x, y, inf)
+        for _ in range(60):
+            place = move_to_least_energy(place, False, -3.0, 8.0, 1e-6, theta, work, f)
+            place = move_to_least_energy(place, True, -6.0, 6.0, 1e-6, theta, work, f)
+        found.append(place.energy)
+    assert least_energy(theta, work, f) <= min(found) + 0.005 * abs(min(found))
 
 
 @pytest.mark.compiled

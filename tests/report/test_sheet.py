@@ -474,24 +474,6 @@ def test_no_words_of_a_drawing_are_cut_at_its_frame(tmp_path: Path, opened: Any)
     assert "step_s: not given" in page.locator(".settings span").all_text_contents()[-2]
 
 
-def test_a_pdf_names_its_author_in_an_update_that_readers_find() -> None:
-    start = b"%PDF-1.4\n1 0 obj\n<</Title (site)>>\nendobj\n"
-    table = b"xref\n0 2\n0000000000 65535 f \n0000000009 00000 n \ntrailer\n<</Size 2\n/Root 2 0 R\n/Info 1 0 R>>\n"
-    pdf = start + table + b"startxref\n%d\n%%%%EOF\n" % len(start)
-    told = writing.with_author(pdf, "C. Dáy")
-    assert told.startswith(pdf)
-    at = int(re.findall(rb"startxref\n(\d+)\n%%EOF", told)[-1])
-    entry = re.fullmatch(
-        rb"xref\n1 1\n(\d{10}) 00000 n \ntrailer\n<</Size 2\n/Root 2 0 R\n/Info 1 0 R\n/Prev (\d+)>>\n",
-        told[at : told.rindex(b"startxref")],
-    )
-    assert entry is not None
-    assert int(entry[2]) == len(start)
-    author = "\ufeffC. Dáy".encode("utf-16-be").hex().encode()
-    assert told[int(entry[1]) : at] == b"1 0 obj\n<</Title (site)\n/Author <%s>>>\nendobj\n" % author
-    assert writing.with_author(pdf, "") == pdf
-
-
 def test_the_browser_that_prints_writes_for_paper(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(writing, "browser", lambda: "chromium")
     opened: list[str] = []
