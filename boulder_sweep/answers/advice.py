@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from boulder_sweep.answers.keys import sweep_ranges
 from boulder_sweep.answers.recommendation import OF_A_DESIGN, Design, Nearest, Recommendation
-from boulder_sweep.answers.search import FAULTY, WORDS
+from boulder_sweep.answers.search import ALWAYS, FAULTY, WORDS
 from boulder_sweep.answers.trials import DEPTH, HEIGHT, RATIO, USUALLY
 from boulder_sweep.columns import BOULDER_MASS
 from boulder_sweep.designs import SIDES
+from boulder_sweep.judge.quantities import EXCAVATED
 from boulder_sweep.judge.robustness import MEANINGS, can_be_asked
 from boulder_sweep.judge.validity import BY_FLAG, UNSTUDIED
 from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT
@@ -291,7 +292,20 @@ class _Words:
         begin, open_ = "B", self.not_graded(design)
         if open_ and not design.stands:
             begin, open_ = f"{open_} By the margin alone, b", ""
-        return f"{begin}{build}{holds}.{self.why(design)}{open_ and ' '}{open_}"
+        return f"{begin}{build}{holds}.{self.not_asked(design)}{self.why(design)}{open_ and ' '}{open_}"
+
+    def not_asked(self, design: Design) -> str:
+        """Return what nobody asked of a design: margin and second opinions with a probability, and lesser depths."""
+        words, missing = "", {"margin": self.need.least_margin, "second opinion": self.need.robust}
+        if design.chance is not None and not all(missing.values()):
+            left = " and no ".join(name for name, asked in missing.items() if not asked)
+            words = f" No {left} {'was' if any(missing.values()) else 'were'} asked for."
+        if self.need.key.name in EMBEDMENT and not self.found.of_run:
+            where = *SIDES, DEPTH, "found"
+            ends = [row for row in self.need.arrow.select(where).to_pylist() if row["found"] == WORDS[ALWAYS]]
+            if any(all(row[name] == size for name, size in design.sizes.items() if name in row) for row in ends):
+                words += " Lesser depths were not searched."
+        return words
 
     def why(self, design: Design) -> str:
         """Return why it is this boulder, as a sentence that follows another."""
@@ -335,9 +349,10 @@ class _Words:
             sizes = tuple(other.sizes.values())
             words = f"{sentences[sizes][0]}, and {BETTER[name]}" if sizes in sentences else BETTER[name].capitalize()
             sentences[sizes] = (words, other)
+        at_most = "up to " if len({row[EXCAVATED.name] for row in design.rows}) > 1 else ""
         return [
             f"{words}: {self.boulder(other.rows[0])}, {self.mass(other.rows[0])}, {self.depth(other)}, "
-            f"{self.dug(other)} to dig in place of {self.dug(design)}."
+            f"{at_most}{self.dug(other)} to dig in place of {self.dug(design)}."
             for words, other in sentences.values()
         ]
 
@@ -387,6 +402,7 @@ class _Words:
     def nearest(self, nearest: Nearest) -> str:
         """Return what comes nearest, by how much it falls short, and which input would change that."""
         failing = [row for row in nearest.rows if row["passes_at"] is None]
+        failing.sort(key=lambda row: row["verdict"] == "pass")  # it may pass there, but not as asked
         row, design, who = (failing or nearest.rows)[0], nearest.design, self.boulder(nearest.rows[0])
         if design is not None:
             under = f" {MODELS}" if nearest.robust else ", but not under every soil model" * self.need.robust
@@ -397,7 +413,7 @@ class _Words:
                 f"Nearest: {who} ({self.mass(row)}), which passes{self.everywhere()}, but at no depth in all of them."
             )
         else:
-            why = (row["reason"] or row["verdict"]).replace("_", " ")
+            why = (row["reason"] or f"passes with {percent(row['margin'])} to spare").replace("_", " ")
             deep = self.deep(row[DEPTH])
             never = f"passes at no depth{self.here(row)}; {deep}"
             if self.found.of_run:
@@ -408,10 +424,9 @@ class _Words:
         for name, one in nearest.changes.items():
             at_most = name == "impact_speed_m_s"
             value = (min if at_most else max)(row[name] for row in one.rows)
-            built = f" ({self.mass(one.rows[0])}, {self.depth(one)})" if name == HEIGHT else ""
             size = shown_unit(BY_NAME[name].unit, self.units).size
             held = size * within(value / size, math.floor if at_most else math.ceil)
-            changes.append(f"{BY_NAME[name].path} {self.value(name, held)} or {'less' if at_most else 'more'}{built}")
+            changes.append(f"{BY_NAME[name].path} {self.value(name, held)} or {'less' if at_most else 'more'}")
         either = "; or ".join(changes)
         return f"{text} It would qualify with {either}." if changes else text
 

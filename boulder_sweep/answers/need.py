@@ -26,9 +26,9 @@ from boulder_sweep.answers.result import (
     rows_table,
     to_build,
 )
-from boulder_sweep.answers.search import FAULTY, WORDS
+from boulder_sweep.answers.search import FAULTY, UNKNOWN, WORDS
 from boulder_sweep.answers.trials import Judges, judges_of, ranges
-from boulder_sweep.columns import INPUTS
+from boulder_sweep.columns import INPUTS, OUTCOME_COLUMNS
 from boulder_sweep.designs import SIDES
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import QuestionError
@@ -257,10 +257,33 @@ def _answered(
     question |= {"robust": True} if judges.robust else {}
     table = joined_tables(tables, asked.sweep, judges, "boulder_sweep.need", question)
     best = None if prefer is None else recommended(asked, table, prefer)
+    table = _outcomes_of_answers(table)
     if best is not None:
         metadata = table.schema.metadata | file_metadata({RECOMMENDATION: best.to_dict()})
         table = table.replace_schema_metadata(metadata)
     return Need(asked.sweep, table, key, judges.least_margin, simulated, chance, judges.robust, best)
+
+
+def _outcomes_of_answers(table: pa.Table) -> pa.Table:
+    """Return answers without the outcome of the value tried last, where nothing passes as asked.
+
+    Why it cannot be computed or decided remains.
+    """
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    passes = table["passes_at"].is_valid()
+    undecided = pc.equal(table["found"].cast("string"), WORDS[UNKNOWN])
+    told = pc.is_in(table["verdict"].cast("string"), pa.array(["undecided", "error"]))
+    for index, name in enumerate(table.column_names):
+        if name in OUTCOME_COLUMNS:
+            where = pc.or_(passes, told) if name in ("verdict", "reason") else passes
+        elif name.startswith(("p_pass", "p_robust", "p_undecided")):
+            where = pc.or_(passes, undecided)
+        else:
+            continue
+        table = table.set_column(index, table.field(index), pc.if_else(where, table[name], None))
+    return table
 
 
 class _Progress:
@@ -330,5 +353,5 @@ def _table_of(asked: Question, start: int, stop: int) -> tuple[pa.Table, int]:
         *to_build(answers.block, asked.sweep),
     ]
     if answers.chances is not None:
-        columns += chance_columns(answers.chances, " at the answer, or at the value tried last")
+        columns += chance_columns(answers.chances, " at the answer")
     return rows_table(start, answers.block, answers.judged, columns, at=1 + len(INPUTS)), answers.simulated

@@ -62,23 +62,6 @@ HEADS = {
     "bed_offset_m": ("bed", "m"),
 }
 """Name and unit above the column of an input."""
-WITHOUT_MARGIN = "What each design just withstands, without a margin"
-"""What the answers of `capacity` are."""
-WITHSTOOD = {
-    WORDS[ALWAYS]: "≥, ≤: passes throughout, up to the worst value tried",
-    WORDS[NOT_MONOTONE]: "*: up to here everything passes; it passes again beyond values that fail, which counts for "
-    "nothing (columns ..._passes_within, -o). never*: fails already at the mildest value tried",
-    WORDS[NEVER]: "never: passes at no value tried",
-    WORDS[BLOCKED]: "blocked: the truck would pass or ride over the boulder",
-    WORDS[UNKNOWN]: "undecided: passes at no value tried; see the reason below",
-    WORDS[FAULTY]: "error: cannot be computed (column reason, -o)",
-}
-"""What the kinds of answers mean to a design that withstands something."""
-MOST_IN_ALL = 1000
-"""Most lines of a table of all answers."""
-MARK = "→"
-"""What stands before the boulder that is recommended."""
-WRITTEN = "-o writes them all"
 NOTES = {
     "always": "≤, ≥: passes throughout the searched range, up to this end of it",
     "never": "never: passes nowhere in the searched range",
@@ -87,6 +70,23 @@ NOTES = {
     "boulder",
     "undecided": "undecided: no value is known to pass, and the one tried last would if it were decided",
 }
+WITHOUT_MARGIN = "What each design just withstands, without a margin"
+"""What the answers of `capacity` are."""
+WITHSTOOD = {
+    WORDS[ALWAYS]: "≥, ≤: passes throughout, up to the worst value tried",
+    WORDS[NOT_MONOTONE]: "*: up to here everything passes; it passes again beyond values that fail, which counts for "
+    "nothing (columns ..._passes_within, -o). never*: fails already at the mildest value tried",
+    WORDS[NEVER]: "never: passes at no value tried",
+    WORDS[BLOCKED]: "blocked: the truck would pass or ride over the boulder",
+    WORDS[UNKNOWN]: NOTES["undecided"],
+    WORDS[FAULTY]: "error: cannot be computed (column reason, -o)",
+}
+"""What the kinds of answers mean to a design that withstands something."""
+MOST_IN_ALL = 1000
+"""Most lines of a table of all answers."""
+MARK = "→"
+"""What stands before the boulder that is recommended."""
+WRITTEN = "-o writes them all"
 Row = Mapping[str, Any]
 Cell = Callable[[Row], str]
 Column = tuple[tuple[str, str], Cell]
@@ -185,7 +185,7 @@ def undecided_columns(table: pa.Table) -> list[Column]:
     """Return the column of the share of the designs drawn that is undecided, where some are."""
     if not any(table["p_undecided"].to_pylist()):
         return []
-    return [(("not", "decided"), lambda row: f"{row['p_undecided']:.4f}")]
+    return [(("not", "decided"), lambda row: "-" if row["p_undecided"] is None else f"{row['p_undecided']:.4f}")]
 
 
 def undecided_lines(table: pa.Table) -> list[str]:
@@ -297,11 +297,14 @@ def withstood(result: Reserves, number: int, units: str = "si", where: str = "It
 
     row, said = rows_of(result.arrow.slice(number, 1), units)[0], list[str]()
     for (key, column, word, _), what in zip(RESERVES, ("speed", "truck", "friction angle"), strict=True):
-        answer = answer_cell(key, column, f"{word}_found", units)(row).rstrip("*")
-        known = row[column] is not None
-        unit = head_of(key.name, units)[1]
-        to = "" if answer[0] in "≤≥" else " or less" if key.most else " or more"
-        said.append(f"a {what} of {answer} {unit}{to}".replace(" deg", "°") if known else f"no {what} that was tried")
+        if row[column] is None:
+            said.append(f"no {what} that was tried")
+            continue
+        answer = answer_cell(key, column, f"{word}_found", units)(row).strip("≤≥*")
+        answer = answer if "." in answer else f"{int(answer):,}"
+        to = "less" if key.most else "more"
+        left = f" ({'more' if key.most else 'less'} was not tried)" * (row[f"{word}_found"] == WORDS[ALWAYS])
+        said.append(f"a {what} of {answer} {head_of(key.name, units)[1]} or {to}{left}".replace(" deg", "°"))
     return f"{where} withstands {', '.join(said[:-1])} and {said[-1]}, each alone and without a margin."
 
 
@@ -416,14 +419,19 @@ def need_lines(
     shown = _every_answer(need, units) if table else screen_lines(need, units)
     lines += ["", *shown]
     remarks = [*yard_lines(need), *_errors(need)]
+    remarks += [] if notes else [line for line in _legend(need) if line[0] in {*"≤*"} & {*"".join(shown)}]
     remarks += undecided_lines(need.arrow) if need.probability is not None else []
-    remarks += caution_lines(need.sweep.model, reasons_in(need.arrow), units)
+    nearest = need.recommendation.nearest if need.recommendation else None
+    reasons = reasons_in(need.arrow) | {row["reason"] for row in (nearest.rows if nearest else ())}
+    remarks += caution_lines(need.sweep.model, reasons, units)
     if notes:
         remarks += [*volume_lines("\n".join(shown)), *_legend(need), *_grades(need), *_outside(need)]
         remarks.append(FOOT_WORDS[need.sweep.model.foot])
     shown_too = {"--table": table, "--notes": notes}
     given = [(option,) for option, is_given in shown_too.items() if is_given]
-    left = () if again is None else [again.asking(*given, (option,)) for option in shown_too if (option,) not in given]
+    if len(need) <= MOST_SHOWN and shown == _every_answer(need, units):
+        shown_too["--table"] = True  # it would show the same
+    left = () if again is None else [again.asking(*given, (option,)) for option, has in shown_too.items() if not has]
     more = ["More:", *(f"  {command}" for command in left)] if left else []
     return [*lines, *wrapped(remarks), *more]
 
@@ -539,17 +547,17 @@ def _by_boulder(need: Need, rows: Sequence[Row], units: str) -> Screen:
     answer = answer_cell(key, key.answer, "found", units)
     edge = [(head_of(name, units), number_of(name, units)) for name in chosen]
     edge += [] if key.name.startswith("boulder_") else [_mass(need, units)]
-    count = len(boulders[0]["rows"])
-    edge.append((("all", head_of(key.name, units)[1]), lambda row: "-" if row["failing"] else answer(row)))
-    wide = _across(need, names, boulders[0]["rows"], answer, units)
+    count, unit = len(boulders[0]["rows"]), head_of(key.name, units)[1]
+    edge.append((("all", unit), lambda row: "-" if row["failing"] else answer(row)))
+    wide = _across(need, names, boulders[0]["rows"], answer, unit, units)
     if len(table_lines([*edge, *wide], boulders, math.inf)[2]) <= WIDTH:
         return Screen([*edge, *wide], boulders)
     passes: Column = (("passes", f"in, of {count}"), lambda row: str(count - row["failing"]))
     return Screen([*edge, passes], boulders, has_each=False)
 
 
-def _across(need: Need, names: Sequence[str], rows: Sequence[Row], cell: Cell, units: str) -> list[Column]:
-    """Return a column for each row of a boulder, with what differs of its soil and vehicle as the head."""
+def _across(need: Need, names: Sequence[str], rows: Sequence[Row], cell: Cell, unit: str, units: str) -> list[Column]:
+    """Return a column for each row of a boulder, headed by what differs of its soil and vehicle, and its own unit."""
     labels, given = need.sweep.plan.labels, need.sweep.plan.given
     different = [name for name in labels if len({row[name] for row in rows}) > 1]
     above: list[Column] = [(("", ""), word_of(name)) for name in different]
@@ -558,8 +566,10 @@ def _across(need: Need, names: Sequence[str], rows: Sequence[Row], cell: Cell, u
             above.append((head_of(name, units), number_of(name, units)))
     wide: list[Column] = []
     for number, row in enumerate(rows):
-        words = [(f"{head[0]} {text(row)}".strip(), head[1]) for head, text in above] or [("", "")]
-        head = words[0] if len(words) == 1 else (words[0][0], ", ".join(word for word, _ in words[1:]))
+        words = [f"{name} {text(row)}{'°' * (of == 'deg')}".strip() for (name, of), text in above]
+        if len(words) == 1 and above[0][0][1] not in ("", "deg"):
+            words[0] += f" {above[0][0][1]}"
+        head = words[0] if words else "", ", ".join(words[1:]) or unit
         wide.append((head, _in_row(number, cell)))
     return wide
 
@@ -590,7 +600,7 @@ def designs_screen(need: Need, units: str = "si") -> Screen:
     table = pa.Table.from_pylist(first)
     names = [name for name in HEADS if varies(need.sweep, table, name)]
     if need.sweep.table is None and 1 < len(first) <= MOST_SHOWN:
-        columns += _across(need, names, first, _margin, units)
+        columns += _across(need, names, first, _margin, "", units)
     return Screen(columns, boulders)
 
 
@@ -696,7 +706,7 @@ def _length(name: str) -> Cell:
 
 def _chance(name: str) -> Cell:
     """Return a formatter for a probability at the answer."""
-    return lambda row: "" if row["passes_at"] is None and not row["p_undecided"] else f"{row[name]:.3f}"
+    return lambda row: "" if row[name] is None else f"{row[name]:.3f}"
 
 
 def _margin(row: Row) -> str:

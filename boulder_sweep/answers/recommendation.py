@@ -33,7 +33,7 @@ from boulder_sweep.answers.trials import (
     uncertain_rows,
     ungraded,
 )
-from boulder_sweep.columns import BOULDER_MASS
+from boulder_sweep.columns import BOULDER_MASS, DESIGN_ID
 from boulder_sweep.designs import SIDES
 from boulder_sweep.judge.quantities import EXCAVATED
 from boulder_sweep.judge.robustness import DECISIVE
@@ -138,7 +138,8 @@ class Nearest:
     Attributes
     ----------
     rows : list of dict
-        Its rows of the answer, or at the last value tried where nothing passes; of a run the rows of the design.
+        Its rows of the answer, or at the greatest depth at which it reaches the bumper where nothing passes; of a run
+        the rows of the design.
     design : Design or None
         It at the depth at which it has the most of what was asked for; None where it does not pass even without a
         margin.
@@ -374,15 +375,18 @@ class _Boulders:
         return Design([by_row[row] for row in rows.tolist()])
 
     def judged(
-        self, rows: np.ndarray, given: InputRows, sizes: dict[str, float], judges: Judges
+        self, rows: np.ndarray, given: InputRows, sizes: dict[str, float], judges: Judges, *, failing: bool = False
     ) -> list[dict[str, Any]] | None:
-        """Return a boulder of some sizes in some rows, with the inputs given there; None where it fails in one."""
+        """Return a boulder of some sizes in some rows, with the inputs given there.
+
+        None where it fails in one, unless it is wanted all the same.
+        """
         inputs = {name: np.full(len(rows), value) for name, value in sizes.items()}
         block = block_at(given, np.arange(len(rows)), **inputs)
         block = replace(block, labels={name: label.at(rows) for name, label in self.labels.items()})
         judged, columns = judges.final(block), to_build(block, self.asked.sweep)
         if self.sampling is None:
-            if not judges.holds(judged, block).all():
+            if not failing and not judges.holds(judged, block).all():
                 return None
             judged = judges.final.graded(judged, block)
         else:
@@ -394,7 +398,7 @@ class _Boulders:
         return rows_table(0, block, judged, columns).to_pylist()
 
     def deepest(self, design: Design) -> float:
-        """Return how deep [m] a design may be buried at most: it holds in all its rows from its own depth on."""
+        """Return how deep [m] a design may be buried at most: down to there it holds in all rows, graded no worse."""
         rows, _ = next(self.tried[each] for each, one in self._judged.items() if one is design)
         given = {name: values[rows] for name, values in self.given.items() if name not in EMBEDMENT}
         sizes, sweep = {name: design.sizes[name] for name in (*SIDES, DEPTH)}, self.asked.sweep
@@ -404,9 +408,11 @@ class _Boulders:
 
         def predicate(index: np.ndarray, positions: np.ndarray) -> np.ndarray:
             held = []
-            for position in positions.tolist():  # its own depth is known to hold
-                one = sizes | {DEPTH: position / MILLIMETRES}
-                held.append(position == last or self.judged(rows, given, one, self.asked.judges) is not None)
+            for position in positions.tolist():
+                depth = {DEPTH: position / MILLIMETRES}
+                known = position == last  # its own depth
+                one = None if known else self.judged(rows, given, sizes | depth, self.asked.judges)
+                held.append(known or (one is not None and RANKS[Design(one).grade] <= RANKS[design.grade]))
             return np.where(held, HOLDS, FAILS)
 
         # From the greatest depth up: where it begins to hold for good.
@@ -446,9 +452,13 @@ class _Boulders:
         reach = given[HEIGHT] - given["bumper_height_m"] - asked.sweep.criterion.min_overlap_m
         tried = self._column(DEPTH)[failing if len(failing) else rows]
         deepest = min(float(tried.max()), math.floor(float(reach.min()) * 1000.0) / 1000.0)
-        return Nearest(
-            self.table.take(rows.tolist()).to_pylist(), design, left, robust, self._changes(rows, given, deepest)
-        )
+        shown = self.table.take(rows.tolist()).to_pylist()
+        if deepest >= low.max() * (given[HEIGHT].min() if key.name == RATIO else 1.0):
+            others = {name: values for name, values in given.items() if name not in EMBEDMENT}
+            there = self.judged(rows, others, {DEPTH: deepest}, judges, failing=True) or []
+            for row, one in zip(shown, there, strict=True):
+                row |= {} if row["passes_at"] is not None else one | {DESIGN_ID.name: row[DESIGN_ID.name]}
+        return Nearest(shown, design, left, robust, self._changes(rows, given, deepest))
 
     def _changes(self, rows: np.ndarray, given: InputRows, depth: float) -> dict[str, Design]:
         """Return a boulder as it would qualify at the greatest depth: in a stronger soil, higher, or at less speed."""

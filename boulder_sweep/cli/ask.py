@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
@@ -31,7 +32,12 @@ from boulder_sweep.cli.options import (
 )
 from boulder_sweep.cli.output import say, say_written, show, working
 from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
+from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT
+from boulder_sweep.settings.problems import Position, Problem
 from boulder_sweep.text import counted
+
+if TYPE_CHECKING:
+    from boulder_sweep.settings import Sweep
 
 NEED_EXAMPLES = """\b
 Examples:
@@ -141,7 +147,10 @@ def need(
 
     def say_how() -> None:
         if not quiet:
-            say_notes(sweep, units)
+            unused = _unused(sweep, question["most"] or question["least"] or EMBEDMENT[1])
+            notes = [note for note in sweep.notes if not (unused and note.key.startswith("site.embedment"))]
+            notes += [Problem(Position(grid), "not used: the depth is searched", BY_NAME[name].path) for name in unused]
+            say_notes(replace(sweep, notes=tuple(notes)), units)
             say_percents(margin=question["margin"], probability=question["probability"])
 
     with working(quiet, of="designs" if question["probability"] is None else "values") as progress:
@@ -160,6 +169,15 @@ def need(
         result.plot(picture, units=units)
         say_written(quiet, picture)
     return EXIT_SOME_ROWS_FAILED if result.errors else EXIT_DONE
+
+
+def _unused(sweep: Sweep, word: str) -> list[str]:
+    """Return the embedments that a file gives in vain, since an embedment is searched and none is its range."""
+    from boulder_sweep.answers.keys import key_of
+
+    given = sweep.plan.given.keys() - {name for axis in sweep.axes for name in axis.columns}
+    is_searched = key_of(word).name in EMBEDMENT and not sweep.depth_sought
+    return [name for name in EMBEDMENT if name in given and is_searched]
 
 
 def _given(names: Sequence[str]) -> tuple[tuple[str, ...], ...]:

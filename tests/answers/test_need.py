@@ -17,6 +17,7 @@ from boulder_sweep.answers.need import Need
 from boulder_sweep.answers.printing import need_lines, uncertainty_lines
 from boulder_sweep.answers.trials import Remembered, judges_of, ranges
 from boulder_sweep.answers.uncertainty import uncertainty
+from boulder_sweep.columns import OUTCOME_COLUMNS
 from boulder_sweep.designs import DesignBlock, some
 from boulder_sweep.errors import PictureError, QuestionError
 from boulder_sweep.judge.accuracy import accuracy_of
@@ -63,7 +64,6 @@ def test_as_printed_nothing_is_proved_so_nothing_is_found(accuracy: str) -> None
     assert set(frame.found) == {"undecided", "blocked_by_overlap"}
     assert len(stands) >= 3
     assert set(zip(stands.verdict, stands.reason, strict=True)) == {("undecided", "horizon")}
-    assert stands.end_time_s.eq(1.0).all()
 
 
 @pytest.mark.parametrize(
@@ -139,7 +139,7 @@ def test_a_boulder_that_ends_below_the_bumper_is_no_answer() -> None:
     assert found.found == "blocked_by_overlap"
     assert math.isnan(found.passes_at)
     assert found.fails_at < 2.6 - 0.5
-    assert found.reason == "overturns"
+    assert found[[*OUTCOME_COLUMNS]].isna().all()  # it has no answer, so it has no outcome
 
 
 @pytest.mark.parametrize("count", [150, pytest.param(300, marks=pytest.mark.nightly)])
@@ -410,7 +410,7 @@ def test_no_grade_stands_beside_a_probability() -> None:
     for answers, lines in ((found, uncertainty_lines(found)), (likely, need_lines(likely, notes=True))):
         assert answers.arrow["robustness"].to_pylist() == [None]
         assert answers.arrow["stands_under"].to_pylist() == [None]
-        assert not any(word in "\n".join(lines) for word in ("robust:", "sensitive", "opinion"))
+        assert not any(word in "\n".join(lines) for word in ("robust:", "sensitive", "opinion:"))
 
 
 SPEED = "impact_speed_m_s"

@@ -68,7 +68,7 @@ def test_boulders_stand_with_the_depth_that_all_soils_need(many) -> None:
 def test_soils_that_fit_are_columns() -> None:
     found = bare_need(load_text(GRID.replace("[36, 38, 40, 42]", "[36, 42]"), Path("grid.yaml")))
     lines = table_of(need_lines(found))
-    assert lines[0].split() == ["W", "H", "mass", "all", "φ′", "36", "φ′", "36", "φ′", "42", "φ′", "42"]
+    assert lines[0].split() == ["W", "H", "mass", "all", *(["φ′", "36°"] * 2), *(["φ′", "42°"] * 2)]
     assert lines[1].split() == ["m", "m", "t", "m", "β", "50", "β", "80", "β", "50", "β", "80"]
     rows, words = found.arrow.to_pylist(), {"blocked_by_overlap": "blocked", "never": "never", "undecided": "undecided"}
     cells = [words.get(row["found"], f"{row['least_embedment_depth_m'] or 0:.3f}") for row in rows]

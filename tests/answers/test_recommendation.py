@@ -17,6 +17,7 @@ from boulder_sweep.answers.need import Need, need
 from boulder_sweep.answers.printing import need_screen
 from boulder_sweep.answers.recommendation import PREFERENCES, Design, _Boulders
 from boulder_sweep.answers.trials import Open, block_at, judges_of
+from boulder_sweep.columns import GRADES
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.judge.validity import BY_FLAG
@@ -211,7 +212,7 @@ def test_where_none_qualifies_the_nearest_has_what_is_said_of_it() -> None:
     assert words.startswith(f"No boulder of the file passes with 25 % to spare {models} in both soils.")
     assert f"Nearest: the 3.14 m boulder (22.6 t) 2.360 m deep, with 15 % to spare {models}." in words
     assert "or less; or soil.friction_angle" in words
-    assert words.endswith(" or boulder.height 3.216 m or more (23.2 t, 2.448 m deep).")  # taller, it stands deeper
+    assert words.endswith(" or boulder.height 3.216 m or more.")
 
 
 def test_what_passes_in_one_model_alone_is_the_nearest_where_nothing_need_be_spared() -> None:
@@ -259,7 +260,26 @@ def test_a_change_that_is_named_would_do_as_it_is_printed(units: str) -> None:
 
 def test_a_boulder_that_passes_at_no_depth_names_the_speed_that_it_holds() -> None:
     found = need(CONFIGS / "abg.yaml")
-    assert "passes at no depth; 1.446 m deep: overturns. It would qualify with vehicle.speed 3.62 m/s or" in said(found)
+    assert "passes at no depth; 1.442 m deep: overturns. It would qualify with vehicle.speed 3.62 m/s or" in said(found)
+
+
+def test_the_nearest_fails_at_a_depth_that_may_be_built_as_a_simulation_says() -> None:
+    found = need(site(height="2.4 m", friction="[32, 34] deg"))
+    assert found.recommendation is not None
+    nearest = found.recommendation.nearest
+    assert nearest is not None
+    for row in nearest.rows:
+        assert row["passes_at"] is None
+        assert row["overlap_m"] >= found.sweep.criterion.min_overlap_m
+        one = changed(site(height="2.4 m"), friction_angle_deg=row["friction_angle_deg"], **{DEPTH: row[DEPTH]})
+        simulated = boulder_sweep.simulate(one)
+        assert (row["verdict"], row["reason"]) == (simulated.verdict, simulated.reason)
+
+
+def test_the_end_of_a_search_is_not_passed_off_as_the_least_depth() -> None:
+    words = " Lesser depths were not searched."
+    assert words in said(need(site(height="3.4 m"), between=("2.5 m", "2.6 m")))
+    assert words not in said(need(site(height="3.4 m")))
 
 
 @pytest.mark.parametrize("question", [{"most": "speed"}, {"least": "friction_angle"}, {"most": "embedment_depth"}])
@@ -295,6 +315,7 @@ def test_a_probability_takes_the_place_of_margin_and_grade() -> None:
     assert design.chance == found.frame.p_pass[0]
     assert design.grade is None
     assert "it passes with a probability of 95." in said(found)
+    assert " No margin and no second opinion were asked for." in said(found)
 
 
 def test_the_same_probability_is_held_in_every_soil() -> None:
@@ -348,7 +369,9 @@ def test_a_design_holds_down_to_its_greatest_depth_and_no_further(height: str) -
 
     def holds(depth: float) -> bool:
         block = block_at(rows, np.arange(best.conditions), **{DEPTH: np.full(best.conditions, depth)})
-        return bool(judges.holds(judges.final(block), block).all())
+        judged = judges.final(block)
+        grades = judges.final.graded(judged, block)["robustness"]
+        return bool(judges.holds(judged, block).all()) and {GRADES[grade] for grade in grades} == {best.design.grade}
 
     assert [holds(depth) for depth in (least - 0.001, *np.linspace(least, most, 7), most + 0.001)] == [
         False,

@@ -359,6 +359,20 @@ def test_a_narrow_range_of_depths_is_widened(sweep, depths, more):
     assert ("site.embedment_ratio=[0.35, 0.75]" in command) == more
 
 
+def test_a_table_that_would_show_the_same_is_not_suggested(sweep):
+    _, out, _ = sweep("need", CONFIGS / "rwg.yaml", "-q")
+    assert more(out) == [["sweep", "need", str(CONFIGS / "rwg.yaml"), "--notes"]]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"), [((), True), (("--most", "speed"), False), (("--least", "embedment_ratio"), True)]
+)
+def test_a_depth_that_is_given_in_vain_is_said_and_not_called_unusual(sweep, words, said):
+    _, _, err = sweep("need", CONFIGS / "rwg.yaml", "--set", "site.embedment_depth=0.3 m", *words)
+    assert ("site.embedment_depth: not used: the depth is searched" in err) == said
+    assert ("computed as given" in err) != said
+
+
 def test_a_probability_is_kept(sweep, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shutil.copy(CONFIGS / "uncertain_site.yaml", "site.yaml")

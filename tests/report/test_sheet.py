@@ -257,7 +257,7 @@ def test_a_sheet_of_capacity_names_a_design_and_what_it_withstands(
     assert words.recommendation[0].startswith("Bury the ")
     where = r"In the worst of 2 cases \(friction angle φ′ 36°\) it withstands a speed of [\d.]+ mph or less, "
     assert re.match(
-        f"{where}a truck of \\d+ lb or less and a friction angle of [\\d.]+° or more, ", words.recommendation[1]
+        f"{where}a truck of \\d+,\\d+ lb or less and a friction angle of [\\d.]+° or more, ", words.recommendation[1]
     )
     read = read_rows(tmp_path / "capacity.parquet")
     answer = answer_of(read)
