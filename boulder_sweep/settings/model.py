@@ -1,8 +1,4 @@
-"""The settings that are not columns, each declared once: criterion, reading of the paper, soil, shape, solver.
-
-What an attribute declares with `setting` is read, checked and documented by that; see `boulder_sweep.settings.fields`.
-A boulder is a box, or has a profile of width and length over the height.
-"""
+"""The settings that are not columns: what an attribute declares with `setting` is read and documented by it."""
 
 from __future__ import annotations
 
@@ -77,55 +73,24 @@ class Usual(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One entry of the file.
-
-    Attributes
-    ----------
-    section, key : str
-        Where it stands in the file: ``section: {key: ...}``.
-    name : str
-        Its column in the table; for other inputs the name of the axis, for settings the attribute of `Criterion`,
-        `Model`, `SolverSettings` or `Sweep` that holds it.
-    unit : str
-        Unit of a bare number, and of the column; empty for words.
-    meaning : str
-        What it is, in one line.
-    admitted : Bound or None
-        Values that are accepted; None for words.
-    usual : Usual or None
-        Values met in practice.
-    held : bool
-        Whether a value far outside the usual range is refused unless the file allows it: a slip of the unit decides
-        more about a mass than about a length.
-    default : float or None
-        Value of an input that the file does not give; None where there is none. (Settings have the defaults of the
-        attributes that declare them.)
-    shown_default : float, str or None
-        What holds where the file does not give the entry, as it is written there: a number in `unit`, or a word.
-    also : tuple of str
-        Other words people try, for "did you mean".
-    optional : bool
-        Whether a file may be complete without it.
-    choices : tuple of str
-        Words of which it is one; none where it is not such a word.
-    kind : str
-        What such a word is, as in "P9 is not a penetration rating".
-    """
+    """One entry of the file, ``section: {key: ...}``."""
 
     section: str
     key: str
-    name: str
-    unit: str
+    name: str  # its column; of other inputs the axis, of settings the attribute that holds it
+    unit: str  # of a bare number, and of the column; empty for words
     meaning: str
     admitted: Bound | None = None
     usual: Usual | None = None
-    default: float | None = None
-    also: tuple[str, ...] = ()
-    optional: bool = False
-    choices: tuple[str, ...] = ()
-    kind: str = ""
-    shown_default: float | str | None = None
+    default: float | None = None  # of an input; settings have the defaults of the attributes that declare them
+    also: tuple[str, ...] = ()  # other words people try, for "did you mean"
+    optional: bool = False  # whether a file may be complete without it
+    choices: tuple[str, ...] = ()  # words of which it is one
+    kind: str = ""  # what such a word is, as in "P9 is not a penetration rating"
+    shown_default: float | str | None = None  # what holds without it, as a file has it: a number in `unit`, or a word
     held: bool = False
+    """Whether a value far outside the usual range is refused unless the file allows it: a slip of the unit decides more
+    about a mass than about a length."""
 
     @property
     def path(self) -> str:
@@ -134,18 +99,9 @@ class Field:
 
 
 def setting(path: str, unit: str, meaning: str, default: Any = MISSING, **more: Any) -> Any:
-    """Declare an attribute of a dataclass as an entry of the file.
+    """Declare an attribute of a dataclass as an entry of the file, which must give it where there is no default.
 
-    Parameters
-    ----------
-    path : str
-        Dotted key.
-    unit, meaning
-        See `Field`.
-    default
-        Value where the file does not give the entry; none where it must.
-    more
-        Further attributes of `Field`; the default is shown as it is where it is a number or a word.
+    `more` are further attributes of `Field`; a default that is a number or a word is shown as it is.
     """
     section, _, key = path.rpartition(".")
     if isinstance(default, float | str):
@@ -163,14 +119,7 @@ def entries_of(part: type[Any]) -> list[Field]:
 class ProfilePoint:
     """One point of a profile, as shares of the height, the width and the length of the boulder.
 
-    Attributes
-    ----------
-    height : float
-        Over the foot.
-    width : float
-        Width there.
-    near, far : float
-        How far the boulder reaches there towards the vehicle and away from it, from the middle of its foot.
+    It reaches `near` towards the vehicle and `far` away from it, from the middle of its foot.
     """
 
     height: float
@@ -184,13 +133,7 @@ BOX = (ProfilePoint(0.0, 1.0, 0.5, 0.5), ProfilePoint(1.0, 1.0, 0.5, 0.5))
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """The shape of the boulders of a file; between its points it is linear.
-
-    Attributes
-    ----------
-    points : tuple of ProfilePoint
-        From the foot to the top; none for a box.
-    """
+    """The shape of the boulders of a file: points from the foot to the top, linear between them; none for a box."""
 
     points: tuple[ProfilePoint, ...] = ()
 
@@ -241,10 +184,6 @@ class Shape:
             total += (high.height - low.height) / 6.0 * (values[0] + values[1] + 4.0 * values[2])
         return total
 
-    def as_list(self) -> list[dict[str, float]]:
-        """Return the points as plain data."""
-        return [asdict(point) for point in self.points]
-
     @classmethod
     def of_model(cls, model: Mapping[str, Any]) -> Shape:
         """Return the shape in the part `model` of resolved settings; a box where that has none."""
@@ -263,23 +202,13 @@ class Shape:
 
 @dataclass(frozen=True, slots=True)
 class Scan:
-    """Where the shape of the boulder comes from.
+    """The scan from which the shape of the boulder comes, and how the boulder stands."""
 
-    Attributes
-    ----------
-    file, sha256 : str
-        The scan, as it is named in the settings, and the hash of its content.
-    up, facing : str
-        Ends of the stone that are up and that face the vehicle.
-    cut_m : float
-        What is cut off below for a flat foot [m].
-    """
-
-    file: str
-    sha256: str
-    up: str
-    facing: str
-    cut_m: float
+    file: str  # as it is named in the settings
+    sha256: str  # of its content
+    up: str  # the end of the boulder that is up
+    facing: str  # the end that faces the vehicle
+    cut_m: float  # what is cut off below for a flat foot [m]
 
 
 def tapered(ratio: float) -> Shape:
@@ -295,41 +224,20 @@ class Distribution:
     """Spread of one input about its mean, in the unit of its column.
 
     The mean is not in here: it is the value of the constant or axis of the same name in the sweep, so a grid may have
-    several means with one spread.
-
-    Attributes
-    ----------
-    kind : str
-        ``normal``, ``lognormal``, ``uniform``, ``triangular`` or ``beta``.
-    sd : float or None
-        Standard deviation; None where `cov` stands for it, or where the ends decide (uniform, triangular).
-    cov : float or None
-        Coefficient of variation, the standard deviation as a fraction of the mean.
-    low, high : float
-        Ends. Normal and lognormal distributions are truncated there, and their mean and standard deviation are those
-        before truncation; the others reach from one end to the other. The admitted range where the file names none.
-    mode : float or None
-        Most likely value; triangular only.
-    position : Position
-        Where it stands in the file.
+    several means with one spread. Normal and lognormal distributions are truncated at the ends, and have their mean and
+    deviation before truncation; the others reach from one end to the other.
     """
 
-    kind: str
-    low: float
+    kind: str  # one of `KINDS`
+    low: float  # the admitted range where the file names no ends
     high: float
-    sd: float | None = None
-    cov: float | None = None
-    mode: float | None = None
+    sd: float | None = None  # None where `cov` stands for it, or the ends decide (uniform, triangular)
+    cov: float | None = None  # coefficient of variation, the standard deviation as a fraction of the mean
+    mode: float | None = None  # most likely value; triangular only
     position: Position = field(default_factory=lambda: Position(""), compare=False)
 
     def deviation(self, mean: np.ndarray) -> np.ndarray:
-        """Return the standard deviation (before truncation) for some means, in the unit of the column.
-
-        Parameters
-        ----------
-        mean : ndarray of float64
-            Means; uniform and triangular distributions have one of their own and do not look at it.
-        """
+        """Return the standard deviation before truncation for some means; uniform and triangular have their own."""
         mean = np.asarray(mean, dtype=np.float64)
         if self.kind == "uniform":
             return np.full(mean.shape, (self.high - self.low) / math.sqrt(12.0))
@@ -364,18 +272,10 @@ class Distribution:
 
 @dataclass(frozen=True, slots=True)
 class SetDistributions:
-    """Spread of one input of named soils or vehicles, each its own.
+    """Spread of one input of named soils or vehicles, each its own."""
 
-    Attributes
-    ----------
-    section : str
-        ``soil`` or ``vehicle``; under this name a row carries the index of its set.
-    each : tuple of Distribution or None
-        In the order of the sets; None where a set gives a value.
-    """
-
-    section: str
-    each: tuple[Distribution | None, ...]
+    section: str  # ``soil`` or ``vehicle``; under this name a row carries the index of its set
+    each: tuple[Distribution | None, ...]  # in the order of the sets; None where a set gives a value
 
     @property
     def position(self) -> Position:
@@ -455,24 +355,12 @@ class Layer:
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """In what the soil differs from a dry, level one without cohesion that is the same at every depth.
+    """In what the soil differs from a dry, level one without cohesion that is the same at every depth."""
 
-    Attributes
-    ----------
-    layers : tuple of Layer
-        Layers below the uppermost, from the top down; the uppermost is the soil that the inputs describe.
-    cohesion_kPa : float
-        Effective cohesion of the uppermost layer [kPa].
-    water_table_m : float or None
-        Depth of the water table below the soil line [m]; None where it is out of reach.
-    slope_deg : float
-        Angle at which the ground falls away behind the boulder [deg].
-    """
-
-    layers: tuple[Layer, ...] = ()
-    cohesion_kPa: float = 0.0
-    water_table_m: float | None = None
-    slope_deg: float = 0.0
+    layers: tuple[Layer, ...] = ()  # from the top down, below the uppermost, which the inputs describe
+    cohesion_kPa: float = 0.0  # effective cohesion of the uppermost
+    water_table_m: float | None = None  # depth below the soil line; None where it is out of reach
+    slope_deg: float = 0.0  # angle at which the ground falls away behind the boulder
 
     @property
     def is_usual(self) -> bool:
@@ -621,11 +509,6 @@ class Model:
     """Whether the density of the rock is `ROCK_KG_M3` because the file gives the mass of the boulders only."""
 
     @property
-    def has_few_elements(self) -> bool:
-        """Whether the file asks for fewer soil elements than it takes to come near their limit."""
-        return 0 < self.soil_elements < ENOUGH_ELEMENTS
-
-    @property
     def ground(self) -> Ground:
         """In what the soil differs from the paper's."""
         return Ground(self.layers, self.cohesion_kPa, self.water_table_m, self.slope_deg)
@@ -651,12 +534,7 @@ class SolverSettings:
     """How finely and how long a design is simulated: by an accuracy, or by a step where that is None."""
 
     accuracy: str | None = setting(
-        "solver.accuracy",
-        "",
-        "how finely the motion is integrated",
-        "balanced",
-        choices=ACCURACIES,
-        kind="an accuracy",
+        "solver.accuracy", "", "how finely the motion is integrated", "balanced", choices=ACCURACIES, kind="an accuracy"
     )
     step_s: float | None = setting(
         "solver.step",

@@ -37,17 +37,11 @@ _PLAIN_WORDS = (
     ("expected ',' or ']'", "a list is not closed: ',' or ']' is missing"),
     ("expected ',' or '}'", "a {...} block is not closed, or a ',' is missing in it"),
     (r"found character '\t'", "indent with spaces, not with tabs"),
-    (
-        "expected '<document start>'",
-        "a key is needed here; check quotation marks and indentation",
-    ),
+    ("expected '<document start>'", "a key is needed here; check quotation marks and indentation"),
     ("expected chomping or indentation indicators", "'>' begins a text of several lines; put it in quotation marks"),
     ("expected a comment or a line break", "'>' begins a text of several lines; put it in quotation marks"),
     ("cannot start any token", "unexpected character; put the text in quotation marks"),
-    (
-        "mapping values are not allowed here",
-        "unexpected ':'; check the indentation and the quotation marks",
-    ),
+    ("mapping values are not allowed here", "unexpected ':'; check the indentation and the quotation marks"),
     ("could not find expected ':'", "a key without ':' after it"),
     ("found unexpected end of stream", "quotation marks are not closed"),
     ("expected <block end>", "the indentation does not match the lines above"),
@@ -57,16 +51,12 @@ _PLAIN_WORDS = (
 
 @dataclass(slots=True)
 class Scalar:
-    """One piece of text.
-
-    `quoted` says whether it stood in quotation marks, `needs_unit` whether a number with a dimension must have its unit
-    here.
-    """
+    """One piece of text."""
 
     position: Position
     text: str
-    quoted: bool = False
-    needs_unit: bool = False
+    quoted: bool = False  # whether it stood in quotation marks
+    needs_unit: bool = False  # whether a number with a dimension must have its unit here
 
 
 @dataclass(slots=True)
@@ -133,21 +123,10 @@ def block_of(position: Position, texts: dict[str, str]) -> Mapping:
 
 
 def parse(text: str, label: str, problems: Problems) -> Mapping:
-    """Return the tree of a YAML text whose top level is a block of keys.
+    """Return the tree of a YAML text whose top level is a block of keys; `label` names the file in messages.
 
-    Parameters
-    ----------
-    text : str
-        The whole file.
-    label : str
-        Name of the file in messages.
-    problems : Problems
-        Receives duplicate keys, tags and other mistakes after which reading can go on.
-
-    Raises
-    ------
-    SettingsError
-        The text is not YAML or something other than keys, nested too deep or too large: reading cannot go on.
+    Mistakes after which reading can go on, such as duplicate keys and tags, go to `problems`. SettingsError is raised
+    where it cannot: the text is not YAML or something other than keys, nested too deep or too large.
     """
     root = parse_node(text, label, problems)
     if isinstance(root, Mapping):
@@ -176,9 +155,7 @@ def _events(yaml: YAML, text: str) -> Iterator[Any]:
         yield from yaml.parse(text)
     except YAMLError:
         raise
-    except Exception:
-        # On some malformed input (bad escapes, directives, a text that ends within a token) ruamel.yaml
-        # lets a bare IndexError, ValueError or AttributeError through.
+    except Exception:  # of bad escapes and directives, ruamel.yaml lets a bare IndexError or ValueError through
         raise YAMLError("the text cannot be read as YAML") from None
 
 
@@ -293,10 +270,7 @@ class _TreeReader:
 
 
 def _joined(mapping: Mapping, key: Node, value: Node) -> bool:
-    """Put a number that a comma has cut in two together again: ``{mass: 15,000 lb}`` has a key ``000 lb`` by YAML.
-
-    The reader of the number then says what is wrong with it.
-    """
+    """Put a number that a comma has cut in two together again, ``{mass: 15,000 lb}``; its reader says what is wrong."""
     last = next(reversed(mapping.entries.values()), None)
     if last is None or not isinstance(key, Scalar) or not isinstance(last.value, Scalar):
         return False
@@ -323,10 +297,9 @@ class _TooDeepError(YAMLError):
 
 
 class _UnitScanner(Scanner):
-    """Scanner that also takes a unit behind a closing bracket: ``[36, 40, 43.2] deg``.
+    """Scanner that also takes a unit behind a closing bracket, for which plain YAML has no place: ``[36, 40] deg``.
 
-    Plain YAML has no place for such a word. It is read up to the next comma, bracket, comment or end of the
-    line and kept in `units` under the position of the bracket.
+    It is read up to the next comma, bracket, comment or end of the line and kept under the position of the bracket.
     """
 
     def __init__(self, loader: Any = None) -> None:
