@@ -43,15 +43,6 @@ _FRONT = ("vehicle_mass_kg", "impact_speed_m_s", "vehicle_spring_N_m", "vehicle_
 LEAST_CRUSH, MOST_CRUSH = 0.5, 1.25
 """Crush at a rigid wall over the calibrated one, between which spring and damper are taken for the vehicle's. A
 boulder gives way and takes less of the front than a wall: hence more than 1."""
-BEYOND_FRONT = (
-    "against a rigid wall the front of this vehicle would be crushed by {crush}; its spring and damper are calibrated "
-    "up to {calibrated} (vehicle.calibrated_crush): do they belong to a vehicle of this mass and speed?"
-)
-SHORT_OF_FRONT = (
-    "against a rigid wall the front of this vehicle would be crushed by only {crush}; its spring and damper are "
-    "calibrated up to {calibrated} (vehicle.calibrated_crush): do they belong to a vehicle of this mass and speed?"
-)
-"""Cautions where a vehicle is far from the one its spring and damper were fitted to; a report's page says the same."""
 
 
 def check_complete(entries: Entries) -> None:
@@ -378,11 +369,16 @@ def _off_front(sweep: Sweep) -> str:
     crush = wall_crush(*front)
     least, largest = float(crush.min()), float(crush.max())
     if largest > MOST_CRUSH * calibrated:
-        up_to = "" if least == largest else "up to "
-        return BEYOND_FRONT.format(crush=f"{up_to}{largest:.3g} m", calibrated=f"{calibrated:g} m")
-    if least < LEAST_CRUSH * calibrated:
-        return SHORT_OF_FRONT.format(crush=f"{least:.3g} m", calibrated=f"{calibrated:g} m")
-    return ""
+        crushed = f"{largest:.3g} m" if least == largest else f"up to {largest:.3g} m"
+    elif least < LEAST_CRUSH * calibrated:
+        crushed = f"only {least:.3g} m"
+    else:
+        return ""
+    return (
+        f"against a rigid wall the front of this vehicle would be crushed by {crushed}; its spring and damper are "
+        f"calibrated up to {calibrated:g} m (vehicle.calibrated_crush): do they belong to a vehicle of this mass and "
+        "speed?"
+    )
 
 
 def _without_partner(off: np.ndarray) -> np.ndarray:

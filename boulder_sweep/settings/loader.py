@@ -293,14 +293,10 @@ def _read_heading(entries: Entries) -> Heading:
 def _read_units(root: Mapping, problems: Problems) -> str:
     """Return the units named in a file, empty where none are; with ``us``, or in feet, no number may lack its unit."""
     node = root.get(UNITS)
-    if node is None:
-        if _is_in_feet(root):
-            _need_units(root)
-        return ""
     units = node.text.strip() if isinstance(node, Scalar) else ""
-    if units not in SYSTEMS:
+    if node is not None and units not in SYSTEMS:
         problems.add(node.position, f"must be {' or '.join(SYSTEMS)}", UNITS)
-    if units == "us":
+    if units == "us" or (node is None and _is_in_feet(root)):
         _need_units(root)
     return units
 

@@ -98,7 +98,7 @@ class Field:
         return f"{self.section}.{self.key}"
 
 
-def setting(path: str, unit: str, meaning: str, default: Any = MISSING, **more: Any) -> Any:
+def setting(path: str, meaning: str, default: Any = MISSING, *, unit: str = "", **more: Any) -> Any:
     """Declare an attribute of a dataclass as an entry of the file, which must give it where there is no default.
 
     `more` are further attributes of `Field`; a default that is a number or a word is shown as it is.
@@ -297,20 +297,20 @@ class Criterion:
 
     max_rotation_deg: float = setting(
         "criterion.max_rotation",
-        "deg",
         "rotation at which the boulder counts as overturned",
         20.0,
+        unit="deg",
         admitted=Bound(0.01, 90.0, "the model holds up to about 20 deg"),
         usual=Usual(1.0, 20.0, "beyond 20 deg the model no longer holds and a truck may ramp up"),
     )
     rating: str = setting(
-        "criterion.rating", "", "penetration rating required", "P1", choices=RATINGS, kind="a penetration rating"
+        "criterion.rating", "penetration rating required", "P1", choices=RATINGS, kind="a penetration rating"
     )
     min_overlap_m: float = setting(
         "criterion.min_overlap",
-        "m",
         "least height of the boulder's top over the underside of the bumper; with less the truck may ride over",
         0.25,
+        unit="m",
         admitted=Bound(0.0, 20.0, "counted upwards from the underside of the bumper"),
         also=("overlap", "engagement"),
     )
@@ -404,26 +404,24 @@ class Model:
 
     readings: ReadingChoice = setting(
         "model.readings",
-        "",
         "how the misprinted equations of the paper are read",
         ReadingChoice(),
         shown_default=PRESETS[1],
     )
     soil_elements: int = setting(
-        "model.soil", "", "closed form of the soil, or a number of soil elements", 0, shown_default=CLOSED_FORM
+        "model.soil", "closed form of the soil, or a number of soil elements", 0, shown_default=CLOSED_FORM
     )
     """0 means the closed form, the limit of infinitely many."""
     calibrated_crush_m: float = setting(
         "vehicle.calibrated_crush",
-        "m",
         "crush up to which spring and damper describe the vehicle's front; a design with more is flagged",
         1.0,
+        unit="m",
         admitted=Bound(0.0, 100.0, "the chassis stiffens at about 1 m of crush"),
         also=("crush", "max_crush"),
     )
     resistance: str = setting(
         "model.resistance",
-        "",
         "soil model, which gives the ultimate resistance of the soil",
         RESISTANCES[0],
         choices=RESISTANCES,
@@ -431,7 +429,6 @@ class Model:
     )
     second_opinion: tuple[str, ...] = setting(
         "model.second_opinion",
-        "",
         "soil models under which passes are simulated again, with friction and vertical motion; "
         "width_capped alone decides, and broms is asked where that overturns a pass or resists more",
         USUAL_OPINION,
@@ -439,35 +436,34 @@ class Model:
         shown_default=USUAL_OPINION[0],
     )
     layers: tuple[Layer, ...] = setting(
-        "soil.layers", "", "layers below the uppermost, which the other entries describe", ()
+        "soil.layers", "layers below the uppermost, which the other entries describe", ()
     )
     cohesion_kPa: float = setting(
         "soil.cohesion",
-        "kPa",
         "effective cohesion of the uppermost layer",
         0.0,
+        unit="kPa",
         admitted=Bound(0.0, 1000.0, "more is rock"),
         also=("c", "c'"),
     )
     water_table_m: float | None = setting(
         "soil.water_table",
-        "m",
         "depth of the water table below the soil line; densities below it are the saturated soil's",
         None,
+        unit="m",
         admitted=Bound(0.0, 1000.0, "counted downwards from the soil line"),
         also=("water", "ground_water", "groundwater", "water_level"),
     )
     slope_deg: float = setting(
         "soil.slope",
-        "deg",
         "angle at which the ground falls away behind the boulder",
         0.0,
+        unit="deg",
         admitted=Bound(0.0, 60.0, "less than the friction angle, or the ground does not stand"),
         also=("ground_slope", "inclination"),
     )
     foot: str = setting(
         "boulder.foot",
-        "",
         "shape of the boulder's underside; a rounded one is not modelled, and its boulders are undecided",
         FEET[0],
         choices=FEET,
@@ -476,30 +472,27 @@ class Model:
     )
     profile: tuple[ProfilePoint, ...] = setting(
         "boulder.profile",
-        "",
         "width and length of a boulder that is no box, over its height, from the foot up",
         (),
         also=("shape", "outline", "section", "sections"),
     )
     taper: float = setting(
         "boulder.taper",
-        "1",
         "width and length of the top over width and length of the foot; the larger end has the width and length given",
         1.0,
+        unit="1",
         admitted=Bound(0.05, 20.0, "0.8 for a top of four fifths of the foot"),
         usual=Usual(0.5, 1.5, "usual boulders"),
         also=("tapering", "batter"),
     )
     scan: Scan | None = setting(
         "boulder.scan",
-        "",
         "scan of the boulder, from which its profile and, with its mass, its density follow",
         None,
         also=("mesh", "stone"),
     )
     rock: str | None = setting(
         "boulder.rock",
-        "",
         "kind of rock, in place of its density: an uncertain input by published ranges",
         None,
         choices=tuple(ROCKS),
@@ -534,19 +527,19 @@ class SolverSettings:
     """How finely and how long a design is simulated: by an accuracy, or by a step where that is None."""
 
     accuracy: str | None = setting(
-        "solver.accuracy", "", "how finely the motion is integrated", "balanced", choices=ACCURACIES, kind="an accuracy"
+        "solver.accuracy", "how finely the motion is integrated", "balanced", choices=ACCURACIES, kind="an accuracy"
     )
     step_s: float | None = setting(
         "solver.step",
-        "s",
         "time step in place of an accuracy; errors are estimated but not confirmed, as by fast",
         None,
+        unit="s",
         admitted=Bound(1e-7, 1.0, "a step of some milliseconds is usual"),
     )
     horizon_s: float = setting(
         "solver.horizon",
-        "s",
         "how long an impact is simulated",
         1.0,
+        unit="s",
         admitted=Bound(1e-4, 100.0, "an impact is over within a second or so"),
     )

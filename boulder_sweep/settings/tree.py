@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.events import (
     AliasEvent,
     DocumentStartEvent,
@@ -22,7 +22,6 @@ from ruamel.yaml.events import (
     SequenceStartEvent,
 )
 from ruamel.yaml.scanner import Scanner
-from ruamel.yaml.tokens import FlowMappingEndToken, FlowSequenceEndToken
 
 from boulder_sweep.settings.problems import Position, Problems, SettingsError, shorten
 
@@ -47,6 +46,7 @@ _PLAIN_WORDS = (
     ("expected <block end>", "the indentation does not match the lines above"),
 )
 """Messages of the parser, and plain words for them."""
+_TOO_DEEP = f"lists and blocks are nested more than {MAX_DEPTH} deep"
 
 
 @dataclass(slots=True)
@@ -145,7 +145,7 @@ def parse_node(text: str, label: str, problems: Problems) -> Node | None:
     except YAMLError as error:
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         position = Position(label) if mark is None else Position(label, mark.line + 1, mark.column + 1)
-        problems.add(position, str(error.problem) if isinstance(error, _TooDeepError) else _explained(error))
+        problems.add(position, _explained(error))
         raise SettingsError(problems) from None
 
 
@@ -156,7 +156,7 @@ def _events(yaml: YAML, text: str) -> Iterator[Any]:
     except YAMLError:
         raise
     except Exception:  # of bad escapes and directives, ruamel.yaml lets a bare IndexError or ValueError through
-        raise YAMLError("the text cannot be read as YAML") from None
+        raise _OwnError(problem="the text cannot be read as YAML") from None
 
 
 class _TreeReader:
@@ -196,7 +196,7 @@ class _TreeReader:
             node, size = Scalar(self.position(event), event.value, event.style in ("'", '"')), 1
         else:
             if self.depth >= MAX_DEPTH:
-                raise _TooDeepError(event.start_mark)
+                raise _OwnError(problem=_TOO_DEEP, problem_mark=event.start_mark)
             if event.anchor is not None:
                 self.anchors[event.anchor] = None
             self.depth += 1
@@ -285,15 +285,12 @@ def _joined(mapping: Mapping, key: Node, value: Node) -> bool:
 def _bounded(size: int) -> int:
     """Return a number of values, if a file may hold so many."""
     if size > MAX_NODES:
-        raise YAMLError(f"the file holds more than {MAX_NODES} values once its aliases are expanded")
+        raise _OwnError(problem=f"the file holds more than {MAX_NODES} values once its aliases are expanded")
     return size
 
 
-class _TooDeepError(YAMLError):
-    def __init__(self, mark: Any) -> None:
-        super().__init__()
-        self.problem_mark = mark
-        self.problem = f"lists and blocks are nested more than {MAX_DEPTH} deep"
+class _OwnError(MarkedYAMLError):
+    """A refusal in plain words already."""
 
 
 class _UnitScanner(Scanner):
@@ -309,14 +306,12 @@ class _UnitScanner(Scanner):
     def fetch_flow_collection_start(self, TokenClass: Any, to_push: str) -> None:
         """Refuse deep nesting as soon as it is seen, before the parser looks at it."""
         if self.flow_level >= MAX_DEPTH:
-            raise _TooDeepError(self.reader.get_mark())
+            raise _OwnError(problem=_TOO_DEEP, problem_mark=self.reader.get_mark())
         super().fetch_flow_collection_start(TokenClass, to_push)
 
     def fetch_flow_collection_end(self, TokenClass: Any) -> None:
         """Take the unit that may stand behind the bracket."""
         super().fetch_flow_collection_end(TokenClass)
-        if TokenClass not in (FlowSequenceEndToken, FlowMappingEndToken):
-            return
         reader = self.reader
         skip = 0
         while reader.peek(skip) == " ":
@@ -336,12 +331,12 @@ class _UnitScanner(Scanner):
 
 def _explained(error: Any) -> str:
     """Return a YAML syntax error in plain words."""
+    if isinstance(error, _OwnError):
+        return str(error.problem)
     problem = " ".join(str(getattr(error, "problem", None) or error).split())
     for technical, plain in _PLAIN_WORDS:
         if technical in problem:
             return f"not valid YAML: {plain}"
-    if type(error) is YAMLError:  # one of our own
-        return problem
     if "special characters are not allowed" in str(error):
         return "contains control characters; a plain text file in UTF-8 is needed"
     return f"not valid YAML: {shorten(problem, 120)}"

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Collection
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
@@ -444,19 +445,16 @@ def refuse_bare(option: str, texts: list[str], unit: str) -> None:
     """
     if unit == "1":
         return
-    written: list[str | None] = []
+    written: dict[str, str] = {}
     for text in texts:
-        try:
-            written.append(split_number(text, unit)[1])
-        except NumberError:
-            written.append(None)
-    if "" not in written:
+        with suppress(NumberError):
+            written[text] = split_number(text, unit)[1]
+    if "" not in written.values():
         return
-    units = [one for one in written if one] or [shown_unit(unit, system).unit for system in SYSTEMS]
+    units = [one for one in written.values() if one] or [shown_unit(unit, system).unit for system in SYSTEMS]
     space = "" if option.endswith("=") else " "
-    pairs = [*zip(texts, written, strict=True)]
     forms = (
-        space.join([option, *(f"'{text} {one}'" if own == "" else f"'{text}'" for text, own in pairs)])
+        space.join([option, *(f"'{text} {one}'" if written.get(text) == "" else f"'{text}'" for text in texts)])
         for one in dict.fromkeys(units[:2])
     )
     allowed = EXPECTED[unit].examples

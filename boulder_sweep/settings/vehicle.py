@@ -41,42 +41,42 @@ class Approach:
 
     length_m: float = setting(
         "vehicle.approach.length",
-        "m",
         "length of the run-up: from its beginning, or the end of its last curve, to the boulder",
+        unit="m",
         admitted=Bound(0.0, 1e5, "a length"),
     )
     acceleration_m_s2: float = setting(
         "vehicle.approach.acceleration",
-        "m/s^2",
         "acceleration of the vehicle at full throttle on level ground",
+        unit="m/s^2",
         admitted=Bound(0.0, 20.0, "tyres transmit about 1 g at most"),
     )
     from_m_s: float | None = setting(
         "vehicle.approach.from",
-        "m/s",
         "speed at the beginning of the run-up",
         None,
+        unit="m/s",
         admitted=Bound(0.0, 100.0, "up to 360 km/h"),
     )
     curve_radius_m: float | None = setting(
         "vehicle.approach.curve_radius",
-        "m",
         "radius of the curve that ends where the run-up begins",
         None,
+        unit="m",
         admitted=Bound(1.0, 1e5, "no truck turns tighter"),
     )
     friction: float = setting(
         "vehicle.approach.friction",
-        "1",
         "coefficient of friction of the tyres in that curve; 1 if not given, the conservative value",
         FRICTION,
+        unit="1",
         admitted=Bound(0.05, 2.0, "0.6 is usual on a road, 1 is conservative"),
     )
     grade: float = setting(
         "vehicle.approach.grade",
-        "1",
         "rise over run of the street in the direction of travel, negative downhill",
         0.0,
+        unit="1",
         admitted=Bound(-0.5, 0.5, "no street is steeper"),
     )
 
