@@ -60,8 +60,7 @@ TOP_KEYS = ("name", *fields.SECTIONS, "table", SECTION, UNITS, fields.ALLOW_UNUS
 SITE_KEYS = {"soil": (*METHODS, HOLE, ENERGY, TOPSOIL.key), "vehicle": (APPROACH,)}
 """Keys of a block that stand for others, as the site gives them."""
 DRAWN_SD = 5.0
-"""Standard deviations above its mean up to which values of an uncertain input are drawn, but for one in three million.
-"""
+"""Standard deviations from its mean up to which an uncertain input is drawn, but for one value in three million."""
 MOST_LAYERS = 100
 MOST_POINTS = 100
 _SIDE = Bound(0.0, 20.0, "a length")

@@ -234,9 +234,7 @@ EMBEDMENT = ("embedment_ratio", "embedment_depth_m")
 """Exactly one of these is given."""
 TO_BE_FOUND = "to be found"
 """What a file gives for the depth where a question is to find it."""
-
 MAX_ELEMENTS = 1_000_000
-"""Most soil elements per design."""
 
 
 def fields_of(section: str) -> tuple[Field, ...]:

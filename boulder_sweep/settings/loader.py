@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import fields as fields_of
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -72,8 +72,6 @@ LISTS = (".csv", ".xlsx", ".parquet")
 
 MAX_OVERRIDE = 20_000
 """Longest option, in characters."""
-
-Part = TypeVar("Part", Criterion, Model, SolverSettings)
 
 Settings = Sweep | str | Path | MappingABC[str, Any]
 """A sweep, the path of its file, or what such a file would hold."""
@@ -405,9 +403,8 @@ def _choices(entries: Entries) -> tuple[Criterion, Model, SolverSettings]:
     given = entries.settings
     if "step_s" in given:
         given = {"accuracy": None, **given}
-    return _part(Criterion, given), _part(Model, given), _part(SolverSettings, given)
-
-
-def _part(kind: type[Part], given: dict[str, Any]) -> Part:
-    """Return one dataclass of settings, made of what is given for it."""
-    return kind(**{attribute.name: given[attribute.name] for attribute in fields_of(kind) if attribute.name in given})
+    criterion, model, solver = (
+        {attribute.name: given[attribute.name] for attribute in fields_of(kind) if attribute.name in given}
+        for kind in (Criterion, Model, SolverSettings)
+    )
+    return Criterion(**criterion), Model(**model), SolverSettings(**solver)

@@ -30,11 +30,9 @@ PRINTED = "printed"
 ACCURACIES = ("fast", "balanced", "fine")
 CLOSED_FORM = "closed_form"
 WATER_KG_M3 = 1000.0
-"""Density of water [kg/m^3]."""
 RESISTANCES = ("kp_squared", "broms", "width_capped")
 """Laws of the ultimate resistance of the soil; the first is the paper's."""
 SECOND_OPINIONS = RESISTANCES[1:]
-"""Laws that a second opinion may take."""
 USUAL_OPINION = SECOND_OPINIONS[-1:]
 """The law that is asked where nothing else is said: the one that decides."""
 NO_OPINION = "none"
@@ -276,11 +274,6 @@ class SetDistributions:
 
     section: str  # ``soil`` or ``vehicle``; under this name a row carries the index of its set
     each: tuple[Distribution | None, ...]  # in the order of the sets; None where a set gives a value
-
-    @property
-    def position(self) -> Position:
-        """Where the first of them stands in the file."""
-        return next(spread.position for spread in self.each if spread is not None)
 
     def words(self, unit: str, size: float = 1.0) -> str:
         """Return kind and spread of each in words; see `Distribution.words`."""

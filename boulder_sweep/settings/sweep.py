@@ -32,7 +32,6 @@ MAX_LISTED = 1000
 
 IMPACT_HEIGHT_RULE = "Eq 9: (min(boulder_height - embedment_depth, hood_height) + bumper_height) / 2"
 
-
 SECTION = "report"
 """Block of the file that holds the heading."""
 UNITS = "units"
@@ -155,8 +154,7 @@ class Sweep:
     heading : Heading
         Project, client, author and date for the heading of a report.
     derived : dict of str to Any
-        What inputs were worked out of, by the key of the file: the run-up that gives a speed, the kind of rock that
-        gives a density.
+        What inputs were worked out of, by the key of the file, such as the run-up that gives a speed.
     units : str
         In which results are shown, ``si`` or ``us``; rows do not depend on it.
     depth_sought : bool
@@ -355,7 +353,11 @@ class Sweep:
 
     def _inputs(self) -> dict[str, Any]:
         """Return the values of the inputs by column name, lists where they vary."""
-        varying = {name: _listed(values) for group in self.groups for name, values in group.items()}
+        varying = {
+            name: _or_hash(values.tolist(), np.ascontiguousarray(values, dtype="<f8").tobytes())
+            for group in self.groups
+            for name, values in group.items()
+        }
         sought = {EMBEDMENT[1]: TO_BE_FOUND} if self.depth_sought else {}
         given = self.constants | sought | varying
         return {entry.name: given[entry.name] for entry in INPUTS if entry.name in given}
@@ -369,11 +371,6 @@ def units_in(settings: dict[str, Any]) -> str:
 def allowed_in(settings: dict[str, Any]) -> tuple[str, ...]:
     """Return `Sweep.allowed` by what `Sweep.resolved` returned; of a grid every value has been allowed."""
     return tuple(settings.get(ALLOW_UNUSUAL, ())) if settings["order"] == "table" else HELD
-
-
-def _listed(values: np.ndarray) -> Any:
-    """Return values as a list; see `_or_hash`."""
-    return _or_hash(values.tolist(), np.ascontiguousarray(values, dtype="<f8").tobytes())
 
 
 def _texts_listed(label: Label) -> Any:

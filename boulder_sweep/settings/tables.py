@@ -539,13 +539,8 @@ def _label(name: str, cells: pa.ChunkedArray, label: str) -> Label:
     return Label(found.codes[array.indices.fill_null(-1).to_numpy(zero_copy_only=False) + 1], found.words)
 
 
-_READERS: dict[str, Callable[[Location, Problems], DesignList]] = {
-    ".csv": _read_rows,
-    ".xlsx": _read_rows,
-    ".parquet": _read_columns,
-}
+_READERS = {".csv": _read_rows, ".xlsx": _read_rows, ".parquet": _read_columns}
 """Readers by the end of the file's name."""
-
 
 MAX_TEXT = 200
 """Longest text that is carried along, in characters."""

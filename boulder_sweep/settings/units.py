@@ -337,8 +337,6 @@ _SHOWN: dict[str, tuple[str, str]] = {
     "m/s^2": ("m/s^2", "ft/s^2"),
 }
 KILONEWTONS_PER_KIP = 4.4482216152605
-
-
 _INCH_M = Fraction(254, 10_000)
 
 
@@ -364,7 +362,6 @@ _FORCES = {
 class ShownColumn(NamedTuple):
     """A column of a result as it is shown."""
 
-    stored: str  # name of the column in the result
     name: str
     unit: str
     size: float  # one of its unit in the unit of the result
@@ -422,10 +419,10 @@ def shown_column(stored: str, units: str) -> ShownColumn:
 def shown_as(stored: str, unit: str, meaning: str, units: str) -> ShownColumn:
     """Return how a column of a unit and a meaning is shown."""
     if units == "si" or not unit:
-        return ShownColumn(stored, stored, unit, 1.0, meaning)
+        return ShownColumn(stored, unit, 1.0, meaning)
     other, size = shown_unit(unit, units)
     name = stored if size == 1.0 else stored.removesuffix(name_suffix(unit)) + name_suffix(other)
-    return ShownColumn(stored, name, other, size, meaning)
+    return ShownColumn(name, other, size, meaning)
 
 
 def shown_settings(settings: Mapping[str, Any], units: str) -> dict[str, Any]:

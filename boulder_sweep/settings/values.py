@@ -34,11 +34,8 @@ from boulder_sweep.settings.units import (
 )
 
 MAX_AXIS = 1_000_000
-"""Most values on one axis."""
-
 OUTSIDE = "{value} is outside the admitted range of {low} to {high} ({reason})"
 """Why a value is not admitted; the page of a report says the same."""
-
 WITHOUT_UNIT = ("1", "deg")
 """Units of the table in which a bare number is meant where units are asked for."""
 RANGE_KEYS = ("from", "to", "count", "step")
