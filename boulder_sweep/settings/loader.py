@@ -166,7 +166,7 @@ def _read_text(path: Path) -> str:
 
 
 def decode(data: bytes, label: str) -> str:
-    """Return bytes as text; SettingsError of zero bytes, as in UTF-16, and of what is not UTF-8."""
+    """Return bytes as text; raise SettingsError for zero bytes, as in UTF-16, and for what is not UTF-8."""
     if b"\x00" in data:
         raise refuse(label, "is not a text file (it contains zero bytes); save it as text in UTF-8")
     try:

@@ -147,7 +147,7 @@ def refuse(file: str, message: str, line: int | None = None, column: int | None 
 
 
 def check_regular_file(path: Location, max_bytes: int, what: str) -> None:
-    """Raise SettingsError of anything but a regular file of at most `max_bytes`, before a byte is read.
+    """Raise SettingsError for anything but a regular file of at most `max_bytes`, before a byte is read.
 
     `what` is advice for a file that is too large.
     """
@@ -168,7 +168,7 @@ def check_regular_file(path: Location, max_bytes: int, what: str) -> None:
 
 
 def content_of(path: Location, max_bytes: int) -> bytes:
-    """Return the content of a file, which may have grown after `check_regular_file`; SettingsError if too large."""
+    """Return the content of a file; raise SettingsError where it has grown too large since `check_regular_file`."""
     try:
         with opened(path) as stream:
             data = stream.read(max_bytes + 1)

@@ -125,7 +125,7 @@ class _Settings:
 
 
 def check_stored(settings: Any) -> None:
-    """Check what a result holds in place of what `Sweep.resolved` returned; ValueError: see `check_entries`."""
+    """Check what a result holds in place of what `Sweep.resolved` returned; it raises as `check_entries` does."""
     check_entries(settings, _Settings, "settings")
     if wrong := next(_inconsistencies(settings), ""):
         raise ValueError(shorten(f"settings.{wrong}", 200))
@@ -134,15 +134,15 @@ def check_stored(settings: Any) -> None:
 def check_entries(entries: Any, kind: type[Any], path: str) -> None:
     """Check plain data by a dataclass: which entries there are, and by their names what they may hold.
 
-    ValueError names an entry, beginning with `path`, that is missing, unknown, of another kind, or has a value that a
-    settings file may not hold.
+    Raise ValueError for one that is missing, unknown, of another kind, or has a value that no settings file may hold;
+    the text names it, beginning with `path`.
     """
     if wrong := next(_mistakes(entries, kind, path), ""):
         raise ValueError(shorten(wrong, 200))
 
 
 def check_control(control: dict[str, Any], readings: dict[str, Any]) -> None:
-    """Check how a result says that the motion was integrated; ValueError of what no settings file leads to."""
+    """Check how a result says that the motion was integrated; raise ValueError for what no settings file leads to."""
     if control.keys() != _CONTROL.keys():
         raise ValueError(f"control has other entries than {', '.join(_CONTROL)}")
     for name, (kind, low, high) in _CONTROL.items():

@@ -68,9 +68,9 @@ Row = tuple[list[str], int, str]
 
 
 class TextTable:
-    """Rows of cells, each with a cell for every name in the row above them; SettingsError where there are no names.
+    """Rows of cells, each with a cell for every name in the row above them; raises SettingsError without such names.
 
-    `label` is the file, for messages; nothing is the `delimiter` of a spreadsheet; `known` are names for a message.
+    `label` is the file, for messages; a spreadsheet has an empty `delimiter`; `known` are names for a message.
     """
 
     def __init__(

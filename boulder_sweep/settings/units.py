@@ -129,9 +129,9 @@ class _UnknownUnitError(UnitError):
 def factor(text: str, target: str) -> Fraction:
     """Return the value of one unit as written, ``kN·s/m``, in a unit of the table, a key of `EXPECTED`.
 
-    Weights stand for masses where a mass or a density is asked (116 pcf, 18.2 kN/m^3, 15 kip), and a pound
-    is a force where a force is asked (350 lb/in^3), with standard gravity in between. Raises UnitError of an unknown or
-    malformed unit, and of another kind of quantity.
+    Weights stand for masses where a mass or a density is asked (116 pcf, 18.2 kN/m^3, 15 kip), and a pound is a force
+    where a force is asked (350 lb/in^3), with standard gravity in between. Raises UnitError for an unknown or malformed
+    unit, and for another kind of quantity.
     """
     if target == "m/s^2" and text.strip().lower() in _GRAVITY_NAMES:
         return STANDARD_GRAVITY
@@ -369,7 +369,7 @@ class ShownColumn(NamedTuple):
 
 
 def check_system(system: str) -> None:
-    """Raise ValueError of units that are neither ``si`` nor ``us``."""
+    """Raise ValueError for units that are neither ``si`` nor ``us``."""
     if system not in SYSTEMS:
         raise ValueError(f"units must be {' or '.join(SYSTEMS)}, not {system!r}")
 

@@ -97,7 +97,7 @@ class Leaf:
 def read_leaf(node: Node, field: Field) -> Leaf:
     """Return the values of an entry: ``1.65 m``, ``[36, 40] deg``, ``{from: 1 m, to: 3 m, count: 5}`` and the like.
 
-    SettingsError is raised with every mistake of it.
+    SettingsError holds every mistake in it.
     """
     node = _unfold_text_list(node)
     if isinstance(node, Mapping):
@@ -118,7 +118,7 @@ def read_leaf(node: Node, field: Field) -> Leaf:
 
 
 def read_single(node: Node, field: Field) -> float:
-    """Return the one value of an entry that cannot be an axis; SettingsError if it is not one admitted number."""
+    """Return the one value of an entry that cannot be an axis; raise SettingsError where it is not admitted."""
     if not isinstance(node, Scalar):
         raise wrong(node.position, "takes one value here, not a list or a range")
     (value,) = _check_values([read_quantity(node, field.unit, sample=sample_of(field))], [node], field)
@@ -126,7 +126,7 @@ def read_single(node: Node, field: Field) -> float:
 
 
 def read_block(node: Node, known: dict[str, Field], what: str, required: Collection[str] = ()) -> dict[str, float]:
-    """Return the single values of a block by the names of its fields; SettingsError with every mistake in it.
+    """Return the single values of a block by the names of its fields; raise SettingsError with every mistake.
 
     Fields are `known` by key; messages call the block `what`, such as ``a layer``.
     """
@@ -354,7 +354,7 @@ def read_quantity(node: Node, unit: str, outer_unit: Scalar | None = None, sampl
 
 
 def split_number(text: str, unit: str, sample: str = "") -> tuple[Fraction, str]:
-    """Return the plain, finite decimal number that a text must begin with, else NumberError, and the rest, its unit."""
+    """Return the plain, finite decimal number at the beginning of a text, else raise NumberError, and its unit."""
     stripped = text.strip().replace("−", "-")
     given = f"'{shorten(text)}'"
     words = needed(unit, sample)
@@ -459,7 +459,7 @@ def refuse_bare(option: str, texts: list[str], unit: str) -> None:
 
 
 def read_count(node: Node, what: str, largest: int) -> int:
-    """Return a whole number from 1 to `largest`; SettingsError of anything else."""
+    """Return a whole number from 1 to `largest`; raise SettingsError for anything else."""
     if isinstance(node, Scalar) and re.fullmatch(r"[1-9]\d{0,17}", node.text.strip(), re.ASCII):
         value = int(node.text)
         if value <= largest:

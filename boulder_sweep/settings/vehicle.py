@@ -97,7 +97,7 @@ class Approach:
 
     @property
     def impact_speed_m_s(self) -> float:
-        """Speed at the boulder [m/s]; NoApproachError where the vehicle stops before it, or never starts."""
+        """Speed at the boulder [m/s]; raises NoApproachError where the vehicle stops before it, or never starts."""
         squared = self.start_speed_m_s**2 + 2.0 * self.net_acceleration_m_s2 * self.length_m
         if squared > 0.0:
             return math.sqrt(squared)
