@@ -32,11 +32,7 @@ def grid_lines(sweep: Sweep) -> list[str]:
         return [f"{sweep.name}: {count} from {sweep.table.file}{carried}", *_uncertain_lines(sweep), *ground]
     lines = [f"{sweep.name}: {count}"]
     for axis in sweep.axes:
-        shown = (
-            shown_column(axis.name, sweep.units)
-            if axis.name in BY_NAME
-            else ShownColumn(axis.name, axis.name, "", 1.0, "")
-        )
+        shown = shown_column(axis.name, sweep.units) if axis.name in BY_NAME else ShownColumn(axis.name, "", 1.0, "")
         if axis.labels:
             noun = "set" if len(axis) == 1 else "sets"
             lines.append(f"  {axis.name:<26}{len(axis):>9,} {noun:<8}{', '.join(axis.labels)}")

@@ -1,19 +1,7 @@
 """The file of settings: YAML with positions, units, typed values, every check."""
 
 from boulder_sweep.settings.loader import load, load_text
-from boulder_sweep.settings.model import Criterion, Model, ReadingChoice, SolverSettings
 from boulder_sweep.settings.problems import Problem, SettingsError
-from boulder_sweep.settings.sweep import Axis, Sweep
+from boulder_sweep.settings.sweep import Sweep
 
-__all__ = [
-    "Axis",
-    "Criterion",
-    "Model",
-    "Problem",
-    "ReadingChoice",
-    "SettingsError",
-    "SolverSettings",
-    "Sweep",
-    "load",
-    "load_text",
-]
+__all__ = ["Problem", "SettingsError", "Sweep", "load", "load_text"]

@@ -1,8 +1,4 @@
-"""Checks across entries: mistakes for which a file is refused, and notes on what deserves a second look.
-
-What is missing, contradictory or mutually exclusive is a mistake. Notes are made on settings that are valid; they never
-stop a run.
-"""
+"""Checks across entries: mistakes for which a file is refused, and notes on valid settings that never stop a run."""
 
 from __future__ import annotations
 
@@ -13,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import numpy as np
 
 from boulder_sweep.columns import BOULDER_MASS, SHAPES, WAY_OUT
-from boulder_sweep.designs import LEAST_SOLIDITY, LEAST_TAPED, MOST_SOLIDITY
+from boulder_sweep.designs import LEAST_SOLIDITY, LEAST_TAPED, MOST_SOLIDITY, SIDES
 from boulder_sweep.investigation import api_curve, off_families, terzaghi_curve
 from boulder_sweep.settings import fields
 from boulder_sweep.settings.entries import Entries
@@ -47,15 +43,6 @@ _FRONT = ("vehicle_mass_kg", "impact_speed_m_s", "vehicle_spring_N_m", "vehicle_
 LEAST_CRUSH, MOST_CRUSH = 0.5, 1.25
 """Crush at a rigid wall over the calibrated one, between which spring and damper are taken for the vehicle's. A
 boulder gives way and takes less of the front than a wall: hence more than 1."""
-BEYOND_FRONT = (
-    "against a rigid wall the front of this vehicle would be crushed by {crush}; its spring and damper are calibrated "
-    "up to {calibrated} (vehicle.calibrated_crush): do they belong to a vehicle of this mass and speed?"
-)
-SHORT_OF_FRONT = (
-    "against a rigid wall the front of this vehicle would be crushed by only {crush}; its spring and damper are "
-    "calibrated up to {calibrated} (vehicle.calibrated_crush): do they belong to a vehicle of this mass and speed?"
-)
-"""Cautions where a vehicle is far from the one its spring and damper were fitted to; a report's page says the same."""
 
 
 def check_complete(entries: Entries) -> None:
@@ -169,7 +156,7 @@ def _check_impact_height(entries: Entries, bumper: float | None) -> None:
 def _check_mass(entries: Entries) -> None:
     """Report boulders that are all heavier than solid boxes of their size."""
     density = entries.values("boulder_density_kg_m3")
-    sides = [entries.values(f"boulder_{side}_m") for side in ("length", "width", "height")]
+    sides = [entries.values(name) for name in SIDES]
     mass = entries.values(BOULDER_MASS)
     if not all(map(len, (mass, *sides))):
         return
@@ -241,14 +228,7 @@ def _check_ground(entries: Entries) -> None:
 def notes_on(sweep: Sweep, positions: Mapping[str, Position], written: Mapping[str, str]) -> Iterator[Problem]:
     """Yield a note for every unusual value and for data that do not belong together.
 
-    Parameters
-    ----------
-    sweep : Sweep
-        Valid settings.
-    positions : mapping of str to Position
-        Position of each input in the file, by its dotted key.
-    written : mapping of str to str
-        Unit in which inputs were written in the file, by the columns of the table.
+    Inputs stand at `positions` by their dotted keys; their units are as `written` by the columns of the table.
     """
     table = sweep.table
     listed = {} if table is None else {BY_NAME[name].path: Position(table.source) for name in table.columns}
@@ -261,7 +241,7 @@ def notes_on(sweep: Sweep, positions: Mapping[str, Position], written: Mapping[s
 
 
 def _remarks(sweep: Sweep, written: Mapping[str, str]) -> Iterator[tuple[str, str]]:
-    """Yield dotted keys, and what is to be remarked of each; empty where nothing is. Arguments: see `notes_on`."""
+    """Yield dotted keys, and what is to be remarked of each; empty where nothing is."""
     values = sweep.values
     for name, of_input in values.items():
         if sweep.table is None or name not in sweep.table.columns:
@@ -285,7 +265,7 @@ def _remarks(sweep: Sweep, written: Mapping[str, str]) -> Iterator[tuple[str, st
     limit, usual = sweep.criterion.max_rotation_deg, BY_NAME["max_rotation_deg"].usual
     if usual is not None and limit > usual.high:
         yield "criterion.max_rotation", f"{limit:g} deg is large: {usual.remark}"
-    if sweep.model.has_few_elements:
+    if 0 < sweep.model.soil_elements < ENOUGH_ELEMENTS:
         few = f"{counted(sweep.model.soil_elements, 'soil element')}: sums over so few may give other verdicts"
         yield "model.soil", f"{few}; take {ENOUGH_ELEMENTS} or more, or {CLOSED_FORM}"
     if sweep.partial_factor != 1.0:
@@ -362,13 +342,7 @@ def _pairs(sweep: Sweep, one: str, other: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def wall_crush(mass: np.ndarray, speed: np.ndarray, spring: np.ndarray, damper: np.ndarray) -> np.ndarray:
-    """Return by how much the front of a vehicle is crushed against a rigid wall (Eqs 49 to 51) [m].
-
-    Parameters
-    ----------
-    mass, speed, spring, damper : ndarray
-        Of vehicles, in SI units, in shapes that broadcast against each other.
-    """
+    """Return by how much the fronts of vehicles, in SI units, are crushed at a rigid wall (Eqs 49 to 51) [m]."""
     by_damper = mass * speed / damper
     decay, squared = -0.5 * spring / damper, spring / mass - (0.5 * spring / damper) ** 2
     b = np.sqrt(np.maximum(squared, 0.0))
@@ -383,22 +357,28 @@ def _off_front(sweep: Sweep) -> str:
 
     The crush grows with mass and speed, and falls with spring and damper, so the ends of axes suffice.
     """
-    values, calibrated = sweep.values, sweep.model.calibrated_crush_m
-    listed = [group for group in sweep.groups if len(group) > 1 and set(group) & set(_FRONT)]
+    calibrated = sweep.model.calibrated_crush_m
+    groups = [group for group in sweep.groups if {*group} & {*_FRONT}]
     front = []
     for name in _FRONT:
-        index = next((k for k, group in enumerate(listed) if name in group), None)
-        ends = values[name] if index is not None else np.array([values[name].min(), values[name].max()])
-        dimension = _FRONT.index(name) if index is None else len(_FRONT) + index
-        front.append(ends.reshape([-1 if k == dimension else 1 for k in range(len(_FRONT) + len(listed))]))
+        varying = [name in group for group in groups]
+        values = sweep.values[name]
+        if not any(len(group) > 1 and name in group for group in groups):
+            values = np.unique([values.min(), values.max()])
+        front.append(values.reshape([-1 if varies else 1 for varies in varying]))
     crush = wall_crush(*front)
-    largest, words = float(crush.max()), BEYOND_FRONT
-    up_to = "" if crush.min() == largest else "up to "
-    if largest <= MOST_CRUSH * calibrated:
-        largest, words, up_to = float(crush.min()), SHORT_OF_FRONT, ""
-        if largest >= LEAST_CRUSH * calibrated:
-            return ""
-    return words.format(crush=f"{up_to}{largest:.3g} m", calibrated=f"{calibrated:g} m")
+    least, largest = float(crush.min()), float(crush.max())
+    if largest > MOST_CRUSH * calibrated:
+        crushed = f"{largest:.3g} m" if least == largest else f"up to {largest:.3g} m"
+    elif least < LEAST_CRUSH * calibrated:
+        crushed = f"only {least:.3g} m"
+    else:
+        return ""
+    return (
+        f"against a rigid wall the front of this vehicle would be crushed by {crushed}; its spring and damper are "
+        f"calibrated up to {calibrated:g} m (vehicle.calibrated_crush): do they belong to a vehicle of this mass and "
+        "speed?"
+    )
 
 
 def _without_partner(off: np.ndarray) -> np.ndarray:
@@ -423,16 +403,11 @@ def _unusual(name: str, values: np.ndarray, written: str = "") -> str:
     given = range_words(low, high, unit, written)
     ends = range_words(usual.low, usual.high, unit, written, digits=4)
     remark = usual.remark.partition("; a bare number")[0] if written else usual.remark
-    return f"{given} is outside the usual range of {ends} ({remark}); {_outcome(name, low, high)}"
-
-
-def _outcome(name: str, low: float, high: float) -> str:
-    """Return what becomes of designs with unusual values."""
-    if name != "embedment_ratio" or high < 1.0:
-        return "computed as given"
-    if low < 1.0:
-        return "designs of 1 or more cannot be computed, since the depth must be less than the boulder's height"
-    return "cannot be computed, since the depth must be less than the boulder's height"
+    outcome = "computed as given"
+    if name == "embedment_ratio" and high >= 1.0:
+        some = "designs of 1 or more " if low < 1.0 else ""
+        outcome = f"{some}cannot be computed, since the depth must be less than the boulder's height"
+    return f"{given} is outside the usual range of {ends} ({remark}); {outcome}"
 
 
 def _off_families(angle: np.ndarray, reaction: np.ndarray) -> str:

@@ -1,8 +1,4 @@
-"""Read the entries of a file block by block; after a mistake reading goes on with the next entry.
-
-Entries that are more than a number have readers of their own: words, readings of the paper, soil representation,
-second opinions, layers, and the shape of the boulder, by a profile or by a scan.
-"""
+"""Read the entries of a file block by block; after a mistake reading goes on with the next entry."""
 
 from __future__ import annotations
 
@@ -50,15 +46,7 @@ from boulder_sweep.settings.soil_readings import (
 from boulder_sweep.settings.sweep import SECTION, UNITS, DesignList
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence, block_of
 from boulder_sweep.settings.units import SYSTEMS, UnitError, factor
-from boulder_sweep.settings.values import (
-    Leaf,
-    meant_by,
-    quoted,
-    read_block,
-    read_count,
-    read_input,
-    read_single,
-)
+from boulder_sweep.settings.values import Leaf, meant_by, quoted, read_block, read_count, read_input, read_single
 from boulder_sweep.settings.vehicle import APPROACH, unfold_approaches
 from boulder_sweep.stones.rock import ROCKS
 
@@ -72,8 +60,7 @@ TOP_KEYS = ("name", *fields.SECTIONS, "table", SECTION, UNITS, fields.ALLOW_UNUS
 SITE_KEYS = {"soil": (*METHODS, HOLE, ENERGY, TOPSOIL.key), "vehicle": (APPROACH,)}
 """Keys of a block that stand for others, as the site gives them."""
 DRAWN_SD = 5.0
-"""Standard deviations above its mean up to which values of an uncertain input are drawn, but for one in three million.
-"""
+"""Standard deviations from its mean up to which an uncertain input is drawn, but for one value in three million."""
 MOST_LAYERS = 100
 MOST_POINTS = 100
 _SIDE = Bound(0.0, 20.0, "a length")
@@ -109,44 +96,22 @@ LAYER_FIELDS = {
 
 
 class Entries:
-    """What a file says, as far as it can be read.
-
-    Attributes
-    ----------
-    leaves : dict of str to Leaf
-        Inputs by column (or axis) name, as far as they have no mistake.
-    settings : dict of str to Any
-        What holds for all designs, by the name of the attribute, as far as given and without a mistake.
-    given : set of str
-        Dotted keys that stand in the file, right or wrong.
-    misspelled : set of str
-        Dotted keys that are missing, while an unknown key beside them looks like them.
-    sets : dict of str to tuple of str
-        Names of the named sets of a block that is a list of them.
-    table : DesignList or None
-        The table named in the file.
-    depth_sought : bool
-        Whether the depth is to be found.
-    derived : dict of str to Any
-        What inputs were worked out of, by the key of the file.
-    allowed : tuple of str
-        Dotted keys whose values may be far from usual, sorted.
-    """
+    """What a file says, as far as it can be read."""
 
     def __init__(self, root: Mapping, path: Path, problems: Problems) -> None:
         self.root = root
         self.path = path
         self.problems = problems
-        self.leaves: dict[str, Leaf] = {}
-        self.settings: dict[str, Any] = {}
-        self.given: set[str] = set()
-        self.misspelled: set[str] = set()
-        self.sets: dict[str, tuple[str, ...]] = {}
+        self.leaves: dict[str, Leaf] = {}  # inputs by column (or axis) name, as far as they have no mistake
+        self.settings: dict[str, Any] = {}  # what holds for all designs, by attribute, as far as it has no mistake
+        self.given: set[str] = set()  # dotted keys that stand in the file, right or wrong
+        self.misspelled: set[str] = set()  # dotted keys that are missing, while an unknown key looks like them
+        self.sets: dict[str, tuple[str, ...]] = {}  # names of the named sets of a block that is a list of them
         self.table: DesignList | None = None
         self.depth_sought = False
-        self.derived: dict[str, Any] = {}
-        self.cautions: list[str] = []
-        self.allowed: tuple[str, ...] = ()
+        self.derived: dict[str, Any] = {}  # what inputs were worked out of, by the key of the file
+        self.cautions: list[str] = []  # about the scan
+        self.allowed: tuple[str, ...] = ()  # dotted keys whose values may be far from usual, sorted
 
     def read(self) -> None:
         """Read the whole file; mistakes go to `problems`."""
@@ -210,8 +175,7 @@ class Entries:
     def _feet(self) -> tuple[float, float]:
         """Return the shallowest and the deepest foot of all designs [m]; infinity where mistakes leave them unknown.
 
-        A depth that is to be found is searched from the least usual embedment down to where the truck goes over the
-        boulder.
+        A depth to be found is searched from the least usual embedment down to where the truck goes over the boulder.
         """
         names = "boulder_height_m", *reversed(fields.EMBEDMENT)
         (low, high), (least, most), (from_ratio, to_ratio) = (self._drawn(name) for name in names)
@@ -261,14 +225,11 @@ class Entries:
         allowed: set[str] = set()
         for item in node.items if isinstance(node, Sequence) and node.unit is None else [node]:
             word = item.text.strip() if isinstance(item, Scalar) else ""
-            if word == fields.EVERYTHING:
-                allowed.update(fields.HELD)
-            elif word in fields.HELD:
-                allowed.add(word)
+            known = (*fields.HELD, fields.EVERYTHING)
+            if word in known:
+                allowed.update(fields.HELD if word == fields.EVERYTHING else [word])
             else:
-                message = unknown_word(
-                    word, "an entry that is held to its usual range", (*fields.HELD, fields.EVERYTHING)
-                )
+                message = unknown_word(word, "an entry that is held to its usual range", known)
                 self.problems.add(item.position, message, fields.ALLOW_UNUSUAL)
         self.allowed = tuple(sorted(allowed))
 
@@ -276,8 +237,7 @@ class Entries:
         node = self.root.get("table")
         if node is None:
             return
-        # The csv module is needed for tables only.
-        from boulder_sweep.settings.tables import read_designs
+        from boulder_sweep.settings.tables import read_designs  # needed for tables only
 
         if not isinstance(node, Scalar) or not node.text.strip():
             self.problems.add(node.position, "must be the name of a .csv, .xlsx or .parquet file", "table")
@@ -320,8 +280,7 @@ class Entries:
         before = len(self.problems)
         names: list[str] = []
         columns: dict[str, list[Leaf]] = {}
-        items = node.items or [Scalar(node.position, "")]
-        for item in items:
+        for item in node.items or [Scalar(node.position, "")]:
             if not isinstance(item, Mapping):
                 message = "must be a list of blocks, each with a name and one value per key"
                 self.problems.add(item.position, message, section)
@@ -331,17 +290,16 @@ class Entries:
                 field = known.get(inner.key)
                 if inner.key == "name":
                     continue
-                if field is not None and field not in fields.INPUTS:
-                    message = f"is not a key of {section} in a named set: it is one for all designs of a file"
-                    self.problems.add(inner.position, message, field.path)
-                    continue
                 if field is None:
                     inputs = (key for key in known if known[key] in fields.INPUTS)
                     self.unknown(inner, section, ("name", *inputs, *SITE_KEYS.get(section, ())))
-                    continue
-                self.given.add(field.path)
-                with self.reporting(field.path):
-                    columns.setdefault(field.name, []).append(_one_of_set(inner.value, field))
+                elif field not in fields.INPUTS:
+                    message = f"is not a key of {section} in a named set: it is one for all designs of a file"
+                    self.problems.add(inner.position, message, field.path)
+                else:
+                    self.given.add(field.path)
+                    with self.reporting(field.path):
+                        columns.setdefault(field.name, []).append(_one_of_set(inner.value, field))
             if len(self.problems) == before:
                 for name, values in columns.items():
                     if len(values) != len(names):
@@ -469,10 +427,7 @@ def _read_layers(node: Node) -> tuple[Layer, ...]:
 
 
 def _read_profile(node: Node) -> tuple[ProfilePoint, ...]:
-    """Read ``[{height: 0 m, width: 1.2 m, length: 1.1 m}, ...]``, or ``near`` and ``far`` in place of ``length``.
-
-    The points are in metres; see `_shares_of`.
-    """
+    """Read ``[{height: 0 m, width: 1.2 m, length: 1.1 m}, ...]``, or ``near`` and ``far`` for ``length``, in metres."""
     if not isinstance(node, Sequence) or not 2 <= len(node.items) <= MOST_POINTS or node.unit is not None:
         message = f"must be a list of 2 to {MOST_POINTS} points from the foot up, each a block of keys: "
         raise wrong(node.position, message + ", ".join(PROFILE_FIELDS))
@@ -511,9 +466,9 @@ def _read_point(node: Node) -> ProfilePoint:
 
 
 def _unfold_scan(boulder: Mapping, folder: Path) -> tuple[Scan, list[str]]:
-    """Replace the scan of a boulder, and the mass of the whole stone beside it, by profile and density.
+    """Replace the scan of a boulder, and its mass, by profile and density; return the scan and what makes one doubt it.
 
-    Returns what the scan is, and what makes one doubt it; a relative name begins in `folder`.
+    A relative name begins in `folder`.
     """
     entry = boulder.entries.pop("scan")
     words = _read_scan_words(entry.value)
@@ -527,8 +482,7 @@ def _unfold_scan(boulder: Mapping, folder: Path) -> tuple[Scan, list[str]]:
     problems.raise_if_any()
     mass = boulder.entries.pop("mass", None)
     mass_kg = None if mass is None else read_single(mass.value, fields.BOULDER_MASS)
-    # What reads scans is needed for them only.
-    from boulder_sweep.stones.weighing import scanned
+    from boulder_sweep.stones.weighing import scanned  # needed for scans only
 
     try:
         metres = float(factor(words.get("unit", "m"), "m"))

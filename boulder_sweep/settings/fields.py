@@ -1,14 +1,11 @@
 """Every entry of a settings file in one register: key, unit, admitted and usual values, default.
 
 Inputs are declared here, settings on the attributes of the dataclasses of `boulder_sweep.settings.model`. The reader,
-the checks, the tables of the documentation and the JSON Schema for editors follow from both. Name, unit and meaning of
-an input that is a column of the result come from the register of columns. Options of commands may call an entry by its
-path, its key or its column: see `named`.
+the checks, the tables of the documentation and the JSON Schema for editors follow from both.
 
-The admitted range is wide: at least a million times either side of what is normal wherever a material or
-mechanical constant is concerned. A value beyond it is a typing mistake and refused. A value outside the usual range
-is computed as given, with a note; of masses, densities, springs, dampers and speeds one that is more than `FAR`
-times outside must be allowed by the file.
+The admitted range is wide: at least a million times either side of what is normal for material and mechanical
+constants. A value beyond it is a typing mistake and refused. A value outside the usual range is computed as given, with
+a note; of masses, densities, springs, dampers and speeds one more than `FAR` times outside must be allowed by the file.
 """
 
 from __future__ import annotations
@@ -45,11 +42,7 @@ _ABOVE_GROUND = Bound(0.0, 20.0, "counted upwards from the ground")
 
 INPUTS: tuple[Field, ...] = (
     _input(
-        "boulder.length",
-        "boulder_length_m",
-        _SIZE,
-        Usual(0.6, 2.0, "usual boulders"),
-        also=("l", "depth", "thickness"),
+        "boulder.length", "boulder_length_m", _SIZE, Usual(0.6, 2.0, "usual boulders"), also=("l", "depth", "thickness")
     ),
     _input("boulder.width", "boulder_width_m", _SIZE, Usual(0.8, 2.5, "usual boulders"), also=("w", "breadth")),
     _input("boulder.height", "boulder_height_m", _SIZE, Usual(1.5, 4.0, "usual boulders"), also=("h",)),
@@ -241,9 +234,7 @@ EMBEDMENT = ("embedment_ratio", "embedment_depth_m")
 """Exactly one of these is given."""
 TO_BE_FOUND = "to be found"
 """What a file gives for the depth where a question is to find it."""
-
 MAX_ELEMENTS = 1_000_000
-"""Most soil elements per design."""
 
 
 def fields_of(section: str) -> tuple[Field, ...]:
@@ -252,15 +243,7 @@ def fields_of(section: str) -> tuple[Field, ...]:
 
 
 class UnknownNameError(ValueError):
-    """A word names no entry, or several.
-
-    Parameters
-    ----------
-    word
-        The word.
-    what
-        What is wrong with it, and which entries there are.
-    """
+    """A word names no entry, or several; `what` says what is wrong with it, and which entries there are."""
 
     def __init__(self, word: str, what: str):
         super().__init__(word, what)
@@ -271,19 +254,9 @@ class UnknownNameError(ValueError):
 
 
 def named(word: str, among: Sequence[Field] = INPUTS) -> Field:
-    """Return the entry that a word names; an input goes before a setting of the same key.
+    """Return the entry that a word names: a path (``boulder.width``), key (``width``) or column (``boulder_width_m``).
 
-    Parameters
-    ----------
-    word
-        Path of the entry (``boulder.width``), its key (``width``) or its column (``boulder_width_m``).
-    among
-        Entries that may be meant; the inputs by default.
-
-    Raises
-    ------
-    UnknownNameError
-        No entry has this name, or several have this key.
+    An input goes before a setting of the same key. Raises UnknownNameError where none or several have this name.
     """
     matches = [field for field in among if word in (field.path, field.name)]
     matches = matches or [field for field in among if word == field.key]
@@ -384,19 +357,7 @@ _HEAD = """\
 
 
 def starter(name: str, vehicle: str = "M30", units: Literal["si", "us"] = "si", file: str = "FILE") -> str:
-    """Return the text of a settings file.
-
-    Parameters
-    ----------
-    name : str
-        Name of the sweep.
-    vehicle : str
-        Class of the vehicle, a key of `CLASSES`.
-    units : {'si', 'us'}
-        Units of the values.
-    file : str
-        Name of the file, for its first lines.
-    """
+    """Return the text of a settings file for a class of vehicles in `CLASSES`; its first lines name the `file`."""
     quoted = printable(shlex.quote(file))
     lines = [*_HEAD.format(name=name, file=quoted, length="ft" if units == "us" else "m").splitlines(), f"name: {name}"]
     for section, words in SECTIONS.items():

@@ -1,11 +1,9 @@
-"""Load a file as a checked sweep, with what ``--set KEY=VALUE`` puts in the place of single entries.
-
-Every mistake is reported at once.
-"""
+"""Load a file as a checked sweep, with what ``--set KEY=VALUE`` puts in the place of single entries."""
 
 from __future__ import annotations
 
 import json
+import math
 import re
 import warnings
 from collections.abc import Mapping as MappingABC
@@ -13,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import fields as fields_of
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +31,7 @@ from boulder_sweep.settings.problems import (
     nearest,
     refuse,
     shorten,
+    wrong,
 )
 from boulder_sweep.settings.sweep import SECTION, UNITS, Axis, Heading, Sweep, wrong_with
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, parse, parse_node
@@ -74,12 +73,8 @@ LISTS = (".csv", ".xlsx", ".parquet")
 MAX_OVERRIDE = 20_000
 """Longest option, in characters."""
 
-Part = TypeVar("Part", Criterion, Model, SolverSettings)
-
 Settings = Sweep | str | Path | MappingABC[str, Any]
 """A sweep, the path of its file, or what such a file would hold."""
-
-
 _IN_MEMORY = Path("settings")
 """What messages call settings that are no file."""
 
@@ -171,13 +166,7 @@ def _read_text(path: Path) -> str:
 
 
 def decode(data: bytes, label: str) -> str:
-    """Return `data` as text, or say why it cannot be.
-
-    Raises
-    ------
-    SettingsError
-        Zero bytes, as in UTF-16, or bytes that are not UTF-8.
-    """
+    """Return bytes as text; raise SettingsError for zero bytes, as in UTF-16, and for what is not UTF-8."""
     if b"\x00" in data:
         raise refuse(label, "is not a text file (it contains zero bytes); save it as text in UTF-8")
     try:
@@ -190,10 +179,9 @@ def decode(data: bytes, label: str) -> str:
 
 
 def _apply_overrides(root: Mapping, overrides: Sequence[str], problems: Problems) -> None:
-    """Put every ``key.path=value`` into the tree, in order; mistakes go to `problems`.
+    """Put every ``key.path=value`` into the tree, in order: keys as `fields.named` takes them, values as in the file.
 
-    They are as typed behind ``--set``, the key as `boulder_sweep.settings.fields.named` takes it; the value is YAML, so
-    lists and ranges work as in the file. ``--accuracy=fine`` is an option of its own.
+    ``--accuracy=fine`` is an option of its own.
     """
     for text in overrides:
         key, equals, value_text = text.partition("=")
@@ -293,8 +281,8 @@ def _read_heading(entries: Entries) -> Heading:
             entries.unknown(inner, SECTION, Heading._fields)
         elif not isinstance(value, Scalar):
             entries.problems.add(value.position, "must be one line of text, not a list or a block", path)
-        elif wrong := wrong_with(value.text):
-            entries.problems.add(value.position, wrong, path)
+        elif mistake := wrong_with(value.text):
+            entries.problems.add(value.position, mistake, path)
         else:
             texts[inner.key] = value.text.strip()
     return Heading(**texts)
@@ -303,14 +291,10 @@ def _read_heading(entries: Entries) -> Heading:
 def _read_units(root: Mapping, problems: Problems) -> str:
     """Return the units named in a file, empty where none are; with ``us``, or in feet, no number may lack its unit."""
     node = root.get(UNITS)
-    if node is None:
-        if _is_in_feet(root):
-            _need_units(root)
-        return ""
     units = node.text.strip() if isinstance(node, Scalar) else ""
-    if units not in SYSTEMS:
+    if node is not None and units not in SYSTEMS:
         problems.add(node.position, f"must be {' or '.join(SYSTEMS)}", UNITS)
-    if units == "us":
+    if units == "us" or (node is None and _is_in_feet(root)):
         _need_units(root)
     return units
 
@@ -342,11 +326,8 @@ def _build(name: str, heading: Heading, units: str, entries: Entries, overrides:
     if factor != 1.0:
         _apply_partial_factor(entries, factor)
     axes = _axes(entries)
-    constants: dict[str, float] = {}
-    for field in fields.INPUTS:
-        value = entries.single(field.name)
-        if value is not None:
-            constants[field.name] = value
+    single = {field.name: entries.single(field.name) for field in fields.INPUTS}
+    constants = {name: value for name, value in single.items() if value is not None}
     if entries.gives_mass and DENSITY not in {*constants, *entries.listed, *entries.leaves}:
         constants[DENSITY] = ROCK_KG_M3
         entries.settings["rock_assumed"] = True
@@ -398,7 +379,6 @@ def _apply_partial_factor(entries: Entries, factor: float) -> None:
 def _axes(entries: Entries) -> tuple[Axis, ...]:
     """Return the axes in the order of the file."""
     axes: list[Axis] = []
-    count = 1
     for section in entries.root:
         if section.key == SECTION:
             continue
@@ -407,19 +387,14 @@ def _axes(entries: Entries) -> tuple[Axis, ...]:
             names = [field.name for field in fields.fields_of(section.key) if field.name in entries.leaves]
             columns = {name: entries.leaves[name].values for name in names}
             axes.append(Axis(section.key, np.arange(float(len(labels))), columns, labels))
-            count *= len(labels)
-        if not isinstance(section.value, Mapping):
-            continue
-        for entry in section.value:
+        for entry in section.value if isinstance(section.value, Mapping) else ():
             field = fields.BY_PATH[f"{section.key}.{entry.key}"]
             leaf = entries.leaves.get(field.name)  # settings have none
             if leaf is not None and leaf.is_axis:
                 axes.append(Axis(field.name, leaf.values))
-                count *= len(leaf.values)
+    count = math.prod(map(len, axes))
     if count > MAX_DESIGNS:
-        message = f"the grid has {count} designs; at most {MAX_DESIGNS} can be numbered"
-        entries.problems.add(entries.root.position, message)
-        entries.problems.raise_if_any()
+        raise wrong(entries.root.position, f"the grid has {count} designs; at most {MAX_DESIGNS} can be numbered")
     return tuple(axes)
 
 
@@ -428,9 +403,8 @@ def _choices(entries: Entries) -> tuple[Criterion, Model, SolverSettings]:
     given = entries.settings
     if "step_s" in given:
         given = {"accuracy": None, **given}
-    return _part(Criterion, given), _part(Model, given), _part(SolverSettings, given)
-
-
-def _part(kind: type[Part], given: dict[str, Any]) -> Part:
-    """Return one dataclass of settings, made of what is given for it."""
-    return kind(**{attribute.name: given[attribute.name] for attribute in fields_of(kind) if attribute.name in given})
+    criterion, model, solver = (
+        {attribute.name: given[attribute.name] for attribute in fields_of(kind) if attribute.name in given}
+        for kind in (Criterion, Model, SolverSettings)
+    )
+    return Criterion(**criterion), Model(**model), SolverSettings(**solver)

@@ -1,8 +1,4 @@
-"""The settings that are not columns, each declared once: criterion, reading of the paper, soil, shape, solver.
-
-What an attribute declares with `setting` is read, checked and documented by that; see `boulder_sweep.settings.fields`.
-A boulder is a box, or has a profile of width and length over the height.
-"""
+"""The settings that are not columns: what an attribute declares with `setting` is read and documented by it."""
 
 from __future__ import annotations
 
@@ -34,11 +30,9 @@ PRINTED = "printed"
 ACCURACIES = ("fast", "balanced", "fine")
 CLOSED_FORM = "closed_form"
 WATER_KG_M3 = 1000.0
-"""Density of water [kg/m^3]."""
 RESISTANCES = ("kp_squared", "broms", "width_capped")
 """Laws of the ultimate resistance of the soil; the first is the paper's."""
 SECOND_OPINIONS = RESISTANCES[1:]
-"""Laws that a second opinion may take."""
 USUAL_OPINION = SECOND_OPINIONS[-1:]
 """The law that is asked where nothing else is said: the one that decides."""
 NO_OPINION = "none"
@@ -77,55 +71,24 @@ class Usual(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One entry of the file.
-
-    Attributes
-    ----------
-    section, key : str
-        Where it stands in the file: ``section: {key: ...}``.
-    name : str
-        Its column in the table; for other inputs the name of the axis, for settings the attribute of `Criterion`,
-        `Model`, `SolverSettings` or `Sweep` that holds it.
-    unit : str
-        Unit of a bare number, and of the column; empty for words.
-    meaning : str
-        What it is, in one line.
-    admitted : Bound or None
-        Values that are accepted; None for words.
-    usual : Usual or None
-        Values met in practice.
-    held : bool
-        Whether a value far outside the usual range is refused unless the file allows it: a slip of the unit decides
-        more about a mass than about a length.
-    default : float or None
-        Value of an input that the file does not give; None where there is none. (Settings have the defaults of the
-        attributes that declare them.)
-    shown_default : float, str or None
-        What holds where the file does not give the entry, as it is written there: a number in `unit`, or a word.
-    also : tuple of str
-        Other words people try, for "did you mean".
-    optional : bool
-        Whether a file may be complete without it.
-    choices : tuple of str
-        Words of which it is one; none where it is not such a word.
-    kind : str
-        What such a word is, as in "P9 is not a penetration rating".
-    """
+    """One entry of the file, ``section: {key: ...}``."""
 
     section: str
     key: str
-    name: str
-    unit: str
+    name: str  # its column; of other inputs the axis, of settings the attribute that holds it
+    unit: str  # of a bare number, and of the column; empty for words
     meaning: str
     admitted: Bound | None = None
     usual: Usual | None = None
-    default: float | None = None
-    also: tuple[str, ...] = ()
-    optional: bool = False
-    choices: tuple[str, ...] = ()
-    kind: str = ""
-    shown_default: float | str | None = None
+    default: float | None = None  # of an input; settings have the defaults of the attributes that declare them
+    also: tuple[str, ...] = ()  # other words people try, for "did you mean"
+    optional: bool = False  # whether a file may be complete without it
+    choices: tuple[str, ...] = ()  # words of which it is one
+    kind: str = ""  # what such a word is, as in "P9 is not a penetration rating"
+    shown_default: float | str | None = None  # what holds without it, as a file has it: a number in `unit`, or a word
     held: bool = False
+    """Whether a value far outside the usual range is refused unless the file allows it: a slip of the unit decides more
+    about a mass than about a length."""
 
     @property
     def path(self) -> str:
@@ -133,19 +96,10 @@ class Field:
         return f"{self.section}.{self.key}"
 
 
-def setting(path: str, unit: str, meaning: str, default: Any = MISSING, **more: Any) -> Any:
-    """Declare an attribute of a dataclass as an entry of the file.
+def setting(path: str, meaning: str, default: Any = MISSING, *, unit: str = "", **more: Any) -> Any:
+    """Declare an attribute of a dataclass as an entry of the file, which must give it where there is no default.
 
-    Parameters
-    ----------
-    path : str
-        Dotted key.
-    unit, meaning
-        See `Field`.
-    default
-        Value where the file does not give the entry; none where it must.
-    more
-        Further attributes of `Field`; the default is shown as it is where it is a number or a word.
+    `more` are further attributes of `Field`; a default that is a number or a word is shown as it is.
     """
     section, _, key = path.rpartition(".")
     if isinstance(default, float | str):
@@ -163,14 +117,7 @@ def entries_of(part: type[Any]) -> list[Field]:
 class ProfilePoint:
     """One point of a profile, as shares of the height, the width and the length of the boulder.
 
-    Attributes
-    ----------
-    height : float
-        Over the foot.
-    width : float
-        Width there.
-    near, far : float
-        How far the boulder reaches there towards the vehicle and away from it, from the middle of its foot.
+    It reaches `near` towards the vehicle and `far` away from it, from the middle of its foot.
     """
 
     height: float
@@ -184,13 +131,7 @@ BOX = (ProfilePoint(0.0, 1.0, 0.5, 0.5), ProfilePoint(1.0, 1.0, 0.5, 0.5))
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """The shape of the boulders of a file; between its points it is linear.
-
-    Attributes
-    ----------
-    points : tuple of ProfilePoint
-        From the foot to the top; none for a box.
-    """
+    """The shape of the boulders of a file: points from the foot to the top, linear between them; none for a box."""
 
     points: tuple[ProfilePoint, ...] = ()
 
@@ -241,10 +182,6 @@ class Shape:
             total += (high.height - low.height) / 6.0 * (values[0] + values[1] + 4.0 * values[2])
         return total
 
-    def as_list(self) -> list[dict[str, float]]:
-        """Return the points as plain data."""
-        return [asdict(point) for point in self.points]
-
     @classmethod
     def of_model(cls, model: Mapping[str, Any]) -> Shape:
         """Return the shape in the part `model` of resolved settings; a box where that has none."""
@@ -263,23 +200,13 @@ class Shape:
 
 @dataclass(frozen=True, slots=True)
 class Scan:
-    """Where the shape of the boulder comes from.
+    """The scan from which the shape of the boulder comes, and how the boulder stands."""
 
-    Attributes
-    ----------
-    file, sha256 : str
-        The scan, as it is named in the settings, and the hash of its content.
-    up, facing : str
-        Ends of the stone that are up and that face the vehicle.
-    cut_m : float
-        What is cut off below for a flat foot [m].
-    """
-
-    file: str
-    sha256: str
-    up: str
-    facing: str
-    cut_m: float
+    file: str  # as it is named in the settings
+    sha256: str  # of its content
+    up: str  # the end of the boulder that is up
+    facing: str  # the end that faces the vehicle
+    cut_m: float  # what is cut off below for a flat foot [m]
 
 
 def tapered(ratio: float) -> Shape:
@@ -295,41 +222,20 @@ class Distribution:
     """Spread of one input about its mean, in the unit of its column.
 
     The mean is not in here: it is the value of the constant or axis of the same name in the sweep, so a grid may have
-    several means with one spread.
-
-    Attributes
-    ----------
-    kind : str
-        ``normal``, ``lognormal``, ``uniform``, ``triangular`` or ``beta``.
-    sd : float or None
-        Standard deviation; None where `cov` stands for it, or where the ends decide (uniform, triangular).
-    cov : float or None
-        Coefficient of variation, the standard deviation as a fraction of the mean.
-    low, high : float
-        Ends. Normal and lognormal distributions are truncated there, and their mean and standard deviation are those
-        before truncation; the others reach from one end to the other. The admitted range where the file names none.
-    mode : float or None
-        Most likely value; triangular only.
-    position : Position
-        Where it stands in the file.
+    several means with one spread. Normal and lognormal distributions are truncated at the ends, and have their mean and
+    deviation before truncation; the others reach from one end to the other.
     """
 
-    kind: str
-    low: float
+    kind: str  # one of `KINDS`
+    low: float  # the admitted range where the file names no ends
     high: float
-    sd: float | None = None
-    cov: float | None = None
-    mode: float | None = None
+    sd: float | None = None  # None where `cov` stands for it, or the ends decide (uniform, triangular)
+    cov: float | None = None  # coefficient of variation, the standard deviation as a fraction of the mean
+    mode: float | None = None  # most likely value; triangular only
     position: Position = field(default_factory=lambda: Position(""), compare=False)
 
     def deviation(self, mean: np.ndarray) -> np.ndarray:
-        """Return the standard deviation (before truncation) for some means, in the unit of the column.
-
-        Parameters
-        ----------
-        mean : ndarray of float64
-            Means; uniform and triangular distributions have one of their own and do not look at it.
-        """
+        """Return the standard deviation before truncation for some means; uniform and triangular have their own."""
         mean = np.asarray(mean, dtype=np.float64)
         if self.kind == "uniform":
             return np.full(mean.shape, (self.high - self.low) / math.sqrt(12.0))
@@ -364,23 +270,10 @@ class Distribution:
 
 @dataclass(frozen=True, slots=True)
 class SetDistributions:
-    """Spread of one input of named soils or vehicles, each its own.
+    """Spread of one input of named soils or vehicles, each its own."""
 
-    Attributes
-    ----------
-    section : str
-        ``soil`` or ``vehicle``; under this name a row carries the index of its set.
-    each : tuple of Distribution or None
-        In the order of the sets; None where a set gives a value.
-    """
-
-    section: str
-    each: tuple[Distribution | None, ...]
-
-    @property
-    def position(self) -> Position:
-        """Where the first of them stands in the file."""
-        return next(spread.position for spread in self.each if spread is not None)
+    section: str  # ``soil`` or ``vehicle``; under this name a row carries the index of its set
+    each: tuple[Distribution | None, ...]  # in the order of the sets; None where a set gives a value
 
     def words(self, unit: str, size: float = 1.0) -> str:
         """Return kind and spread of each in words; see `Distribution.words`."""
@@ -397,20 +290,20 @@ class Criterion:
 
     max_rotation_deg: float = setting(
         "criterion.max_rotation",
-        "deg",
         "rotation at which the boulder counts as overturned",
         20.0,
+        unit="deg",
         admitted=Bound(0.01, 90.0, "the model holds up to about 20 deg"),
         usual=Usual(1.0, 20.0, "beyond 20 deg the model no longer holds and a truck may ramp up"),
     )
     rating: str = setting(
-        "criterion.rating", "", "penetration rating required", "P1", choices=RATINGS, kind="a penetration rating"
+        "criterion.rating", "penetration rating required", "P1", choices=RATINGS, kind="a penetration rating"
     )
     min_overlap_m: float = setting(
         "criterion.min_overlap",
-        "m",
         "least height of the boulder's top over the underside of the bumper; with less the truck may ride over",
         0.25,
+        unit="m",
         admitted=Bound(0.0, 20.0, "counted upwards from the underside of the bumper"),
         also=("overlap", "engagement"),
     )
@@ -455,24 +348,12 @@ class Layer:
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """In what the soil differs from a dry, level one without cohesion that is the same at every depth.
+    """In what the soil differs from a dry, level one without cohesion that is the same at every depth."""
 
-    Attributes
-    ----------
-    layers : tuple of Layer
-        Layers below the uppermost, from the top down; the uppermost is the soil that the inputs describe.
-    cohesion_kPa : float
-        Effective cohesion of the uppermost layer [kPa].
-    water_table_m : float or None
-        Depth of the water table below the soil line [m]; None where it is out of reach.
-    slope_deg : float
-        Angle at which the ground falls away behind the boulder [deg].
-    """
-
-    layers: tuple[Layer, ...] = ()
-    cohesion_kPa: float = 0.0
-    water_table_m: float | None = None
-    slope_deg: float = 0.0
+    layers: tuple[Layer, ...] = ()  # from the top down, below the uppermost, which the inputs describe
+    cohesion_kPa: float = 0.0  # effective cohesion of the uppermost
+    water_table_m: float | None = None  # depth below the soil line; None where it is out of reach
+    slope_deg: float = 0.0  # angle at which the ground falls away behind the boulder
 
     @property
     def is_usual(self) -> bool:
@@ -516,26 +397,24 @@ class Model:
 
     readings: ReadingChoice = setting(
         "model.readings",
-        "",
         "how the misprinted equations of the paper are read",
         ReadingChoice(),
         shown_default=PRESETS[1],
     )
     soil_elements: int = setting(
-        "model.soil", "", "closed form of the soil, or a number of soil elements", 0, shown_default=CLOSED_FORM
+        "model.soil", "closed form of the soil, or a number of soil elements", 0, shown_default=CLOSED_FORM
     )
     """0 means the closed form, the limit of infinitely many."""
     calibrated_crush_m: float = setting(
         "vehicle.calibrated_crush",
-        "m",
         "crush up to which spring and damper describe the vehicle's front; a design with more is flagged",
         1.0,
+        unit="m",
         admitted=Bound(0.0, 100.0, "the chassis stiffens at about 1 m of crush"),
         also=("crush", "max_crush"),
     )
     resistance: str = setting(
         "model.resistance",
-        "",
         "soil model, which gives the ultimate resistance of the soil",
         RESISTANCES[0],
         choices=RESISTANCES,
@@ -543,7 +422,6 @@ class Model:
     )
     second_opinion: tuple[str, ...] = setting(
         "model.second_opinion",
-        "",
         "soil models under which passes are simulated again, with friction and vertical motion; "
         "width_capped alone decides, and broms is asked where that overturns a pass or resists more",
         USUAL_OPINION,
@@ -551,35 +429,34 @@ class Model:
         shown_default=USUAL_OPINION[0],
     )
     layers: tuple[Layer, ...] = setting(
-        "soil.layers", "", "layers below the uppermost, which the other entries describe", ()
+        "soil.layers", "layers below the uppermost, which the other entries describe", ()
     )
     cohesion_kPa: float = setting(
         "soil.cohesion",
-        "kPa",
         "effective cohesion of the uppermost layer",
         0.0,
+        unit="kPa",
         admitted=Bound(0.0, 1000.0, "more is rock"),
         also=("c", "c'"),
     )
     water_table_m: float | None = setting(
         "soil.water_table",
-        "m",
         "depth of the water table below the soil line; densities below it are the saturated soil's",
         None,
+        unit="m",
         admitted=Bound(0.0, 1000.0, "counted downwards from the soil line"),
         also=("water", "ground_water", "groundwater", "water_level"),
     )
     slope_deg: float = setting(
         "soil.slope",
-        "deg",
         "angle at which the ground falls away behind the boulder",
         0.0,
+        unit="deg",
         admitted=Bound(0.0, 60.0, "less than the friction angle, or the ground does not stand"),
         also=("ground_slope", "inclination"),
     )
     foot: str = setting(
         "boulder.foot",
-        "",
         "shape of the boulder's underside; a rounded one is not modelled, and its boulders are undecided",
         FEET[0],
         choices=FEET,
@@ -588,30 +465,27 @@ class Model:
     )
     profile: tuple[ProfilePoint, ...] = setting(
         "boulder.profile",
-        "",
         "width and length of a boulder that is no box, over its height, from the foot up",
         (),
         also=("shape", "outline", "section", "sections"),
     )
     taper: float = setting(
         "boulder.taper",
-        "1",
         "width and length of the top over width and length of the foot; the larger end has the width and length given",
         1.0,
+        unit="1",
         admitted=Bound(0.05, 20.0, "0.8 for a top of four fifths of the foot"),
         usual=Usual(0.5, 1.5, "usual boulders"),
         also=("tapering", "batter"),
     )
     scan: Scan | None = setting(
         "boulder.scan",
-        "",
         "scan of the boulder, from which its profile and, with its mass, its density follow",
         None,
         also=("mesh", "stone"),
     )
     rock: str | None = setting(
         "boulder.rock",
-        "",
         "kind of rock, in place of its density: an uncertain input by published ranges",
         None,
         choices=tuple(ROCKS),
@@ -619,11 +493,6 @@ class Model:
     )
     rock_assumed: bool = False
     """Whether the density of the rock is `ROCK_KG_M3` because the file gives the mass of the boulders only."""
-
-    @property
-    def has_few_elements(self) -> bool:
-        """Whether the file asks for fewer soil elements than it takes to come near their limit."""
-        return 0 < self.soil_elements < ENOUGH_ELEMENTS
 
     @property
     def ground(self) -> Ground:
@@ -651,24 +520,19 @@ class SolverSettings:
     """How finely and how long a design is simulated: by an accuracy, or by a step where that is None."""
 
     accuracy: str | None = setting(
-        "solver.accuracy",
-        "",
-        "how finely the motion is integrated",
-        "balanced",
-        choices=ACCURACIES,
-        kind="an accuracy",
+        "solver.accuracy", "how finely the motion is integrated", "balanced", choices=ACCURACIES, kind="an accuracy"
     )
     step_s: float | None = setting(
         "solver.step",
-        "s",
         "time step in place of an accuracy; errors are estimated but not confirmed, as by fast",
         None,
+        unit="s",
         admitted=Bound(1e-7, 1.0, "a step of some milliseconds is usual"),
     )
     horizon_s: float = setting(
         "solver.horizon",
-        "s",
         "how long an impact is simulated",
         1.0,
+        unit="s",
         admitted=Bound(1e-4, 100.0, "an impact is over within a second or so"),
     )

@@ -34,36 +34,25 @@ class Position:
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One mistake in a file, or one note on it.
-
-    Attributes
-    ----------
-    position : Position
-        The file as the user named it, or the ``--set`` option; line and column are None where there are none (a file
-        that cannot be read, an option).
-    message : str
-        What is wrong and what is allowed.
-    key : str
-        Dotted key it is about, for example ``boulder.height``; empty if it is about the whole file.
-    """
+    """One mistake in a file, or one note on it."""
 
     position: Position
-    message: str
-    key: str = ""
+    message: str  # what is wrong and what is allowed
+    key: str = ""  # dotted key it is about, ``boulder.height``; empty if it is about the whole file
 
     @property
     def file(self) -> str:
-        """The file, or the option."""
+        """The file as the user named it, or the option."""
         return self.position.file
 
     @property
     def line(self) -> int | None:
-        """The line, counted from 1."""
+        """The line, counted from 1; None of an option, and of a file that cannot be read."""
         return self.position.line
 
     @property
     def column(self) -> int | None:
-        """The column, counted from 1."""
+        """The column, counted from 1; None where there is no line."""
         return self.position.column
 
     def __str__(self) -> str:
@@ -124,12 +113,8 @@ class Problems(list[Problem]):
     def under(self, key: str = "", named: Position | None = None) -> Iterator[None]:
         """Take the problems of a part; what follows the block is read all the same.
 
-        Parameters
-        ----------
-        key : str
-            Key of the part, if it has one: a key within it becomes part of the message.
-        named : Position or None
-            Where the part is named, if it is a file of its own: problems of the whole of it are reported there.
+        Where the part has a `key`, a key within it becomes part of the message. Where it is a file of its own, problems
+        of the whole of it are reported at the position at which it is `named`.
         """
         try:
             yield
@@ -162,21 +147,9 @@ def refuse(file: str, message: str, line: int | None = None, column: int | None 
 
 
 def check_regular_file(path: Location, max_bytes: int, what: str) -> None:
-    """Refuse anything but a regular file of at most `max_bytes`, before a byte is read.
+    """Raise SettingsError for anything but a regular file of at most `max_bytes`, before a byte is read.
 
-    Parameters
-    ----------
-    path : Path or UPath
-        The file.
-    max_bytes : int
-        Largest size admitted.
-    what : str
-        Advice for a file that is too large.
-
-    Raises
-    ------
-    SettingsError
-        Missing, a directory, a device or pipe, not readable, or too large.
+    `what` is advice for a file that is too large.
     """
     label = str(path)
     try:
@@ -195,13 +168,7 @@ def check_regular_file(path: Location, max_bytes: int, what: str) -> None:
 
 
 def content_of(path: Location, max_bytes: int) -> bytes:
-    """Return the content of a file of at most `max_bytes`.
-
-    Raises
-    ------
-    SettingsError
-        Not readable, or too large: a file may grow after `check_regular_file`.
-    """
+    """Return the content of a file; raise SettingsError where it has grown too large since `check_regular_file`."""
     try:
         with opened(path) as stream:
             data = stream.read(max_bytes + 1)

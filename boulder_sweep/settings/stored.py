@@ -1,8 +1,4 @@
-"""Check the settings that a result carries by the declarations that a settings file is checked by.
-
-A result may be damaged, or a stranger's. Whoever reads it takes every entry for one that `Sweep.resolved` wrote, so all
-are checked once, where the result is opened.
-"""
+"""Check the settings that a result carries, which may be damaged, by the declarations that a file is checked by."""
 
 from __future__ import annotations
 
@@ -129,18 +125,7 @@ class _Settings:
 
 
 def check_stored(settings: Any) -> None:
-    """Check resolved settings.
-
-    Parameters
-    ----------
-    settings
-        What a result holds in place of what `Sweep.resolved` returned.
-
-    Raises
-    ------
-    ValueError
-        An entry is missing, unknown, of another kind, or no value that a settings file may hold; the text names it.
-    """
+    """Check what a result holds in place of what `Sweep.resolved` returned; it raises as `check_entries` does."""
     check_entries(settings, _Settings, "settings")
     if wrong := next(_inconsistencies(settings), ""):
         raise ValueError(shorten(f"settings.{wrong}", 200))
@@ -149,31 +134,15 @@ def check_stored(settings: Any) -> None:
 def check_entries(entries: Any, kind: type[Any], path: str) -> None:
     """Check plain data by a dataclass: which entries there are, and by their names what they may hold.
 
-    Raises
-    ------
-    ValueError
-        An entry is missing, unknown, of another kind, or has a value that a settings file may not hold. The text
-        names the entry, beginning with `path`.
+    Raise ValueError for one that is missing, unknown, of another kind, or has a value that no settings file may hold;
+    the text names it, beginning with `path`.
     """
     if wrong := next(_mistakes(entries, kind, path), ""):
         raise ValueError(shorten(wrong, 200))
 
 
 def check_control(control: dict[str, Any], readings: dict[str, Any]) -> None:
-    """Check how a result says that the motion was integrated.
-
-    Parameters
-    ----------
-    control
-        See `boulder_kernels.control.Control`.
-    readings
-        See `boulder_kernels.design.Readings`.
-
-    Raises
-    ------
-    ValueError
-        An entry is missing, unknown, or no value that a settings file leads to.
-    """
+    """Check how a result says that the motion was integrated; raise ValueError for what no settings file leads to."""
     if control.keys() != _CONTROL.keys():
         raise ValueError(f"control has other entries than {', '.join(_CONTROL)}")
     for name, (kind, low, high) in _CONTROL.items():

@@ -32,7 +32,6 @@ MAX_LISTED = 1000
 
 IMPACT_HEIGHT_RULE = "Eq 9: (min(boulder_height - embedment_depth, hood_height) + bumper_height) / 2"
 
-
 SECTION = "report"
 """Block of the file that holds the heading."""
 UNITS = "units"
@@ -44,10 +43,7 @@ MOST_CHARACTERS = 200
 
 
 class Heading(NamedTuple):
-    """The heading of a report: whom and what it is for, and who answers for it. An entry that is not given is empty.
-
-    Nothing that is computed depends on it.
-    """
+    """The heading of a report: whom and what it is for, and who answers for it. An entry that is not given is empty."""
 
     project: str = ""
     client: str = ""
@@ -78,24 +74,12 @@ def wrong_with(text: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Axis:
-    """One axis of the grid: the values of one input, or named sets of several.
+    """One axis of the grid: the values of one input, or named sets of several."""
 
-    Attributes
-    ----------
-    name : str
-        Column of the table, or ``embedment_ratio``; ``soil`` or ``vehicle`` for named sets.
-    values : ndarray of float64
-        Values in the unit of the column, in the order of the file; for named sets their numbers from 0.
-    sets : dict of str to ndarray of float64
-        Values by column name, of named sets only.
-    labels : tuple of str
-        Names of the named sets.
-    """
-
-    name: str
-    values: np.ndarray
-    sets: dict[str, np.ndarray] = field(default_factory=dict)
-    labels: tuple[str, ...] = ()
+    name: str  # column of the table, or ``embedment_ratio``; ``soil`` or ``vehicle`` for named sets
+    values: np.ndarray  # float64, in the unit of the column, in the order of the file; of named sets their numbers
+    sets: dict[str, np.ndarray] = field(default_factory=dict)  # values by column name, of named sets only
+    labels: tuple[str, ...] = ()  # names of the named sets
 
     def __len__(self) -> int:
         return len(self.values)
@@ -108,33 +92,15 @@ class Axis:
 
 @dataclass(frozen=True, eq=False)
 class DesignList:
-    """The explicit list of designs of ``table: FILE``.
+    """The explicit list of designs of ``table: FILE``."""
 
-    Attributes
-    ----------
-    file : str
-        Name of the file, without its folder.
-    columns : dict of str to ndarray of float64, shape (n,)
-        Values by column name.
-    labels : dict of str to Label
-        Text columns that are carried into the result.
-    units : str
-        ``us`` where the column of the height is in feet or inches, else ``si``.
-    source : str
-        The file, for messages.
-    lines : ndarray of int, shape (n,)
-        Lines of the rows in it; of shape (0,) where it has none.
-    written : dict of str to str
-        Names of its columns as the file has them, by column name.
-    """
-
-    file: str
-    columns: dict[str, np.ndarray]
-    labels: dict[str, Label] = field(default_factory=dict)
-    units: str = SYSTEMS[0]
-    source: str = ""
-    lines: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))
-    written: dict[str, str] = field(default_factory=dict)
+    file: str  # without its folder
+    columns: dict[str, np.ndarray]  # float64, shape (n,)
+    labels: dict[str, Label] = field(default_factory=dict)  # text columns that are carried into the result
+    units: str = SYSTEMS[0]  # ``us`` where the column of the height is in feet or inches
+    source: str = ""  # the file, for messages
+    lines: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))  # of the rows; none in a Parquet file
+    written: dict[str, str] = field(default_factory=dict)  # names of the columns as the file has them
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
@@ -188,8 +154,7 @@ class Sweep:
     heading : Heading
         Project, client, author and date for the heading of a report.
     derived : dict of str to Any
-        What inputs were worked out of, by the key of the file: the run-up that gives a speed, the kind of rock that
-        gives a density.
+        What inputs were worked out of, by the key of the file, such as the run-up that gives a speed.
     units : str
         In which results are shown, ``si`` or ``us``; rows do not depend on it.
     depth_sought : bool
@@ -287,13 +252,7 @@ class Sweep:
         return self.plan.block(start, stop)
 
     def need_depth(self) -> None:
-        """Refuse what takes the depth as given, where it is to be found.
-
-        Raises
-        ------
-        QuestionError
-            Says which command finds it.
-        """
+        """Raise QuestionError where the depth is to be found, and say which command finds it."""
         if self.depth_sought:
             raise QuestionError(
                 f"{BY_NAME[EMBEDMENT[1]].path} is {TO_BE_FOUND}, and one that is given is needed here. This command "
@@ -322,10 +281,8 @@ class Sweep:
     def resolved(self) -> dict[str, Any]:
         """Return everything that decides the results, and the heading, as plain data.
 
-        Defaults are filled in, units are in the names.
-
-        Two files that mean the same designs, written in other units or another layout, give the same.
-        Very long axes and tables are represented by a SHA-256 of their values.
+        Defaults are filled in, units are in the names. Two files that mean the same designs, written in other units or
+        another layout, give the same. Very long axes and tables are represented by a SHA-256 of their values.
         """
         inputs = self._inputs()
         inputs.setdefault("impact_height_m", IMPACT_HEIGHT_RULE)
@@ -364,7 +321,7 @@ class Sweep:
                 "resistance": self.model.resistance,
                 "foot": self.model.foot,
                 **({"rock_assumed": True} if self.model.rock_assumed else {}),
-                **({} if self.model.shape.is_box else {"profile": self.model.shape.as_list()}),
+                **({} if self.model.shape.is_box else {"profile": [asdict(one) for one in self.model.shape.points]}),
                 **({} if self.model.scan is None else {"scan": asdict(self.model.scan)}),
                 **({} if ground.is_usual else {"ground": asdict(ground)}),
                 **({"second_opinion": list(opinions)} if (opinions := self.model.second_opinion) else {}),
@@ -396,7 +353,11 @@ class Sweep:
 
     def _inputs(self) -> dict[str, Any]:
         """Return the values of the inputs by column name, lists where they vary."""
-        varying = {name: _listed(values) for group in self.groups for name, values in group.items()}
+        varying = {
+            name: _or_hash(values.tolist(), np.ascontiguousarray(values, dtype="<f8").tobytes())
+            for group in self.groups
+            for name, values in group.items()
+        }
         sought = {EMBEDMENT[1]: TO_BE_FOUND} if self.depth_sought else {}
         given = self.constants | sought | varying
         return {entry.name: given[entry.name] for entry in INPUTS if entry.name in given}
@@ -410,11 +371,6 @@ def units_in(settings: dict[str, Any]) -> str:
 def allowed_in(settings: dict[str, Any]) -> tuple[str, ...]:
     """Return `Sweep.allowed` by what `Sweep.resolved` returned; of a grid every value has been allowed."""
     return tuple(settings.get(ALLOW_UNUSUAL, ())) if settings["order"] == "table" else HELD
-
-
-def _listed(values: np.ndarray) -> Any:
-    """Return values as a list; see `_or_hash`."""
-    return _or_hash(values.tolist(), np.ascontiguousarray(values, dtype="<f8").tobytes())
 
 
 def _texts_listed(label: Label) -> Any:

@@ -2,9 +2,7 @@
 
 A file of text, or the first sheet of a spreadsheet, is read as rows of cells in one way. Blank rows, commas at the ends
 of rows and the numbers of rows that pandas writes in front are left out. Where a comma does not separate cells, it may
-be the decimal sign of the whole file. Nothing is read without a limit: on the bytes of a file, its lines, its columns,
-and the characters of a row. A list of designs may be a Parquet file, too; its numbers are in the units of the column
-names.
+be the decimal sign of the whole file. Nothing is read without a limit. A list of designs may be a Parquet file, too.
 """
 
 from __future__ import annotations
@@ -15,7 +13,7 @@ import math
 import re
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import chain
@@ -70,34 +68,9 @@ Row = tuple[list[str], int, str]
 
 
 class TextTable:
-    """Rows of cells below a row of names.
+    """Rows of cells, each with a cell for every name in the row above them; raises SettingsError without such names.
 
-    Parameters
-    ----------
-    label
-        The file, for messages.
-    rows
-        All its rows, the names first.
-    delimiter
-        What separates cells; empty for a spreadsheet.
-    known
-        Names as a table may have them, for a message.
-    problems
-        Receives what is wrong, with its place.
-
-    Attributes
-    ----------
-    names : list of str
-        Names of the columns.
-    positions : list of Position
-        Where they stand.
-    rows : iterator of Row
-        The rows below, each with a cell for every name.
-
-    Raises
-    ------
-    SettingsError
-        It is empty, has too many columns, or has no names.
+    `label` is the file, for messages; a spreadsheet has an empty `delimiter`; `known` are names for a message.
     """
 
     def __init__(
@@ -165,20 +138,9 @@ class TextTable:
     def numbers(
         self, rows: list[Row], index: int, key: str, unit: str = "1", *, may_be_empty: bool = False
     ) -> np.ndarray:
-        """Return the cells of a column as numbers, NaN for empty ones and for those that are none.
+        """Return the cells of a column as numbers, NaN for empty ones and for others that are none, which are reported.
 
-        Parameters
-        ----------
-        rows
-            Some rows.
-        index
-            The column.
-        key
-            What it gives, for messages.
-        unit
-            What a message says is needed: the unit of an input.
-        may_be_empty
-            Whether empty cells are no mistake.
+        Messages begin with the `key`, and say that numbers in the `unit` are needed.
         """
         cells = self.cells(rows, index)
         text = "\n".join(cells)
@@ -187,11 +149,9 @@ class TextTable:
             if "," in text:
                 cells = [cell.replace(",", ".") if cell.count(",") == 1 and "." not in cell else cell for cell in cells]
         if text.isascii() and "_" not in text and "n" not in text.lower():
-            try:
-                gaps = may_be_empty and not all(cells)  # the usual case, fast
+            with suppress(ValueError):  # the usual case, fast
+                gaps = may_be_empty and not all(cells)
                 return np.array([np.nan if gaps and not cell.strip() else float(cell) for cell in cells])
-            except ValueError:
-                pass
         values = np.full(len(cells), np.nan)
         for at, cell in enumerate(cells):
             if may_be_empty and not cell.strip():
@@ -258,8 +218,7 @@ class _Lines:
         self.stream, self.label, self.most = stream, label, most
         self.number = 0
         self.text = ""
-        self.taken, self.begun = 0, 1
-        """Characters since the last row, and the line behind it."""
+        self.taken, self.begun = 0, 1  # characters since the last row, and the line behind it
 
     def __iter__(self) -> Iterator[str]:
         readline = self.stream.readline
@@ -280,25 +239,11 @@ class _Lines:
 
 @contextmanager
 def open_table(path: Location, most_lines: int, known: Sequence[str], problems: Problems) -> Iterator[TextTable]:
-    """Open a text file, or the first sheet of a spreadsheet (.xlsx), as a table.
+    """Open a text file, or the first sheet of a spreadsheet (.xlsx), as a table; see `TextTable`.
 
-    Parameters
-    ----------
-    path
-        A text is UTF-8; comma, semicolon or tab between the cells, the first line the column names. Lines that begin
-        with # and blank rows are skipped. In a spreadsheet row and column of a cell are its position, and formulas
-        count by their stored value.
-    most_lines
-        Most lines that a text may have.
-    known
-        Names as a table may have them, for a message.
-    problems
-        Receives mistakes with line and column of the cell.
-
-    Raises
-    ------
-    SettingsError
-        The file cannot be read at all, or not to its end, or openpyxl is not installed.
+    A text is UTF-8; comma, semicolon or tab between the cells, the first line the column names. Lines that begin with #
+    and blank rows are skipped. In a spreadsheet row and column of a cell are its position, and formulas count by their
+    stored value. SettingsError is raised where the file cannot be read to its end, or openpyxl is not installed.
     """
     label = str(path)
     if path.suffix.lower() == ".xlsx":
@@ -363,22 +308,7 @@ _MAX_PIECE = 10 * MAX_CELL
 
 
 def read_designs(node: Scalar, folder: Path, problems: Problems) -> DesignList | None:
-    """Return the designs of a table; mistakes go to `problems`.
-
-    Parameters
-    ----------
-    node : Scalar
-        The file's name as written in the settings, or its URL.
-    folder : Path
-        Where relative names begin.
-    problems : Problems
-        Receives what is wrong with the table, by line and column of the table itself.
-
-    Returns
-    -------
-    DesignList or None
-        None where the table cannot be used; the problems say why.
-    """
+    """Return the designs of a table by its name or URL, or None: `problems` say why, by its own lines and columns."""
     before = len(problems)
     with problems.under("table", node.position):
         path = located(node, folder)
@@ -394,13 +324,7 @@ def read_designs(node: Scalar, folder: Path, problems: Problems) -> DesignList |
 
 
 def located(node: Scalar, folder: Path) -> Location:
-    """Return where a file lies by its name or URL; relative names begin in `folder`.
-
-    Raises
-    ------
-    SettingsError
-        It is the URL of nothing that can be opened.
-    """
+    """Return where a file lies by its name or URL; relative names begin in `folder`."""
     name = node.text.strip()
     try:
         return location_of(name) if is_url(name) else folder / Path(name)
@@ -535,13 +459,10 @@ def _check_formulas(source: IO[bytes] | str | Path, load_workbook: Callable[...,
 
 
 def _check_pieces(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, label: str) -> None:
-    """Refuse a cell that no spreadsheet can hold, before the parser of XML keeps several copies of it.
-
-    Reading to the end also compares the checksum.
-    """
+    """Refuse a cell that no spreadsheet can hold, before the parser of XML keeps several copies of it."""
     length = 0
     with archive.open(entry) as content:
-        while chunk := content.read(_MAX_PIECE):
+        while chunk := content.read(_MAX_PIECE):  # to the end, which compares the checksum
             first, *others = chunk.split(b"<")
             length += len(first)
             if length > _MAX_PIECE:
@@ -618,13 +539,8 @@ def _label(name: str, cells: pa.ChunkedArray, label: str) -> Label:
     return Label(found.codes[array.indices.fill_null(-1).to_numpy(zero_copy_only=False) + 1], found.words)
 
 
-_READERS: dict[str, Callable[[Location, Problems], DesignList]] = {
-    ".csv": _read_rows,
-    ".xlsx": _read_rows,
-    ".parquet": _read_columns,
-}
+_READERS = {".csv": _read_rows, ".xlsx": _read_rows, ".parquet": _read_columns}
 """Readers by the end of the file's name."""
-
 
 MAX_TEXT = 200
 """Longest text that is carried along, in characters."""
@@ -635,27 +551,15 @@ _LABEL = re.compile(r"\w[\w .+/()#-]{0,79}")
 
 @dataclass(frozen=True, slots=True)
 class TableColumn:
-    """One column that can be used.
+    """One column that can be used."""
 
-    Attributes
-    ----------
-    name : str
-        Its name in the file.
-    field : Field or None
-        The input it gives; None for a text column.
-    factor : Fraction
-        From its numbers to the unit of the input.
-    """
-
-    name: str
-    field: Field | None
-    factor: Fraction = Fraction(1)
+    name: str  # in the file
+    field: Field | None  # the input it gives; None for a text column
+    factor: Fraction = Fraction(1)  # from its numbers to the unit of the input
 
 
 _STEMS: dict[str, Field] = {field.name.removesuffix(name_suffix(field.unit)): field for field in INPUTS}
 """Inputs by the name of the column without its unit."""
-
-
 _ROCK = ("rock", "boulder_rock", "rock_type")
 _ROCK_REMEDY = (
     "is not read, for a file has one boulder.rock for its whole list: write a list for each kind of rock, or add a "

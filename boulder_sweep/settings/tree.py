@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.events import (
     AliasEvent,
     DocumentStartEvent,
@@ -22,7 +22,6 @@ from ruamel.yaml.events import (
     SequenceStartEvent,
 )
 from ruamel.yaml.scanner import Scanner
-from ruamel.yaml.tokens import FlowMappingEndToken, FlowSequenceEndToken
 
 from boulder_sweep.settings.problems import Position, Problems, SettingsError, shorten
 
@@ -37,36 +36,27 @@ _PLAIN_WORDS = (
     ("expected ',' or ']'", "a list is not closed: ',' or ']' is missing"),
     ("expected ',' or '}'", "a {...} block is not closed, or a ',' is missing in it"),
     (r"found character '\t'", "indent with spaces, not with tabs"),
-    (
-        "expected '<document start>'",
-        "a key is needed here; check quotation marks and indentation",
-    ),
+    ("expected '<document start>'", "a key is needed here; check quotation marks and indentation"),
     ("expected chomping or indentation indicators", "'>' begins a text of several lines; put it in quotation marks"),
     ("expected a comment or a line break", "'>' begins a text of several lines; put it in quotation marks"),
     ("cannot start any token", "unexpected character; put the text in quotation marks"),
-    (
-        "mapping values are not allowed here",
-        "unexpected ':'; check the indentation and the quotation marks",
-    ),
+    ("mapping values are not allowed here", "unexpected ':'; check the indentation and the quotation marks"),
     ("could not find expected ':'", "a key without ':' after it"),
     ("found unexpected end of stream", "quotation marks are not closed"),
     ("expected <block end>", "the indentation does not match the lines above"),
 )
 """Messages of the parser, and plain words for them."""
+_TOO_DEEP = f"lists and blocks are nested more than {MAX_DEPTH} deep"
 
 
 @dataclass(slots=True)
 class Scalar:
-    """One piece of text.
-
-    `quoted` says whether it stood in quotation marks, `needs_unit` whether a number with a dimension must have its unit
-    here.
-    """
+    """One piece of text."""
 
     position: Position
     text: str
-    quoted: bool = False
-    needs_unit: bool = False
+    quoted: bool = False  # whether it stood in quotation marks
+    needs_unit: bool = False  # whether a number with a dimension must have its unit here
 
 
 @dataclass(slots=True)
@@ -133,21 +123,10 @@ def block_of(position: Position, texts: dict[str, str]) -> Mapping:
 
 
 def parse(text: str, label: str, problems: Problems) -> Mapping:
-    """Return the tree of a YAML text whose top level is a block of keys.
+    """Return the tree of a YAML text whose top level is a block of keys; `label` names the file in messages.
 
-    Parameters
-    ----------
-    text : str
-        The whole file.
-    label : str
-        Name of the file in messages.
-    problems : Problems
-        Receives duplicate keys, tags and other mistakes after which reading can go on.
-
-    Raises
-    ------
-    SettingsError
-        The text is not YAML or something other than keys, nested too deep or too large: reading cannot go on.
+    Mistakes after which reading can go on, such as duplicate keys and tags, go to `problems`. SettingsError is raised
+    where it cannot: the text is not YAML or something other than keys, nested too deep or too large.
     """
     root = parse_node(text, label, problems)
     if isinstance(root, Mapping):
@@ -166,7 +145,7 @@ def parse_node(text: str, label: str, problems: Problems) -> Node | None:
     except YAMLError as error:
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         position = Position(label) if mark is None else Position(label, mark.line + 1, mark.column + 1)
-        problems.add(position, str(error.problem) if isinstance(error, _TooDeepError) else _explained(error))
+        problems.add(position, _explained(error))
         raise SettingsError(problems) from None
 
 
@@ -176,10 +155,8 @@ def _events(yaml: YAML, text: str) -> Iterator[Any]:
         yield from yaml.parse(text)
     except YAMLError:
         raise
-    except Exception:
-        # On some malformed input (bad escapes, directives, a text that ends within a token) ruamel.yaml
-        # lets a bare IndexError, ValueError or AttributeError through.
-        raise YAMLError("the text cannot be read as YAML") from None
+    except Exception:  # of bad escapes and directives, ruamel.yaml lets a bare IndexError or ValueError through
+        raise _OwnError(problem="the text cannot be read as YAML") from None
 
 
 class _TreeReader:
@@ -219,7 +196,7 @@ class _TreeReader:
             node, size = Scalar(self.position(event), event.value, event.style in ("'", '"')), 1
         else:
             if self.depth >= MAX_DEPTH:
-                raise _TooDeepError(event.start_mark)
+                raise _OwnError(problem=_TOO_DEEP, problem_mark=event.start_mark)
             if event.anchor is not None:
                 self.anchors[event.anchor] = None
             self.depth += 1
@@ -293,10 +270,7 @@ class _TreeReader:
 
 
 def _joined(mapping: Mapping, key: Node, value: Node) -> bool:
-    """Put a number that a comma has cut in two together again: ``{mass: 15,000 lb}`` has a key ``000 lb`` by YAML.
-
-    The reader of the number then says what is wrong with it.
-    """
+    """Put a number that a comma has cut in two together again, ``{mass: 15,000 lb}``; its reader says what is wrong."""
     last = next(reversed(mapping.entries.values()), None)
     if last is None or not isinstance(key, Scalar) or not isinstance(last.value, Scalar):
         return False
@@ -311,22 +285,18 @@ def _joined(mapping: Mapping, key: Node, value: Node) -> bool:
 def _bounded(size: int) -> int:
     """Return a number of values, if a file may hold so many."""
     if size > MAX_NODES:
-        raise YAMLError(f"the file holds more than {MAX_NODES} values once its aliases are expanded")
+        raise _OwnError(problem=f"the file holds more than {MAX_NODES} values once its aliases are expanded")
     return size
 
 
-class _TooDeepError(YAMLError):
-    def __init__(self, mark: Any) -> None:
-        super().__init__()
-        self.problem_mark = mark
-        self.problem = f"lists and blocks are nested more than {MAX_DEPTH} deep"
+class _OwnError(MarkedYAMLError):
+    """A refusal in plain words already."""
 
 
 class _UnitScanner(Scanner):
-    """Scanner that also takes a unit behind a closing bracket: ``[36, 40, 43.2] deg``.
+    """Scanner that also takes a unit behind a closing bracket, for which plain YAML has no place: ``[36, 40] deg``.
 
-    Plain YAML has no place for such a word. It is read up to the next comma, bracket, comment or end of the
-    line and kept in `units` under the position of the bracket.
+    It is read up to the next comma, bracket, comment or end of the line and kept under the position of the bracket.
     """
 
     def __init__(self, loader: Any = None) -> None:
@@ -336,14 +306,12 @@ class _UnitScanner(Scanner):
     def fetch_flow_collection_start(self, TokenClass: Any, to_push: str) -> None:
         """Refuse deep nesting as soon as it is seen, before the parser looks at it."""
         if self.flow_level >= MAX_DEPTH:
-            raise _TooDeepError(self.reader.get_mark())
+            raise _OwnError(problem=_TOO_DEEP, problem_mark=self.reader.get_mark())
         super().fetch_flow_collection_start(TokenClass, to_push)
 
     def fetch_flow_collection_end(self, TokenClass: Any) -> None:
         """Take the unit that may stand behind the bracket."""
         super().fetch_flow_collection_end(TokenClass)
-        if TokenClass not in (FlowSequenceEndToken, FlowMappingEndToken):
-            return
         reader = self.reader
         skip = 0
         while reader.peek(skip) == " ":
@@ -363,12 +331,12 @@ class _UnitScanner(Scanner):
 
 def _explained(error: Any) -> str:
     """Return a YAML syntax error in plain words."""
+    if isinstance(error, _OwnError):
+        return str(error.problem)
     problem = " ".join(str(getattr(error, "problem", None) or error).split())
     for technical, plain in _PLAIN_WORDS:
         if technical in problem:
             return f"not valid YAML: {plain}"
-    if type(error) is YAMLError:  # one of our own
-        return problem
     if "special characters are not allowed" in str(error):
         return "contains control characters; a plain text file in UTF-8 is needed"
     return f"not valid YAML: {shorten(problem, 120)}"

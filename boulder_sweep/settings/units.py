@@ -82,8 +82,7 @@ class QuantityKind(NamedTuple):
 
     words: str
     examples: str
-    sample: str
-    """A value that a message suggests."""
+    sample: str  # a value that a message suggests
 
 
 # By the unit of the table (the unit of a bare number).
@@ -105,28 +104,8 @@ EXPECTED: dict[str, QuantityKind] = {
     "1": QuantityKind("a plain number", "no unit, or %", ""),
 }
 
-_KINDS = (
-    ("m^2", "an area"),
-    ("m^3", "a volume"),
-    ("N", "a force"),
-    ("1/s", "a frequency"),
-    ("N*m", "a moment"),
-)
-_TRANSLATION = str.maketrans(
-    {
-        "·": "*",
-        "⋅": "*",
-        "×": "*",
-        "∙": "*",
-        "•": "*",
-        "−": "-",
-        "–": "-",
-        "²": "^2",
-        "³": "^3",
-        "º": "°",
-        "μ": "µ",
-    }
-)
+_KINDS = (("m^2", "an area"), ("m^3", "a volume"), ("N", "a force"), ("1/s", "a frequency"), ("N*m", "a moment"))
+_TRANSLATION = str.maketrans("·⋅×∙•−–ºμ", "*****--°µ") | str.maketrans({"²": "^2", "³": "^3"})
 _TOKEN = re.compile(r"\s*(?:(?P<name>[A-Za-zµ_]+|[%°])\.?|(?P<power>(?:\^|\*\*)?\s*-?\d)|(?P<sign>[*/()\-]))")
 MAX_LENGTH = 60
 MAX_POWER = 9
@@ -148,29 +127,11 @@ class _UnknownUnitError(UnitError):
 
 @lru_cache(maxsize=1024)
 def factor(text: str, target: str) -> Fraction:
-    """Return the factor from a unit as written to the unit of the table.
+    """Return the value of one unit as written, ``kN·s/m``, in a unit of the table, a key of `EXPECTED`.
 
-    Parameters
-    ----------
-    text : str
-        Unit as the user wrote it, for example ``kN·s/m``.
-    target : str
-        Unit of the table, a key of `EXPECTED`.
-
-    Returns
-    -------
-    Fraction
-        Value in `target` of one `text`.
-
-    Raises
-    ------
-    UnitError
-        Unknown unit, malformed unit, or another kind of quantity.
-
-    Notes
-    -----
-    Weights stand for masses where a mass or a density is asked (116 pcf, 18.2 kN/m^3, 15 kip), and a pound
-    is a force where a force is asked (350 lb/in^3), with standard gravity in between.
+    Weights stand for masses where a mass or a density is asked (116 pcf, 18.2 kN/m^3, 15 kip), and a pound is a force
+    where a force is asked (350 lb/in^3), with standard gravity in between. Raises UnitError for an unknown or malformed
+    unit, and for another kind of quantity.
     """
     if target == "m/s^2" and text.strip().lower() in _GRAVITY_NAMES:
         return STANDARD_GRAVITY
@@ -208,11 +169,9 @@ def _meant(word: str, text: str, target: str) -> str:
     """Return the unit that a misspelled word in a unit stands for, empty where that is not certain.
 
     A unit differs from others by one letter, so a word counts as misspelled only where it has the letters of the unit,
-    or is a long word that begins like it. What it makes of the text must be of the kind that is needed. Where the slip
-    may be one of size, M for m, the size is said.
+    or is a long word that begins like it. Where the slip may be one of size, M for m, the size is said.
     """
-    # difflib takes a few milliseconds to import and is needed for mistakes only.
-    from difflib import get_close_matches
+    from difflib import get_close_matches  # takes a few milliseconds to import: for mistakes only
 
     known = _vocabulary()
     spellings = {name.lower(): name for name in known}
@@ -233,15 +192,7 @@ def _meant(word: str, text: str, target: str) -> str:
 
 
 def suffix_unit(suffix: str, unit: str) -> str:
-    """Return the unit at the end of a name (``ft``, ``kN_m3``, ``lb_s_in``) as it is written, empty if it is none.
-
-    Parameters
-    ----------
-    suffix : str
-        The end of the name, without the underline before it.
-    unit : str
-        Unit of the table that it must fit.
-    """
+    """Return the unit at the end of a name (``ft``, ``kN_m3``, ``lb_s_in``) as it is written; empty if it is none."""
     parts = suffix.split("_")
     products = [suffix, *("*".join(parts[:k]) + "/" + "/".join(parts[k:]) for k in range(1, len(parts)))]
     for text in products:
@@ -386,8 +337,6 @@ _SHOWN: dict[str, tuple[str, str]] = {
     "m/s^2": ("m/s^2", "ft/s^2"),
 }
 KILONEWTONS_PER_KIP = 4.4482216152605
-
-
 _INCH_M = Fraction(254, 10_000)
 
 
@@ -413,42 +362,20 @@ _FORCES = {
 class ShownColumn(NamedTuple):
     """A column of a result as it is shown."""
 
-    stored: str
-    """Name of the column in the result."""
     name: str
     unit: str
-    size: float
-    """One of its unit in the unit of the result."""
+    size: float  # one of its unit in the unit of the result
     meaning: str
 
 
 def check_system(system: str) -> None:
-    """Refuse units that are neither ``si`` nor ``us``.
-
-    Raises
-    ------
-    ValueError
-        They are neither.
-    """
+    """Raise ValueError for units that are neither ``si`` nor ``us``."""
     if system not in SYSTEMS:
         raise ValueError(f"units must be {' or '.join(SYSTEMS)}, not {system!r}")
 
 
 def shown_unit(unit: str, system: str) -> ShownUnit:
-    """Return the unit in which values of a unit of the table are shown.
-
-    Parameters
-    ----------
-    unit
-        Unit of a column, as in `boulder_sweep.columns`; ``J`` and ``N`` beside.
-    system
-        ``si`` or ``us``.
-
-    Returns
-    -------
-    ShownUnit
-        A value of the table divided by ``size`` is in ``unit``. A unit that both systems share stays as it is.
-    """
+    """Return the unit in which values of a column in a unit, or in ``J`` or ``N``, are shown in one of `SYSTEMS`."""
     check_system(system)
     position = SYSTEMS.index(system)
     if unit in _FORCES:
@@ -476,16 +403,7 @@ def number_text(value: float, units: str) -> str:
 def quantity_text(unit: str, units: str, *ends: float, digits: str = ".4g") -> str:
     """Return a value or a range in the units asked for: ``3.2 m``, ``3.2 to 3.6 m``.
 
-    Parameters
-    ----------
-    unit
-        Unit of the table in which the values are given; 1 is not written.
-    units
-        ``si`` for that unit, ``us`` for the one that stands for it.
-    *ends
-        The value, or both ends of the range.
-    digits
-        Format of the numbers.
+    They are given in a `unit` of the table, in which they stay for ``si``; 1 is not written.
     """
     shown, size = (unit, 1.0) if units == "si" else shown_unit(unit, units)
     numbers = " to ".join(dict.fromkeys(f"{end / size:{digits}}" for end in ends))
@@ -501,22 +419,14 @@ def shown_column(stored: str, units: str) -> ShownColumn:
 def shown_as(stored: str, unit: str, meaning: str, units: str) -> ShownColumn:
     """Return how a column of a unit and a meaning is shown."""
     if units == "si" or not unit:
-        return ShownColumn(stored, stored, unit, 1.0, meaning)
+        return ShownColumn(stored, unit, 1.0, meaning)
     other, size = shown_unit(unit, units)
     name = stored if size == 1.0 else stored.removesuffix(name_suffix(unit)) + name_suffix(other)
-    return ShownColumn(stored, name, other, size, meaning)
+    return ShownColumn(name, other, size, meaning)
 
 
 def shown_settings(settings: Mapping[str, Any], units: str) -> dict[str, Any]:
-    """Return resolved settings or a row in the units asked for: numbers under a name that ends in a unit, and its name.
-
-    Parameters
-    ----------
-    settings
-        See `boulder_sweep.settings.Sweep.resolved`, or a part of it; or values by names of columns.
-    units
-        ``si`` or ``us``.
-    """
+    """Return resolved settings or a row in the units asked for: numbers, and names that end in a unit."""
     if units == "si":
         return dict(settings)
     shown_by_name = {}

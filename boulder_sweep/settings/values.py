@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Collection
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
@@ -17,14 +18,7 @@ import numpy as np
 
 from boulder_sweep.settings.fields import FAR, Field
 from boulder_sweep.settings.model import KINDS, Distribution, SetDistributions
-from boulder_sweep.settings.problems import (
-    Position,
-    Problems,
-    did_you_mean,
-    nearest,
-    shorten,
-    wrong,
-)
+from boulder_sweep.settings.problems import Position, Problems, did_you_mean, nearest, shorten, wrong
 from boulder_sweep.settings.tree import Entry, Mapping, Node, Scalar, Sequence
 from boulder_sweep.settings.units import (
     EXPECTED,
@@ -40,11 +34,8 @@ from boulder_sweep.settings.units import (
 )
 
 MAX_AXIS = 1_000_000
-"""Most values on one axis."""
-
 OUTSIDE = "{value} is outside the admitted range of {low} to {high} ({reason})"
 """Why a value is not admitted; the page of a report says the same."""
-
 WITHOUT_UNIT = ("1", "deg")
 """Units of the table in which a bare number is meant where units are asked for."""
 RANGE_KEYS = ("from", "to", "count", "step")
@@ -88,30 +79,14 @@ class Quantity(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Leaf:
-    """Values of one entry in the unit of the table.
+    """Values of one entry in the unit of the table."""
 
-    Attributes
-    ----------
-    values : ndarray of float64, shape (n,)
-        The values in the order given.
-    is_axis : bool
-        Whether it was written as a list or range (an axis of the grid) or as one value.
-    position : Position
-        Where it stands.
-    written : str
-        The unit in which it was written; empty for bare numbers.
-    positions : tuple of Position
-        Where each value stands; empty where all of them stand at `position`, as in a range.
-    distribution : Distribution, SetDistributions or None
-        Spread about the values, which are its means; None where the values are certain.
-    """
-
-    values: np.ndarray
-    is_axis: bool
+    values: np.ndarray  # float64, shape (n,), in the order given
+    is_axis: bool  # whether it was written as a list or range
     position: Position
-    written: str = ""
-    positions: tuple[Position, ...] = ()
-    distribution: Distribution | SetDistributions | None = None
+    written: str = ""  # the unit in which it was written; empty for bare numbers
+    positions: tuple[Position, ...] = ()  # of each value; empty where all of them stand at `position`, as in a range
+    distribution: Distribution | SetDistributions | None = None  # spread about the values, which are its means
 
     @property
     def system(self) -> str:
@@ -120,20 +95,9 @@ class Leaf:
 
 
 def read_leaf(node: Node, field: Field) -> Leaf:
-    """Return the values of an entry.
+    """Return the values of an entry: ``1.65 m``, ``[36, 40] deg``, ``{from: 1 m, to: 3 m, count: 5}`` and the like.
 
-    Parameters
-    ----------
-    node : Node
-        ``1.65 m``, ``[36, 40] deg``, ``[36 deg, 40 deg]``, ``{from: 1 m, to: 3 m, count: 5}`` or
-        ``{from: 0.4, to: 0.7, step: 0.02}``.
-    field : Field
-        What it is about.
-
-    Raises
-    ------
-    SettingsError
-        With every mistake of this entry.
+    SettingsError holds every mistake in it.
     """
     node = _unfold_text_list(node)
     if isinstance(node, Mapping):
@@ -154,13 +118,7 @@ def read_leaf(node: Node, field: Field) -> Leaf:
 
 
 def read_single(node: Node, field: Field) -> float:
-    """Return the one value of an entry that cannot be an axis, within its admitted range.
-
-    Raises
-    ------
-    SettingsError
-        Not one number, wrong unit, or outside the admitted range.
-    """
+    """Return the one value of an entry that cannot be an axis; raise SettingsError where it is not admitted."""
     if not isinstance(node, Scalar):
         raise wrong(node.position, "takes one value here, not a list or a range")
     (value,) = _check_values([read_quantity(node, field.unit, sample=sample_of(field))], [node], field)
@@ -168,23 +126,9 @@ def read_single(node: Node, field: Field) -> float:
 
 
 def read_block(node: Node, known: dict[str, Field], what: str, required: Collection[str] = ()) -> dict[str, float]:
-    """Return the single values of a block by the names of its fields.
+    """Return the single values of a block by the names of its fields; raise SettingsError with every mistake.
 
-    Parameters
-    ----------
-    node : Node
-        Must be a block.
-    known : dict of str to Field
-        What may be in it, by key.
-    what : str
-        What it is, for messages: ``a layer``.
-    required : collection of str
-        Keys that it must have.
-
-    Raises
-    ------
-    SettingsError
-        With every mistake in it.
+    Fields are `known` by key; messages call the block `what`, such as ``a layer``.
     """
     if not isinstance(node, Mapping) or node.unit is not None:
         raise wrong(node.position, f"{what} must be a block of keys: {', '.join(known)}")
@@ -208,12 +152,7 @@ def read_block(node: Node, known: dict[str, Field], what: str, required: Collect
 def meant_by(entry: Entry, known: dict[str, Field] | dict[str, Field | None]) -> tuple[str, str]:
     """Return the known key that an unknown one stands for, and ``"; did you mean ...?"``; both empty where none does.
 
-    Parameters
-    ----------
-    entry : Entry
-        The unknown key with its value.
-    known : dict of str to Field or None
-        Known keys with what is known of their values: a key is meant only where it takes the value, unit and all.
+    A key is meant only where it takes the value of the entry, unit and all, as far as its field is known.
     """
     stem, _, suffix = entry.key.partition("_")
     while suffix:
@@ -260,13 +199,11 @@ def outside(value: float, field: Field, written: str = "") -> str:
 
 
 def is_unusual(values: np.ndarray, field: Field) -> np.ndarray:
-    """Return which values are so far outside the usual range that a file must allow them, bool; see `Field.held`.
-
-    Zero is not: it is no slip of the unit, and a vehicle may stand.
-    """
+    """Return which values are so far outside the usual range that a file must allow them, bool; see `Field.held`."""
     if field.usual is None or not field.held:
         return np.zeros(values.shape, dtype=bool)
     low, high = field.usual.low / FAR, field.usual.high * FAR
+    # Zero is no slip of the unit, and a vehicle may stand.
     return (values != 0.0) & ((values < low * (1.0 - 1e-9)) | (values > high * (1.0 + 1e-9)))
 
 
@@ -302,8 +239,7 @@ def _check_values(quantities: list[Quantity], nodes: list[Node], field: Field) -
     values = [_to_float(quantity.value) for quantity in quantities]
     problems = Problems()
     for node, value, quantity in zip(nodes, values, quantities, strict=True):
-        problem = outside(value, field, quantity.written)
-        if problem:
+        if problem := outside(value, field, quantity.written):
             problems.add(node.position, problem)
     problems.raise_if_any()
     return values
@@ -390,23 +326,10 @@ def _to_float(value: Fraction) -> float:
 
 
 def read_quantity(node: Node, unit: str, outer_unit: Scalar | None = None, sample: str = "") -> Quantity:
-    """Return the number a node holds, converted to `unit`.
+    """Return the number a node holds, ``1.65`` or ``6.5 ft``, in a unit of the table; a bare number is in that unit.
 
-    Parameters
-    ----------
-    node : Node
-        Must be a piece of text such as ``1.65``, ``6.5 ft`` or ``95 MN/m^3``.
-    unit : str
-        Unit of the table; the unit of a bare number.
-    outer_unit : Scalar, optional
-        Unit after the bracket of the list that holds the number.
-    sample : str
-        A value of the entry, which a message suggests; one of its unit by default.
-
-    Raises
-    ------
-    SettingsError
-        Not a finite decimal number, or an unknown or unfit unit.
+    The unit may be an `outer_unit`, behind the bracket of the list that holds the number; a message suggests `sample`.
+    SettingsError is raised where it is not a finite decimal number, or the unit is unknown or unfit.
     """
     if not isinstance(node, Scalar):
         kind = "a list" if isinstance(node, Sequence) else "a block"
@@ -431,13 +354,7 @@ def read_quantity(node: Node, unit: str, outer_unit: Scalar | None = None, sampl
 
 
 def split_number(text: str, unit: str, sample: str = "") -> tuple[Fraction, str]:
-    """Return the number at the beginning of a text and the rest, its unit; `sample`: see `read_quantity`.
-
-    Raises
-    ------
-    NumberError
-        The text does not begin with a plain, finite decimal number.
-    """
+    """Return the plain, finite decimal number at the beginning of a text, else raise NumberError, and its unit."""
     stripped = text.strip().replace("−", "-")
     given = f"'{shorten(text)}'"
     words = needed(unit, sample)
@@ -447,8 +364,7 @@ def split_number(text: str, unit: str, sample: str = "") -> tuple[Fraction, str]
         raise NumberError(f"{given} is a yes/no value; {words}")
     if _NOT_FINITE.fullmatch(stripped):
         raise NumberError(f"{given} is not a finite number; {words}")
-    length = _feet_and_inches(stripped)
-    if length is not None:
+    if length := _feet_and_inches(stripped):
         return length
     match = _NUMBER.match(stripped)
     sign, whole, decimals, exponent = match.groups() if match else ("", "", None, None)
@@ -458,10 +374,9 @@ def split_number(text: str, unit: str, sample: str = "") -> tuple[Fraction, str]
     if whole == "0" and rest[:1].lower() in ("x", "o", "b"):
         raise NumberError(f"{given} is not a decimal number; {words}")
     if len(whole) > 1 and whole.startswith("0"):
-        cut_off = (
-            "; if a comma cuts it off a number, write that without a comma, as in 15000" if len(whole) == 3 else ""
-        )
-        raise NumberError(f"{given} begins with a zero, which some programs read as octal; remove the zero{cut_off}")
+        cut_off = "; if a comma cuts it off a number, write that without a comma, as in 15000"
+        remedy = f"remove the zero{cut_off if len(whole) == 3 else ''}"
+        raise NumberError(f"{given} begins with a zero, which some programs read as octal; {remedy}")
     if re.match(r"\s*[,;]\s+\d", rest) or rest[:1] == ";":
         raise NumberError(f"{given} is not one number; write a list in brackets, such as [34, 38] deg")
     if rest[:1] in (",", "_", "'", "’", ".") or re.match(r"\s+\d", rest):
@@ -481,10 +396,7 @@ def split_number(text: str, unit: str, sample: str = "") -> tuple[Fraction, str]
 def _feet_and_inches(text: str) -> tuple[Fraction, str] | None:
     """Return a length in feet and inches, ``5 ft 6 in`` or ``5' 6 1/2"``, as a number and its unit; None for others.
 
-    Raises
-    ------
-    NumberError
-        The inches are no part of a foot, or their sign is missing.
+    NumberError is raised where the inches are no part of a foot, or their sign is missing.
     """
     if len(text) > _MAX_DIGITS:
         return None
@@ -508,8 +420,8 @@ def _feet_and_inches(text: str) -> tuple[Fraction, str] | None:
 def plainly(text: str) -> str:
     """Return a number with its unit as it must be written, ``15000 lb`` for ``15,000 lb``; empty if it is not certain.
 
-    A sign before exactly three digits separates thousands: a decimal point in its place would make the number too small
-    by a factor of 1000. A comma before any other number of digits, or behind a zero, is a decimal one.
+    A sign before exactly three digits separates thousands. A comma before any other number of digits, or behind a zero,
+    is a decimal one.
     """
     match = _SEPARATED.fullmatch(text)
     if match is None:
@@ -525,35 +437,21 @@ def plainly(text: str) -> str:
 def refuse_bare(option: str, texts: list[str], unit: str) -> None:
     """Refuse numbers of an option that have a dimension and no unit: meant in feet, they would be read in metres.
 
-    Parameters
-    ----------
-    option : str
-        The option; with ``=`` at its end where a name comes before the number.
-    texts : list of str
-        What was given to it. Text that is no number is left to its reader.
-    unit : str
-        Unit of the table.
-
-    Raises
-    ------
-    NumberError
-        Says how the numbers are written with a unit.
+    The option ends in ``=`` where a name comes before the number. Text that is no number is left to its reader.
+    NumberError says how the numbers are written with a unit.
     """
     if unit == "1":
         return
-    written: list[str | None] = []
+    written: dict[str, str] = {}
     for text in texts:
-        try:
-            written.append(split_number(text, unit)[1])
-        except NumberError:
-            written.append(None)
-    if "" not in written:
+        with suppress(NumberError):
+            written[text] = split_number(text, unit)[1]
+    if "" not in written.values():
         return
-    units = [one for one in written if one] or [shown_unit(unit, system).unit for system in SYSTEMS]
+    units = [one for one in written.values() if one] or [shown_unit(unit, system).unit for system in SYSTEMS]
     space = "" if option.endswith("=") else " "
-    pairs = [*zip(texts, written, strict=True)]
     forms = (
-        space.join([option, *(f"'{text} {one}'" if own == "" else f"'{text}'" for text, own in pairs)])
+        space.join([option, *(f"'{text} {one}'" if written.get(text) == "" else f"'{text}'" for text in texts)])
         for one in dict.fromkeys(units[:2])
     )
     allowed = EXPECTED[unit].examples
@@ -561,19 +459,12 @@ def refuse_bare(option: str, texts: list[str], unit: str) -> None:
 
 
 def read_count(node: Node, what: str, largest: int) -> int:
-    """Return a whole number from 1 to `largest`.
-
-    Raises
-    ------
-    SettingsError
-        Not a whole number, or outside that range.
-    """
+    """Return a whole number from 1 to `largest`; raise SettingsError for anything else."""
     if isinstance(node, Scalar) and re.fullmatch(r"[1-9]\d{0,17}", node.text.strip(), re.ASCII):
         value = int(node.text)
         if value <= largest:
             return value
-    message = f"{quoted(node)} is not valid; {what} must be a whole number from 1 to {largest}"
-    raise wrong(node.position, message)
+    raise wrong(node.position, f"{quoted(node)} is not valid; {what} must be a whole number from 1 to {largest}")
 
 
 def quoted(node: Node) -> str:
@@ -596,24 +487,14 @@ _WORDS = frozenset({*_KEYS, *KINDS})
 
 
 def read_input(node: Node, field: Field) -> Leaf:
-    """Return what an entry gives for an input: a value, a list, a range or a distribution.
-
-    Raises
-    ------
-    SettingsError
-        With every mistake of this entry.
-    """
+    """Return what an entry gives for an input: a value, a list, a range or a distribution."""
     if isinstance(node, Mapping) and not set(RANGE_KEYS) & set(node.entries) and _WORDS & set(node.entries):
         return _read_distribution(node, field)
     return read_leaf(node, field)
 
 
 def _read_distribution(node: Mapping, field: Field) -> Leaf:
-    """Return an uncertain input: its mean, or the axis of its means, and its distribution.
-
-    It is ``{mean: 38 deg, sd: 3 deg}``, ``{distribution: lognormal, mean: [36, 38] deg, cov: 8 %}``,
-    ``{characteristic: 36 deg, cov: 8 %}``, ``{distribution: uniform, low: 36 deg, high: 40 deg}`` and the like.
-    """
+    """Return an uncertain input, ``{mean: 38 deg, sd: 3 deg}`` or ``{distribution: uniform, low: 36 deg, ...}``."""
     kind = _kind(node)
     _check_keys(node, kind)
     problems = Problems()

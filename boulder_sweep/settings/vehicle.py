@@ -4,9 +4,6 @@ The vehicle leaves the last curve, or passes the beginning of the run-up, and ac
 ``v^2 = v_0^2 + 2 (a - g sin(atan(grade))) s``. A curve is left with at most ``sqrt(mu g r)``, the speed at which the
 vehicle skids (MIL-HDBK-1013/14, Eq 6; UFC 4-022-02 supersedes it). Nothing else limits the speed, which is the safe
 side: an acceleration falls as the speed grows, and a vehicle has a largest speed.
-
-What stands for entries of the table is worked out while the file is read; what was used of a street is kept, so that it
-can be printed, stored and reported.
 """
 
 from __future__ import annotations
@@ -40,62 +37,46 @@ class NoApproachError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Approach:
-    """A run-up to a boulder.
-
-    Attributes
-    ----------
-    length_m : float
-        Length s of the run-up, from its beginning or the end of its last curve to the boulder [m].
-    acceleration_m_s2 : float
-        Acceleration a of the vehicle on level ground, at full throttle [m/s^2].
-    from_m_s : float or None
-        Speed at the beginning of the run-up [m/s]; None for what the curve admits.
-    curve_radius_m : float or None
-        Radius r of the curve that ends where the run-up begins [m]; None for none.
-    friction : float
-        Coefficient of friction mu of the tyres in that curve [-].
-    grade : float
-        Rise over run of the street in the direction of travel, negative downhill [-].
-    """
+    """A run-up to a boulder; where the file gives no speed at its beginning, it is what the curve admits."""
 
     length_m: float = setting(
         "vehicle.approach.length",
-        "m",
         "length of the run-up: from its beginning, or the end of its last curve, to the boulder",
+        unit="m",
         admitted=Bound(0.0, 1e5, "a length"),
     )
     acceleration_m_s2: float = setting(
         "vehicle.approach.acceleration",
-        "m/s^2",
         "acceleration of the vehicle at full throttle on level ground",
+        unit="m/s^2",
         admitted=Bound(0.0, 20.0, "tyres transmit about 1 g at most"),
     )
     from_m_s: float | None = setting(
         "vehicle.approach.from",
-        "m/s",
         "speed at the beginning of the run-up",
         None,
+        unit="m/s",
         admitted=Bound(0.0, 100.0, "up to 360 km/h"),
     )
     curve_radius_m: float | None = setting(
         "vehicle.approach.curve_radius",
-        "m",
         "radius of the curve that ends where the run-up begins",
         None,
+        unit="m",
         admitted=Bound(1.0, 1e5, "no truck turns tighter"),
     )
     friction: float = setting(
         "vehicle.approach.friction",
-        "1",
         "coefficient of friction of the tyres in that curve; 1 if not given, the conservative value",
         FRICTION,
+        unit="1",
         admitted=Bound(0.05, 2.0, "0.6 is usual on a road, 1 is conservative"),
     )
     grade: float = setting(
         "vehicle.approach.grade",
-        "1",
         "rise over run of the street in the direction of travel, negative downhill",
         0.0,
+        unit="1",
         admitted=Bound(-0.5, 0.5, "no street is steeper"),
     )
 
@@ -116,13 +97,7 @@ class Approach:
 
     @property
     def impact_speed_m_s(self) -> float:
-        """Speed at the boulder [m/s].
-
-        Raises
-        ------
-        NoApproachError
-            The vehicle stops before the boulder, or never starts.
-        """
+        """Speed at the boulder [m/s]; raises NoApproachError where the vehicle stops before it, or never starts."""
         squared = self.start_speed_m_s**2 + 2.0 * self.net_acceleration_m_s2 * self.length_m
         if squared > 0.0:
             return math.sqrt(squared)
@@ -155,8 +130,7 @@ def _read_approach(node: Node) -> Approach:
     except NoApproachError as error:
         raise wrong(node.position, str(error)) from None
     if speed > 100.0:
-        message = f"reaches {speed:.4g} m/s; more than 100 m/s (360 km/h) is not admitted"
-        raise wrong(node.position, message)
+        raise wrong(node.position, f"reaches {speed:.4g} m/s; more than 100 m/s (360 km/h) is not admitted")
     return approach
 
 
@@ -191,20 +165,7 @@ def _speed_text(speed: float, units: str) -> str:
 
 
 def unfold_approaches(root: Mapping, problems: Problems) -> list[dict[str, Any]]:
-    """Replace the approach of every vehicle by its speed.
-
-    Parameters
-    ----------
-    root : Mapping
-        The tree of the file, changed in place.
-    problems : Problems
-        Receives what is wrong with them.
-
-    Returns
-    -------
-    list of dict
-        What is kept of each as plain data, under the name of its vehicle where it is a named one.
-    """
+    """Replace the approach of every vehicle in the tree by its speed; return what is kept of each as plain data."""
     data: list[dict[str, Any]] = []
     for vehicle in root.blocks("vehicle"):
         entry = vehicle.entries.get(APPROACH)
@@ -216,7 +177,6 @@ def unfold_approaches(root: Mapping, problems: Problems) -> list[dict[str, Any]]
             if SPEED in vehicle.entries:
                 problems.add(entry.position, f"give {SPEED} or {APPROACH}, not both")
             data.append(vehicle.label | _kept_of(approach))
-            speed = Scalar(entry.value.position, f"{approach.impact_speed_m_s!r} m/s")
-            new = [Entry(SPEED, entry.position, speed)]
+            new = [Entry(SPEED, entry.position, Scalar(entry.value.position, f"{approach.impact_speed_m_s!r} m/s"))]
         vehicle.replace(APPROACH, new)
     return data

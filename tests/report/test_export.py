@@ -239,7 +239,7 @@ def test_a_disk_that_fills_up_under_a_spreadsheet_is_named(result, tmp_path, mon
 
 def test_cells_without_a_number_are_blank(answers, tmp_path, monkeypatch):
     table = pa.table({"design_id": [0, 1, 2, 3], "x": [1.5, None, math.nan, math.inf], "word": ["a", "", None, "b"]})
-    columns = [ShownColumn(name, name, "", 1.0, "") for name in table.column_names]
+    columns = [ShownColumn(name, "", 1.0, "") for name in table.column_names]
     monkeypatch.setattr(module, "_tables", lambda *_: iter([(columns, table.slice(0, 3)), (columns, table.slice(3))]))
     export(answers["simulate"][0], tmp_path / "blank.xlsx")
     rows = openpyxl.load_workbook(tmp_path / "blank.xlsx")["designs"].iter_rows(min_row=2, values_only=True)

@@ -1,5 +1,6 @@
 """Boulders that are no boxes in reports: the simulator has their outline, and the pictures show the stone as given."""
 
+from dataclasses import astuple
 from pathlib import Path
 
 import numpy as np
@@ -54,7 +55,7 @@ def check_copied(page, sweep):
     """Hold the settings file of the page against the design's own."""
     copied = load_text(page.input_value("#yaml"), Path("copied.yaml"))
     assert copied.constants == pytest.approx(sweep.constants, rel=1e-5)
-    points = [[(*point.values(),) for point in one.model.shape.as_list()] for one in (copied, sweep)]
+    points = [[astuple(point) for point in one.model.shape.points] for one in (copied, sweep)]
     np.testing.assert_allclose(*points, rtol=0, atol=1e-5)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 import shutil
-from dataclasses import replace
+from dataclasses import asdict, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -77,7 +77,7 @@ def test_a_taper_goes_with_axes_of_the_sides(load_it, minimal):
     sweep = load_it(minimal.replace("  height: 3.44\n", "  height: [3, 3.44]\n  taper: 0.8\n"))
     assert sweep.n_designs == 2
     assert sweep.model.shape == tapered(0.8)
-    assert sweep.resolved()["model"]["profile"] == tapered(0.8).as_list()
+    assert sweep.resolved()["model"]["profile"] == [asdict(point) for point in tapered(0.8).points]
 
 
 def test_a_constant_profile_and_a_taper_of_one_are_boxes(load_it, minimal):
@@ -92,7 +92,7 @@ def test_a_constant_profile_and_a_taper_of_one_are_boxes(load_it, minimal):
 
 def test_settings_are_read_back(load_it, minimal):
     shape = load_it(with_profile(minimal, POINTS)).model.shape
-    assert Shape.of_model({"profile": shape.as_list()}) == shape
+    assert Shape.of_model({"profile": asdict(shape)["points"]}) == shape
 
 
 @pytest.mark.parametrize(
