@@ -46,46 +46,30 @@ RATINGS = ("P1", "P2", "P3")
 
 @dataclass(frozen=True, slots=True)
 class ColumnSpec:
-    """One column of the table.
-
-    Attributes
-    ----------
-    name : str
-        Name in the table; ends in its unit where it has one.
-    type : {'int64', 'float64', 'dictionary'}
-        Type of the values.
-    unit : str
-        Unit of the values, ``"1"`` for plain numbers, ``""`` for text and numbering.
-    meaning : str
-        One sentence for people who design barriers.
-    """
+    """One column of the table."""
 
     name: str
+    """Name in the table; ends in its unit where it has one."""
     type: ColumnType
     unit: str
+    """Unit of the values, ``"1"`` for plain numbers, ``""`` for text and numbering."""
     meaning: str
+    """One sentence for people who design barriers."""
 
 
 @dataclass(frozen=True, slots=True)
 class OutcomeColumn(ColumnSpec):
-    """One column that a simulation fills.
-
-    Attributes
-    ----------
-    value : callable
-        From what the judge knows of n rows (`boulder_sweep.judge.verdict.Facts`) to the values of the column, shape
-        (n,): numbers in `unit`, or codes.
-    rows : {'all', 'judged', 'computed', 'free', 'rated', 'overturned', 'passing'}
-        Which rows have a value; null elsewhere. *Judged* are all but errors, *computed* all that were simulated, *free*
-        all simulated ones that were not stopped at the limit of the rotation, *rated* all whose penetration counts:
-        neither overturned nor left undecided by anything but the numerical error. *Passing* rows have the verdict pass.
-    words : tuple of str
-        What the codes of a dictionary column stand for; a row may add words of its own behind them. Code -1 is null.
-    """
+    """One column that a simulation fills."""
 
     value: Callable[[Any], np.ndarray]
+    """From what the judge knows of n rows (`boulder_sweep.judge.verdict.Facts`) to the values of the column, shape
+    (n,): numbers in `unit`, or codes."""
     rows: RowKind = "computed"
+    """Which rows have a value; null elsewhere. *Judged* are all but errors, *computed* all that were simulated, *free*
+    all simulated ones that were not stopped at the limit of the rotation, *rated* all whose penetration counts: neither
+    overturned nor left undecided by anything but the numerical error. *Passing* rows have the verdict pass."""
     words: tuple[str, ...] = ()
+    """What the codes of a dictionary column stand for; a row may add words of its own behind them. Code -1 is null."""
 
 
 DESIGN_ID = ColumnSpec(

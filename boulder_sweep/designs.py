@@ -29,18 +29,12 @@ MAX_DICTIONARY = 1 << 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Column:
-    """One input of a block of designs.
-
-    Attributes
-    ----------
-    codes : ndarray of int32, shape (n,), or None
-        Row i has ``values[codes[i]]``; None where `values` has one entry per row.
-    values : ndarray of float64
-        Values in the unit of the column.
-    """
+    """One input of a block of designs, of n rows."""
 
     codes: np.ndarray | None
+    """Row i has ``values[codes[i]]``, int32, shape (n,); None where `values` has one entry per row."""
     values: np.ndarray
+    """Values in the unit of the column, float64."""
 
     def __len__(self) -> int:
         return len(self.values if self.codes is None else self.codes)
@@ -56,18 +50,12 @@ class Column:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reasons:
-    """Why rows cannot be computed.
-
-    Attributes
-    ----------
-    codes : ndarray of int8, shape (n,)
-        0 where the row can be computed, otherwise an index into `texts`.
-    texts : tuple of str
-        The reasons; the first one is empty.
-    """
+    """Why rows cannot be computed."""
 
     codes: np.ndarray
+    """0 where the row can be computed, otherwise an index into `texts`; int8, shape (n,)."""
     texts: tuple[str, ...]
+    """The reasons; the first one is empty."""
 
     def __len__(self) -> int:
         return len(self.codes)
@@ -83,21 +71,13 @@ class Reasons:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Label:
-    """Text that belongs to the designs and decides nothing: an ID, or the name of a soil.
-
-    Attributes
-    ----------
-    codes : ndarray of int32, shape (n,)
-        Row i has ``words[codes[i]]``. In a `DesignPlan` n is the length of the axis `axis`, in a block its rows.
-    words : tuple of str
-        The texts.
-    axis : int
-        Position of the axis it goes along; of no meaning in a block.
-    """
+    """Text that belongs to the designs and decides nothing: an ID, or the name of a soil."""
 
     codes: np.ndarray
+    """Row i has ``words[codes[i]]``, int32. A `DesignPlan` has one along the axis `axis`, a block one for each row."""
     words: tuple[str, ...]
     axis: int = 0
+    """Position of the axis it goes along; of no meaning in a block."""
 
     def at(self, indices: np.ndarray) -> Label:
         """Return the label at some indices along its axis, with no more words than these need."""
@@ -107,31 +87,19 @@ class Label:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DesignBlock:
-    """Rows ``[start, stop)`` of a sweep, or some of them.
-
-    Attributes
-    ----------
-    start, stop : int
-        Numbers of the first design and of the one after the last.
-    columns : dict of str to Column
-        Every input column of the table but ``design_id``, in the order of the table.
-    reasons : Reasons
-        Why single rows cannot be computed.
-    labels : dict of str to Label
-        Text columns that are carried along.
-    numbers : ndarray of int64, shape (n,), or None
-        Numbers of the designs where they are not all of ``[start, stop)``.
-    cases : tuple of DesignBlock
-        The same rows with other values of their uncertain inputs, by which they are judged, too; none as a rule.
-    """
+    """Rows ``[start, stop)`` of a sweep, or some of them."""
 
     start: int
     stop: int
+    """Numbers of the first design and of the one after the last."""
     columns: dict[str, Column]
+    """Every input column of the table but ``design_id``, in the order of the table."""
     reasons: Reasons
     labels: dict[str, Label] = field(default_factory=dict)
     numbers: np.ndarray | None = None
+    """Numbers of the designs where they are not all of ``[start, stop)``, int64, shape (n,)."""
     cases: tuple[DesignBlock, ...] = ()
+    """The same rows with other values of their uncertain inputs, by which they are judged, too; none as a rule."""
 
     def __len__(self) -> int:
         return self.stop - self.start if self.numbers is None else len(self.numbers)
@@ -142,14 +110,9 @@ class DesignBlock:
 
 
 class Source:
-    """Values of one quantity over some axes of the grid.
+    """Values of one quantity over some axes of the grid, the last axis changing fastest.
 
-    Parameters
-    ----------
-    values : ndarray, shape (product of the lengths of `axes`,)
-        Values, the last of `axes` changing fastest.
-    axes : tuple of int
-        Positions of the axes it depends on, ascending; empty for a constant.
+    The axes are given by their positions, ascending; there are none for a constant.
     """
 
     def __init__(self, values: np.ndarray, axes: tuple[int, ...] = ()) -> None:
@@ -252,15 +215,9 @@ def _completed(
 ) -> tuple[dict[str, Known], Known]:
     """Return every input column of designs by name, and for every row the index in `REASONS`.
 
-    Parameters
-    ----------
-    given
-        By column name; ``embedment_ratio`` may stand in place of ``embedment_depth_m``, and ``impact_height_m`` may be
-        missing, as in a file.
-    zero
-        Stands for the impact height where it is missing, and lies on every boulder.
-    combine
-        Called with a function of arrays and what it is to be applied to; returns its values.
+    ``embedment_ratio`` may be given in place of ``embedment_depth_m``, and ``impact_height_m`` may be missing, as in a
+    file; `zero` then stands for it, and lies on every boulder. `combine` is called with a function of arrays and what
+    it is to be applied to; it returns its values.
     """
     known = dict(given)
     height, bumper, hood = known["boulder_height_m"], known["bumper_height_m"], known["hood_height_m"]
@@ -281,19 +238,10 @@ def _completed(
 
 
 class DesignPlan:
-    """How every input column of a sweep follows from its axes.
+    """How every input column of a sweep follows from its axes, whose lengths are in the order of the file.
 
-    Parameters
-    ----------
-    lengths : sequence of int
-        Lengths of the axes in the order of the file.
-    given : dict of str to Source
-        By column name; ``embedment_ratio`` in place of ``embedment_depth_m`` and a missing
-        ``impact_height_m`` are computed here.
-    labels : mapping of str to Label
-        Text columns to carry along.
-    cases : sequence of DesignPlan
-        Plans of the same lengths with other values of uncertain inputs, see `DesignBlock.cases`.
+    What is given may lack columns as in `_completed`. The cases are plans of the same lengths with other values of
+    uncertain inputs, see `DesignBlock.cases`.
     """
 
     def __init__(
@@ -331,23 +279,11 @@ class DesignPlan:
         return Source(function(*grids).reshape(-1), axes)
 
     def block(self, start: int, stop: int) -> DesignBlock:
-        """Return the designs ``[start, stop)``.
-
-        Raises
-        ------
-        IndexError
-            The rows are not within the sweep.
-        """
+        """Return the designs ``[start, stop)``; raise IndexError where these are not within the sweep."""
         return self._block(self._rows(start, stop))
 
     def selection(self, numbers: np.ndarray) -> DesignBlock:
-        """Return some designs by their numbers, int64, ascending, at least one.
-
-        Raises
-        ------
-        IndexError
-            The rows are not within the sweep.
-        """
+        """Return some designs by their numbers, int64, ascending, at least one; raise IndexError as `block`."""
         first, stop = int(numbers[0]), int(numbers[-1]) + 1
         return self._block(self._rows(first, stop, numbers))
 
@@ -362,12 +298,7 @@ class DesignPlan:
     def given_rows(self, start: int, stop: int) -> dict[str, np.ndarray]:
         """Return what is given of the designs ``[start, stop)``, one value a row; what follows from it is left out.
 
-        What differs in a case is there again under the name of `in_case`.
-
-        Raises
-        ------
-        IndexError
-            The rows are not within the sweep.
+        What differs in a case is there again under the name of `in_case`. Raises IndexError as `block`.
         """
         rows = self._rows(start, stop)
         given = {name: rows.values(source) for name, source in self.given.items()}
@@ -395,19 +326,10 @@ def input_of(name: str) -> str:
 
 
 def block_of(given: Mapping[str, np.ndarray]) -> DesignBlock:
-    """Return designs given row by row as a block.
+    """Return designs given row by row as a block, numbered from 0, with the same bits as the same designs in a grid.
 
-    Parameters
-    ----------
-    given
-        Arrays of shape (n,) by column name, in the units of the table; ``embedment_ratio`` may stand in place of
-        ``embedment_depth_m``, and ``impact_height_m`` may be missing, as in a file. What differs in a case of the
-        block stands under the name of `in_case`.
-
-    Returns
-    -------
-    DesignBlock
-        The designs, numbered from 0, with the same bits as the same designs in a grid.
+    Arrays have the shape (n,) and the units of the table; columns may be missing as in `_completed`. What differs in a
+    case of the block stands under the name of `in_case`.
     """
     base = {name: values for name, values in given.items() if input_of(name) == name}
     values, codes = _completed(base, np.zeros(1), lambda function, *inputs: function(*inputs))

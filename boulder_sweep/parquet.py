@@ -54,30 +54,10 @@ class ParquetLimitError(ParquetError):
 class TableFile:
     """A Parquet file of plain columns; its rows are not read yet.
 
-    Parameters
-    ----------
-    source
-        The opened file.
-    most_rows
-        Most rows that it may have.
-    most_bytes
-        Most bytes that the columns may take that are read, each number as eight.
-    most_text
-        Most bytes that their text may take where every row spells its words.
-
-    Attributes
-    ----------
-    schema : pyarrow.Schema
-        Names and types; a column of text is a dictionary of words.
-    rows : int
-        Number of rows.
-
-    Raises
-    ------
-    ParquetError
-        It is no Parquet file, or damaged.
-    ParquetLimitError
-        A column is nested or of a type that no table has, or there are too many rows or columns.
+    It may have no more than `most_rows`; the columns that are read take at most `most_bytes`, each number as eight, and
+    their text at most `most_text` where every row spells its words. In the schema, a column of text is a dictionary of
+    words. Raises `ParquetError` where it is no Parquet file, or damaged, and `ParquetLimitError` where a column is
+    nested or of a type that no table has, or there are too many rows or columns.
     """
 
     def __init__(
@@ -120,12 +100,8 @@ class TableFile:
     def read(self, columns: Sequence[str] | None = None) -> pa.Table:
         """Return all rows, of the named columns or of all.
 
-        Raises
-        ------
-        ParquetError
-            The file is damaged.
-        ParquetLimitError
-            The columns have too many bytes, or a word is too long.
+        Raises `ParquetError` where the file is damaged, and `ParquetLimitError` where the columns have too many bytes,
+        or a word is too long.
         """
         with _in_words():
             spelled = self._check_bytes(columns)

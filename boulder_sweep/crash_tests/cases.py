@@ -232,17 +232,7 @@ NOT_COMPARED = (
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """Result of `validate`.
-
-    Attributes
-    ----------
-    trajectories : dict of (str, str) to Trajectory
-        By test (``abg``, ``rwg``) and preset (``as_printed``, ``corrected``).
-    wall : RigidWall
-        The paper's truck against a rigid wall.
-    files : list of Path
-        What was written.
-    """
+    """Result of `validate`: by test and preset of readings, the truck against a rigid wall, and the files written."""
 
     trajectories: dict[tuple[str, str], Trajectory]
     wall: RigidWall
@@ -303,15 +293,8 @@ class Validation:
 def validate(out: str | Path | None = None) -> Validation:
     """Simulate both crash tests under both presets and compare them with what the paper states.
 
-    Parameters
-    ----------
-    out
-        Folder for pictures and time histories; nothing is written without one.
-
-    Raises
-    ------
-    PictureError
-        The folder cannot be written, or matplotlib is not installed.
+    Pictures and time histories go to the folder `out`, if one is given. Raises `PictureError` where it cannot be
+    written, or matplotlib is not installed.
     """
     trajectories = {(test, preset): simulate(crash_test(test), readings=preset) for test in NAMES for preset in PRESETS}
     wall = rigid_wall_test()

@@ -63,33 +63,19 @@ TEST_SIGNALS = (TIME, ROTATION, BOULDER, VEHICLE, VEHICLE_ACCELERATION)
 
 @dataclass(frozen=True, eq=False)
 class TimeHistory:
-    """A measured time history.
-
-    Attributes
-    ----------
-    time_s : ndarray, shape (n,)
-        Times, ascending [s].
-    signals : dict of str to ndarray, shape (n,)
-        Values by name in SI units (angles in degrees), NaN where there is a gap.
-    """
+    """A measured time history of n ascending times."""
 
     path: Path
     time_s: np.ndarray
     signals: Mapping[str, np.ndarray]
+    """Values by name in SI units (angles in degrees), shape (n,), NaN where there is a gap."""
 
 
 def read_history(path: str | Path, wanted: Sequence[Signal]) -> TimeHistory:
     """Read a CSV file of measurements over time; `wanted` are the quantities it may hold, time among them.
 
-    Returns
-    -------
-    TimeHistory
-        With at least one quantity beside time and at least two rows.
-
-    Raises
-    ------
-    SettingsError
-        Every mistake of the file, with line and column.
+    Returns at least one quantity beside time and at least two rows. Raises `SettingsError` with every mistake of the
+    file, with line and column.
     """
     file = Path(path)
     check_regular_file(file, MAX_BYTES, "Keep the impact, and leave out what comes before and after")
@@ -204,15 +190,7 @@ SIZES = (1e-9, 1e9)
 
 
 def read_pulse(path: str | Path) -> TimeHistory:
-    """Read a crash pulse from a CSV file; see `boulder_sweep.crash_tests.measured` for its header.
-
-    Raises
-    ------
-    SettingsError
-        The file is not valid.
-    FitError
-        Its signals contradict the direction of an impact.
-    """
+    """Read a crash pulse from a CSV file; see `boulder_sweep.crash_tests.measured` for its header, and `pulse_of`."""
     return pulse_of(read_history(path, PULSE_SIGNALS))
 
 
@@ -220,13 +198,9 @@ def pulse_of(history: TimeHistory) -> TimeHistory:
     """Return a measured history as a crash pulse; a deceleration becomes an acceleration.
 
     It has one or more of ``displacement`` [m], ``velocity`` [m/s] and ``acceleration`` [m/s^2]. Zero need not be first
-    touch exactly, and rows before it are of use.
-
-    Raises
-    ------
-    FitError
-        A signal has fewer than 8 values, the vehicle seems to be accelerated by the wall or to move away from it, or a
-        signal does not change or has a size that no impact has.
+    touch exactly, and rows before it are of use. Raises `FitError` where a signal has fewer than 8 values, the vehicle
+    seems to be accelerated by the wall or to move away from it, or a signal does not change or has a size that no
+    impact has.
     """
     signals = dict(history.signals)
     if "deceleration" in signals:

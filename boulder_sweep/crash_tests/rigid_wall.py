@@ -23,17 +23,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class RigidWall:
-    """A vehicle that hits a rigid wall.
-
-    Parameters
-    ----------
-    mass_kg : float
-        Mass m_v of the vehicle.
-    speed_m_s : float
-        Speed v_0 of impact.
-    spring_N_m, damper_N_s_m : float
-        Spring k_v and damper c_v of its Maxwell element.
-    """
+    """A vehicle of mass m_v that hits a rigid wall at v_0, with spring k_v and damper c_v of its Maxwell element."""
 
     mass_kg: float
     speed_m_s: float
@@ -110,16 +100,9 @@ class RigidWall:
         return self.response(time_s)[0]
 
     def response(self, time_s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Displacement [m], velocity [m/s] and acceleration [m/s^2] (Eq 49 corrected, with the release of Eq 47).
+        """Displacement [m], velocity [m/s] and acceleration [m/s^2] at times since first touch [s], shape (n,) each.
 
-        Parameters
-        ----------
-        time_s : ndarray, shape (n,)
-            Times since first touch [s]; before it the vehicle keeps its speed.
-
-        Returns
-        -------
-        tuple of three ndarrays, shape (n,)
+        Eq 49 corrected, with the release of Eq 47; before first touch the vehicle keeps its speed.
         """
         asked = np.asarray(time_s, dtype=float)
         t = np.clip(asked, 0.0, self.separation_time_s)

@@ -114,21 +114,10 @@ def simulate(
 def history_of(
     sweep: Sweep, design_id: int, evaluation: Evaluation, cases: list[Judged], sample_s: float = SAMPLE_S
 ) -> Trajectory:
-    """Return the time history of a design whose row is known.
+    """Return the time history of a design that can be computed, by how its row was simulated.
 
-    Parameters
-    ----------
-    sweep, design_id
-        The design, one that can be computed.
-    evaluation, cases
-        How its row was simulated, and the row as judged in each case: the history is of the one that decides.
-    sample_s
-        Time between two samples [s].
-
-    Raises
-    ------
-    ValueError
-        There would be too many samples, or `sample_s` is not positive.
+    The row is given as judged in each case: the history is of the one that decides. Raises ValueError where there would
+    be too many samples, or `sample_s` is not positive.
     """
     judged, worst = worst_of(cases), int(worst_case(cases)[0])
     sweep = (sweep, *sweep.cases)[worst]

@@ -69,59 +69,29 @@ def by_kernels(table: DesignTable, readings: Readings, control: Control) -> Outc
 
 @dataclass(frozen=True)
 class Evaluation:
-    """How the designs of one sweep are simulated and judged; the same for every row, sent to every worker.
-
-    Parameters
-    ----------
-    readings
-        Which formulas are read as printed.
-    control
-        How the motion is integrated.
-    limits
-        Limits of the criterion.
-    simulate
-        Function that simulates a table of designs.
-    only
-        Outcome columns wanted, verdict and reason among them; all of the table where empty.
-    model
-        Resistance, layers, water, cohesion and slope of the soil, and shape of the boulders.
-    least_margin
-        Margin that a question asks for, from 0 to less than 1; see `judged`.
-    second_opinion
-        Laws of the soil's resistance under which every pass is simulated again, see `boulder_sweep.judge.robustness`.
-    askable
-        Whether second opinions know such designs.
-    against_slower
-        Whether shallow boulders that slide are judged against slower trucks, too; not where the caller does so.
-    barrels_in_lanes
-        Whether there are so many designs that barrels, of two pieces, are simulated several at a time.
-    """
+    """How the designs of one sweep are simulated and judged; the same for every row, sent to every worker."""
 
     readings: Readings
     control: Control
     limits: Limits
     simulate: Simulate = by_kernels
     only: tuple[str, ...] = ()
+    """Outcome columns wanted, verdict and reason among them; all of the table where empty."""
     model: Model = field(default_factory=Model)
+    """Resistance, layers, water, cohesion and slope of the soil, and shape of the boulders."""
     least_margin: float = 0.0
+    """Margin that a question asks for, from 0 to less than 1; see `judged`."""
     second_opinion: tuple[str, ...] = ()
+    """Laws of the soil's resistance under which every pass is simulated again, see `boulder_sweep.judge.robustness`."""
     askable: bool = False
+    """Whether second opinions know such designs."""
     against_slower: bool = True
+    """Whether shallow boulders that slide are judged against slower trucks, too; not where the caller does so."""
     barrels_in_lanes: bool = False
+    """Whether there are so many designs that barrels, of two pieces, are simulated several at a time."""
 
     def __call__(self, block: DesignBlock) -> Judged:
-        """Simulate and judge a block.
-
-        Parameters
-        ----------
-        block
-            Inputs of n rows.
-
-        Returns
-        -------
-        Judged
-            n rows, in the same order. Of a block with cases, each row has the worst of their verdicts.
-        """
+        """Simulate and judge the n rows of a block, in its order; with cases, each has the worst of their verdicts."""
         if block.cases:
             return worst_of(self.by_case(block))
         if not block.reasons.any:
@@ -142,24 +112,12 @@ class Evaluation:
         return designs_of(block, rows, self.model)
 
     def judged(self, designs: Designs) -> Judged:
-        """Simulate and judge designs that can be computed.
+        """Simulate and judge n designs that can be computed, in their order.
 
-        Rows that are refused for their time steps, undecided for their numerical error, or late are simulated again
-        by finer steps until they are decided or `finer_controls` ends, see `boulder_kernels.rules`. Shallow boulders
-        that would pass and slide are simulated with slower trucks, too. A row depends on nothing but its own design.
+        Rows that are refused for their time steps, undecided for their numerical error, or late are simulated again by
+        finer steps until they are decided or `finer_controls` ends, see `boulder_kernels.rules`. Shallow boulders that
+        would pass and slide are simulated with slower trucks, too. A row depends on nothing but its own design.
 
-        Parameters
-        ----------
-        designs
-            n designs.
-
-        Returns
-        -------
-        Judged
-            n rows, in the same order.
-
-        Notes
-        -----
         A simulation may end with a proof of its verdict while the rotation can still grow, so its margin is one up to
         then. Where a question asks for a margin, the rows that have it are simulated again with the limit of rotation
         reduced by it. Those that do not pass so, too, keep their verdict and get a margin just below the one asked for.

@@ -32,15 +32,9 @@ NEEDED = (
 def quantities(rows: Mapping[str, Any], shape: Shape, ground: Ground) -> dict[str, np.ndarray]:
     """Return the quantities of n designs by the names of `QUANTITIES`, shape (n,) each.
 
-    Parameters
-    ----------
-    rows
-        Values of the columns `NEEDED`, and of ``boulder_mass_kg`` where the boulders are weighed, in the units of the
-        table; numbers, or arrays that broadcast against each other.
-    shape
-        Shape of the boulders.
-    ground
-        Layers below the uppermost; the wedge follows the one of those above the base that makes it the longest.
+    The rows are values of the columns `NEEDED`, and of ``boulder_mass_kg`` where the boulders are weighed, in the units
+    of the table: numbers, or arrays that broadcast against each other. Of all layers above the base, the wedge follows
+    the one that makes it the longest.
     """
     L, W, H, density, d, phi = (np.asarray(rows[name], dtype=np.float64) for name in NEEDED)
     box, weighed = L * W * H, rows.get(BOULDER_MASS)
@@ -71,12 +65,7 @@ def wedge_slope(phi_deg: np.ndarray) -> np.ndarray:
 def buried_share(shape: Shape, ratio: np.ndarray) -> np.ndarray:
     """Return the volume of a boulder below a height over the volume of its box, exactly.
 
-    Parameters
-    ----------
-    shape
-        Shape of the boulder.
-    ratio
-        The height as a share of the boulder's; above its top all of it lies below.
+    The height is a share of the boulder's; above its top all of it lies below.
     """
     total = np.zeros(np.shape(ratio))
     for low, high in pairwise(shape.points or BOX):

@@ -35,24 +35,15 @@ NOT_A_RATING = "a simulation, not a rating by test"
 
 @dataclass(frozen=True)
 class Flag:
-    """One flag.
-
-    Attributes
-    ----------
-    name : str
-        Its name in the column.
-    meaning : str
-        What is outside, in words that follow "passes with".
-    raised_where : str
-        The condition.
-    why : str
-        Why it matters, and where the threshold comes from.
-    """
+    """One flag, by its name in the column."""
 
     name: str
     meaning: str
+    """What is outside, in words that follow "passes with"."""
     raised_where: str
+    """The condition on which it is raised."""
     why: str
+    """Why it matters, and where the threshold comes from."""
 
 
 def usual_range(name: str) -> tuple[float, float]:
@@ -203,14 +194,9 @@ def has_odd_layers(ground: Ground) -> bool:
 
 
 def run_by_run(function: Callable[[np.ndarray], np.ndarray], column: np.ndarray) -> np.ndarray:
-    """Return a function of n values, computed once for neighbours that are equal.
+    """Return a function of n values, one along its last axis for each, computed once for neighbours that are equal.
 
-    Parameters
-    ----------
-    function
-        Takes values and returns numbers for each, along the last axis.
-    column
-        Values of shape (n,), such as a soil's: from one design of a grid to the next they seldom change.
+    Values such as a soil's seldom change from one design of a grid to the next.
     """
     starts = np.flatnonzero(column[1:] != column[:-1]) + 1
     if 4 * len(starts) >= len(column):

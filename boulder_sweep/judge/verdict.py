@@ -144,23 +144,9 @@ def judge(
     limits: Limits,
     only: tuple[str, ...] = (),
 ) -> Judged:
-    """Apply the rules of this module to n rows.
+    """Apply the rules of this module to what the kernels computed of n rows (rad, m, N, s); no row is dropped.
 
-    Parameters
-    ----------
-    outcomes
-        What the kernels computed, arrays of shape (n,); rad, m, N, s.
-    designs
-        Inputs of the same rows.
-    limits
-        Limits of the criterion, and what the model was tested on.
-    only
-        Columns wanted; all of the table where empty.
-
-    Returns
-    -------
-    Judged
-        One verdict a row; no row is dropped.
+    The columns are those in `only`; all of the table where it is empty.
     """
     rows = rows_of(designs, limits)
     consider_rows(*rows, np.arange(designs.size), np.stack(outcomes), 0, UNCONFIRMED, limits.of_rules)
@@ -180,15 +166,7 @@ def rows_of(designs: Designs, limits: Limits) -> Rows:
 
 
 def judged_rows(rows: Rows, designs: Designs, limits: Limits, only: tuple[str, ...] = ()) -> Judged:
-    """Return the columns of n rows as their solutions and courses have them.
-
-    Parameters
-    ----------
-    rows
-        The rows, after `boulder_kernels.rules.consider_rows`.
-    designs, limits, only
-        See `judge`.
-    """
+    """Return the columns of n rows as `boulder_kernels.rules.consider_rows` left their solutions and courses."""
     facts = facts_of(rows, designs, limits)
     columns, words = {}, {}
     for spec in OUTCOMES:

@@ -76,15 +76,7 @@ _BRO_EMPTY = "-999999"
 
 
 class _Hole:
-    """The readings of one hole, and the names of all.
-
-    Parameters
-    ----------
-    label
-        The file.
-    name
-        The hole that is meant; None where the file has only one.
-    """
+    """The readings of one hole of a file, and the names of all; without a name the file has only one."""
 
     def __init__(self, label: str, name: str | None) -> None:
         self.label, self.name = label, name
@@ -136,21 +128,10 @@ class _Hole:
 
 
 def read_log(node: Scalar, hole: Scalar | None, folder: Path) -> Log:
-    """Return the readings of one hole.
+    """Return the readings of one hole of a file, by its name or URL as written in the settings.
 
-    Parameters
-    ----------
-    node
-        Name of the file as written in the settings, or its URL.
-    hole
-        Name of the hole; None where the file has only one.
-    folder
-        Where relative names begin.
-
-    Raises
-    ------
-    SettingsError
-        With every mistake, at its line of the file.
+    The hole is None where the file has only one; relative names begin in the folder. Raises `SettingsError` with every
+    mistake, at its line of the file.
     """
     problems = Problems()
     with problems.under(named=node.position):

@@ -43,47 +43,32 @@ MOST_DOUBLED = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """A stone on its foot, with one face to the road.
-
-    Attributes
-    ----------
-    up, facing : str
-        Which end is up, and which faces the vehicle: names of `DIRECTIONS`.
-    axes : ndarray, shape (3, 3)
-        Direction of travel, across it to the left, and up, in the axes of the scan.
-    stands : bool
-        Whether the stone stands by itself before it is cut, its centre of mass over what it rests on.
-    cut_m : float
-        What is cut off at the foot [m].
-    cut_share : float
-        The same as a share of the volume.
-    rests : float
-        Section of the uncut stone just above what it lies on, as a share of its largest section.
-    profile : Profile
-        The stone above the cut.
-    centre : tuple of float
-        Centre of mass of the cut stone: beyond the middle of the foot of the profile, and above the cut [m].
-    moment : float
-        Its moment of inertia about the axis across the travel through the centre, for 1 kg/m^3 [m^5].
-    volume : float
-        Volume of the cut stone [m^3].
-    outline : ndarray, shape (m, 3)
-        The stone as it is, cut or not: height above the foot, distances of its sides before and behind the middle of
-        the foot [m].
-    """
+    """A stone on its foot, with one face to the road."""
 
     up: str
     facing: str
+    """Which end is up, and which faces the vehicle: names of `DIRECTIONS`."""
     axes: np.ndarray
+    """Direction of travel, across it to the left, and up, in the axes of the scan, shape (3, 3)."""
     stands: bool
+    """Whether the stone stands by itself before it is cut, its centre of mass over what it rests on."""
     cut_m: float
+    """What is cut off at the foot [m]."""
     cut_share: float
+    """What is cut off, as a share of the volume."""
     rests: float
+    """Section of the uncut stone just above what it lies on, as a share of its largest section."""
     profile: Profile
+    """The stone above the cut."""
     centre: tuple[float, float]
+    """Centre of mass of the cut stone: beyond the middle of the foot of the profile, and above the cut [m]."""
     moment: float
+    """Its moment of inertia about the axis across the travel through the centre, for 1 kg/m^3 [m^5]."""
     volume: float
+    """Volume of the cut stone [m^3]."""
     outline: np.ndarray
+    """The stone as it is, cut or not: height above the foot, distances of its sides before and behind the middle of the
+    foot [m], shape (m, 3)."""
 
     @property
     def has_foot(self) -> bool:
@@ -105,19 +90,9 @@ def has_foot(profile: Profile) -> bool:
 
 
 class Stone:
-    """A stone that can be set up.
+    """A stone that can be set up; its scan is named in messages.
 
-    Parameters
-    ----------
-    solid
-        The stone.
-    file
-        Its scan, for messages.
-
-    Raises
-    ------
-    ScanError
-        Its surface crosses itself.
+    Raises `ScanError` where its surface crosses itself.
     """
 
     def __init__(self, solid: Solid, file: str) -> None:
@@ -184,12 +159,8 @@ class Stone:
         """Return the stone with one end up and another to the road.
 
         With an end of its own axes up the stone may be tilted to a part of its surface on which it stands firmly; with
-        an axis of the scan up it stands as it was scanned.
-
-        Raises
-        ------
-        ScanError
-            Up or facing is no end, or they are ends of one axis, or of two kinds of axes.
+        an axis of the scan up it stands as it was scanned. Raises `ScanError` where up or facing is no end, or they are
+        ends of one axis, or of two kinds of axes.
         """
         for key, end in (("up", up), ("facing", facing)):
             if end not in DIRECTIONS:
@@ -381,19 +352,10 @@ LEAST_GAIN = 1e-9
 
 
 def smallest_box(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the box of least volume around the convex hull of some points.
+    """Return the box of least volume around the corners of a convex hull [m], shape (n, 3): axes and sides [m].
 
-    Parameters
-    ----------
-    points
-        Corners of the hull, around the origin [m], shape (n, 3). Their order changes nothing but the last digits.
-
-    Returns
-    -------
-    axes : ndarray, shape (3, 3)
-        Directions of the sides as rows, right-handed, in no particular order.
-    sides : ndarray, shape (3,)
-        Lengths along them [m].
+    The axes are the directions of the sides as rows, right-handed, in no particular order, shape (3, 3). The order of
+    the corners changes nothing but the last digits.
     """
     from scipy.spatial.transform import Rotation
 
