@@ -68,6 +68,7 @@ class TableFile:
         most_text: float = MOST_BYTES,
     ) -> None:
         import pyarrow.parquet as pq  # takes a third of a second to import: only where there is such a file
+        import pyarrow.types as kinds
 
         self._source, self._most_bytes, self._most_text = source, most_bytes, most_text
         self._taken, self._text = 0, 0
@@ -85,7 +86,7 @@ class TableFile:
             if self.rows > most_rows:
                 raise ParquetLimitError(f"has {self.rows:,} rows; at most {most_rows:,} are read")
             for index, field in enumerate(self.schema):
-                stored = footer.schema.column(index) if _is_decimal(field.type) else None
+                stored = footer.schema.column(index) if kinds.is_decimal(field.type) else None
                 if stored and (stored.physical_type == "BYTE_ARRAY" or stored.length > _WIDEST_NUMBER):
                     raise ParquetLimitError(f"column {_shown(field.name)} holds decimals of any length; {_REMEDY}")
             self._check_chunks()
@@ -298,10 +299,3 @@ def _is_string(kind: pa.DataType) -> bool:
     import pyarrow.types as kinds
 
     return bool(kinds.is_string(kind) or kinds.is_large_string(kind))
-
-
-@lru_cache(maxsize=64)
-def _is_decimal(kind: pa.DataType) -> bool:
-    import pyarrow.types as kinds
-
-    return bool(kinds.is_decimal(kind))

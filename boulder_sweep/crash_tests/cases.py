@@ -284,7 +284,16 @@ class Validation:
                 for (test, preset), row in self.rows().items()
             ],
             "statements": [asdict(statement) for statement in self.statements],
-            "rigid_wall": wall_figures(self.wall),
+            "rigid_wall": {
+                "a_per_s": self.wall.a,
+                "b_per_s": self.wall.b,
+                "max_displacement_m": self.wall.max_displacement_m,
+                "time_of_max_displacement_s": self.wall.max_displacement_time_s,
+                "peak_force_kN": self.wall.peak_force / 1e3,
+                "time_of_peak_force_s": self.wall.peak_force_time_s,
+                "separation_time_s": self.wall.separation_time_s,
+                "rebound_speed_m_s": -self.wall.rebound_speed_m_s,
+            },
             "not_compared": NOT_COMPARED,
             "files": [str(file) for file in self.files],
         }
@@ -302,20 +311,6 @@ def validate(out: str | Path | None = None) -> Validation:
     if out is not None:
         result.files.extend(draw("crash_curves", "write_validation", result, Path(out)))
     return result
-
-
-def wall_figures(wall: RigidWall) -> dict[str, float]:
-    """Return the characteristic figures of a rigid-wall impact."""
-    return {
-        "a_per_s": wall.a,
-        "b_per_s": wall.b,
-        "max_displacement_m": wall.max_displacement_m,
-        "time_of_max_displacement_s": wall.max_displacement_time_s,
-        "peak_force_kN": wall.peak_force / 1e3,
-        "time_of_peak_force_s": wall.peak_force_time_s,
-        "separation_time_s": wall.separation_time_s,
-        "rebound_speed_m_s": -wall.rebound_speed_m_s,
-    }
 
 
 def _row(trajectory: Trajectory) -> dict[str, Any]:

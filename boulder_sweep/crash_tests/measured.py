@@ -16,14 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from boulder_sweep.errors import FitError
-from boulder_sweep.settings.problems import (
-    Position,
-    Problems,
-    check_regular_file,
-    did_you_mean,
-    refuse,
-    shorten,
-)
+from boulder_sweep.settings.problems import Position, Problems, check_regular_file, did_you_mean, refuse, shorten
 from boulder_sweep.settings.tables import MAX_BYTES, TextTable, open_table
 from boulder_sweep.settings.units import UnitError, factor
 

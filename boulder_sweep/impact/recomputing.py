@@ -32,8 +32,6 @@ from boulder_sweep.store.reading import FinishedRows
 if TYPE_CHECKING:
     from boulder_sweep.impact.trajectory import Trajectory
 
-__all__ = ["Recomputation", "recompute"]
-
 
 @dataclass(frozen=True, eq=False)
 class Recomputation:
@@ -132,11 +130,7 @@ def one_design(settings: dict[str, Any], inputs: dict[str, float | None], contro
         table=DesignList("", {name: np.array([value]) for name, value in given.items()}) if is_listed else None,
         criterion=Criterion(**settings["criterion"]),
         model=model_of(settings, control),
-        solver=SolverSettings(
-            accuracy=None,
-            step_s=step_s,
-            horizon_s=control.horizon,
-        ),
+        solver=SolverSettings(accuracy=None, step_s=step_s, horizon_s=control.horizon),
         units=units_in(settings),
         allowed=allowed_in(settings),
     )

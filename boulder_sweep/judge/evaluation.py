@@ -15,13 +15,7 @@ import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, simulate_table
 from boulder_kernels._jit import plain
-from boulder_kernels.rules import (
-    RULES,
-    SLOWER_SPEEDS,
-    Rows,
-    consider_rows,
-    rule_by_slower,
-)
+from boulder_kernels.rules import RULES, SLOWER_SPEEDS, Rows, consider_rows, rule_by_slower
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_sweep.columns import SHAPES
 from boulder_sweep.judge.accuracy import (
@@ -55,16 +49,7 @@ SLOWER_AT_ONCE = 150
 BY_SLOWER = np.array([plain(rule_by_slower)(rule) for rule in range(len(RULES))])
 """The worst rule that a slower truck can impose on a row, by the rule that decides the slower truck."""
 Simulate = Callable[..., OutcomeTable]
-"""Function that simulates a table of designs, with the arguments of `by_kernels`, which it always is outside tests."""
-
-
-def by_kernels(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
-    """Simulate with the compiled kernels.
-
-    A plain function, so that worker processes import it by name and use the compiled code on disk; the kernel
-    itself would be sent as source and compiled again.
-    """
-    return simulate_table(table, readings, control)
+"""Function that simulates a table of designs, as `simulate_table`, which it always is outside tests."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +59,7 @@ class Evaluation:
     readings: Readings
     control: Control
     limits: Limits
-    simulate: Simulate = by_kernels
+    simulate: Simulate = simulate_table
     only: tuple[str, ...] = ()
     """Outcome columns wanted, verdict and reason among them; all of the table where empty."""
     model: Model = field(default_factory=Model)
@@ -281,7 +266,7 @@ PLAIN_DESIGN = DesignTable(
 """One usual design, in the units of the kernels."""
 
 
-def evaluation_of(sweep: Sweep, accuracy: Accuracy, simulate: Simulate = by_kernels) -> Evaluation:
+def evaluation_of(sweep: Sweep, accuracy: Accuracy, simulate: Simulate = simulate_table) -> Evaluation:
     """Return how the designs of a sweep are simulated, with a given accuracy, and judged."""
     askable = can_be_asked(sweep)
     return Evaluation(

@@ -144,11 +144,7 @@ class Designs(NamedTuple):
         return (self.solidity >= LEAST_SOLIDITY) | self.has_outlines
 
 
-def designs_of(
-    block: DesignBlock,
-    rows: np.ndarray | None = None,
-    model: Model | None = None,
-) -> Designs:
+def designs_of(block: DesignBlock, rows: np.ndarray | None = None, model: Model | None = None) -> Designs:
     """Return the designs of a block, or some of its n rows (bool or indices), as the kernels take them.
 
     The model says what is not in the block: the law of the soil's resistance, its layers, water, cohesion and slope,

@@ -19,7 +19,7 @@ from boulder_sweep import elementary
 from boulder_sweep.columns import BOULDER_MASS, TO_BUILD, ColumnSpec
 from boulder_sweep.settings.model import BOX, Ground, Shape
 
-MASS = ColumnSpec(BOULDER_MASS, "float64", "kg", "mass of the boulder, its volume times its density")
+MASS = ColumnSpec(BOULDER_MASS, "kg", "mass of the boulder, its volume times its density")
 ABOVE, EXCAVATED, BACKFILLED = TO_BUILD
 QUANTITIES = (MASS, *TO_BUILD)
 NEEDED = (

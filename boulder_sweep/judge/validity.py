@@ -46,11 +46,10 @@ class Flag:
     """Why it matters, and where the threshold comes from."""
 
 
-def usual_range(name: str) -> tuple[float, float]:
+def _usual_range(name: str) -> tuple[float, float]:
     """Range met in practice, from the register of settings, rounding allowed for."""
     usual = BY_NAME[name].usual
-    if usual is None:
-        raise KeyError(name)
+    assert usual is not None
     return _rounded(usual.low, usual.high)
 
 
@@ -75,10 +74,10 @@ DAMPING = (
 """Damper of these vehicles over sqrt(k m) [-]."""
 NOWHERE = 1e9
 """A friction angle that no soil has [deg]."""
-_SIZES = [usual_range(f"boulder_{side}_m") for side in ("length", "width", "height")]
-_EMBEDMENT, _ROCK = usual_range("embedment_ratio"), (2400.0, 3074.0)
-_ANGLE, _SOIL = usual_range("friction_angle_deg"), usual_range("soil_density_kg_m3")
-_RATE_FACTOR = usual_range("strain_rate_factor")
+_SIZES = [_usual_range(f"boulder_{side}_m") for side in ("length", "width", "height")]
+_EMBEDMENT, _ROCK = _usual_range("embedment_ratio"), (2400.0, 3074.0)
+_ANGLE, _SOIL = _usual_range("friction_angle_deg"), _usual_range("soil_density_kg_m3")
+_RATE_FACTOR = _usual_range("strain_rate_factor")
 
 FLAGS = (
     Flag(

@@ -120,8 +120,6 @@ class Facts(NamedTuple):
     """How far the leading edge of the cargo bed came past the far face of the boulder [m]."""
     margin: np.ndarray
     """Least (limit - value) / limit over the criteria."""
-    rule: np.ndarray
-    """The rule that decides each row, one of `boulder_kernels.rules.RULES`."""
     verdict: np.ndarray
     """Codes of the verdicts."""
     reason: np.ndarray
@@ -132,18 +130,11 @@ class Facts(NamedTuple):
     """Codes of the flags."""
     robustness: np.ndarray
     """Codes of `GRADES`, of passes that no second opinion was asked of."""
-    stands_under: np.ndarray
-    """Codes of `STANDINGS`; -1 before a second opinion was asked for."""
     words: dict[str, tuple[str, ...]]
     """What the codes of a column stand for, where that depends on the rows."""
 
 
-def judge(
-    outcomes: OutcomeTable,
-    designs: Designs,
-    limits: Limits,
-    only: tuple[str, ...] = (),
-) -> Judged:
+def judge(outcomes: OutcomeTable, designs: Designs, limits: Limits, only: tuple[str, ...] = ()) -> Judged:
     """Apply the rules of this module to what the kernels computed of n rows (rad, m, N, s); no row is dropped.
 
     The columns are those in `only`; all of the table where it is empty.
@@ -214,13 +205,11 @@ def facts_of(rows: Rows, designs: Designs, limits: Limits) -> Facts:
         overlap=courses["overlap"],
         penetration=penetration,
         margin=courses["margin"],
-        rule=rule,
         verdict=verdict,
         reason=reason,
         rating=_ratings(penetration),
         validity=reason,
         robustness=reason,
-        stands_under=np.full(len(status), -1, dtype=np.int32),
         words={"reason": reasons},
     )
 

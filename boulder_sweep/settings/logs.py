@@ -156,7 +156,7 @@ def _log_of(found: _Hole, node: Scalar, hole: Scalar) -> Log:
         raise wrong(hole.position, unknown_word(hole.text, f"a hole of {found.label} with readings", shown))
     key = CONE if CONE in found.readings else next(iter(found.readings), "")
     given = found.readings.get(key, [])
-    readings = sorted((one for one in given if one.is_whole), key=lambda one: one.depth_m)
+    readings = sorted((one for one in given if one.text and math.isfinite(one.depth_m)), key=lambda one: one.depth_m)
     if not readings:
         raise wrong(node.position, f"{found.label} has no rows with a depth and a reading")
     unused = [*found.unused, *("blow counts" for other in found.readings if other != key)]

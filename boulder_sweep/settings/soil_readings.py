@@ -274,11 +274,6 @@ class LogReading(NamedTuple):
     text: str
     energy_ratio: str
 
-    @property
-    def is_whole(self) -> bool:
-        """Whether it has a depth and a value."""
-        return bool(self.text) and math.isfinite(self.depth_m)
-
 
 class Log(NamedTuple):
     """The readings of a hole, from the top down, all with a depth and a value."""

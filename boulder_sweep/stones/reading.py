@@ -9,6 +9,7 @@ files. What it returns must have the points and triangles that were counted.
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import io
 import json
 import re
@@ -326,14 +327,6 @@ class ScannedSurface:
     """Distance between neighbouring numbers at its largest coordinate, as the file stores them [m]."""
 
 
-def require_trimesh() -> None:
-    """Raise `ScanError` if trimesh is not installed."""
-    from importlib.util import find_spec  # an extra: files with sizes or profiles do not need it
-
-    if find_spec("trimesh") is None:
-        raise ScanError(f"scans need trimesh, which is not installed: {install('scan')}")
-
-
 def read_scan(path: str | Path, metres: float = 1.0) -> ScannedSurface:
     """Return the surface of a stone in a PLY, STL, OBJ or GLB file, whose unit has a length [m].
 
@@ -344,7 +337,8 @@ def read_scan(path: str | Path, metres: float = 1.0) -> ScannedSurface:
     kind = path.suffix.lower()
     if kind not in READERS:
         raise ScanError(f"{path}: is not a scan that can be read; use one of {', '.join(READERS)}")
-    require_trimesh()
+    if importlib.util.find_spec("trimesh") is None:  # an extra: files with sizes or profiles do not need it
+        raise ScanError(f"scans need trimesh, which is not installed: {install('scan')}")
     data = _content(path)
     try:
         vertices, faces, step = _placed(parts_of(kind, data))

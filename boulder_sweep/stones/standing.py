@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -96,7 +95,12 @@ class Stone:
     """
 
     def __init__(self, solid: Solid, file: str) -> None:
+        import trimesh
+
         self.solid = solid
+        self._hull: Any = trimesh.Trimesh(solid.vertices, solid.faces, process=False).convex_hull
+        self.axes, self.sides_m = _named_box(self._hull.vertices - solid.centre)
+        """Directions of a, b and c in the axes of the scan, shape (3, 3), and sides of the smallest box along them."""
         self._ups: dict[str, _Up] = {}
         doubled = self._whole_doubled()
         if doubled > MOST_DOUBLED:
@@ -104,39 +108,6 @@ class Stone:
                 f"{file}: the surface crosses itself: {doubled:.0%} of the boulder lies inside it twice or inside out; "
                 "repair the scan first, for example in MeshLab"
             )
-
-    @cached_property
-    def _box(self) -> tuple[np.ndarray, np.ndarray]:
-        """Axes a, b and c as rows, and the sides of the box along them [m]."""
-        points = self._hull.vertices - self.solid.centre
-        axes, sides = smallest_box(points)
-        order = np.argsort(-np.round(sides, 9), kind="stable")
-        axes, sides = axes[order], sides[order]
-        placed = points @ axes.T
-        middle = 0.5 * (placed.min(axis=0) + placed.max(axis=0))
-        # An end of a stone that is the same on both has no name of its own: it takes what makes the axes right-handed.
-        same = np.abs(middle) < 1e-6 * sides
-        axes *= np.sign(np.where(same, axes[range(3), np.abs(axes).argmax(axis=1)], middle))[:, None]
-        if np.linalg.det(axes) < 0.0:
-            axes[1 if same[1] else 0 if same[0] else 2] *= -1.0
-        return axes, sides
-
-    @cached_property
-    def _hull(self) -> Any:
-        """Convex hull of the scan."""
-        import trimesh
-
-        return trimesh.Trimesh(self.solid.vertices, self.solid.faces, process=False).convex_hull
-
-    @property
-    def axes(self) -> np.ndarray:
-        """Directions of a, b and c in the axes of the scan, shape (3, 3)."""
-        return self._box[0]
-
-    @property
-    def sides_m(self) -> np.ndarray:
-        """Sides a, b and c of the smallest box around the stone [m], shape (3,)."""
-        return self._box[1]
 
     @property
     def solidity(self) -> float:
@@ -198,7 +169,7 @@ class Stone:
 
     def _direction(self, end: str) -> np.ndarray:
         """Return an end as a unit vector in the axes of the scan."""
-        axes, names = (self._box[0], OF_STONE) if end[-1] in OF_STONE else (np.eye(3), OF_SCAN)
+        axes, names = (self.axes, OF_STONE) if end[-1] in OF_STONE else (np.eye(3), OF_SCAN)
         return (-1.0 if end[0] == "-" else 1.0) * axes[names.index(end[-1])]
 
     def _set_up(self, up: str) -> _Up:
@@ -252,8 +223,7 @@ class Stone:
 
     def _whole_doubled(self) -> float:
         """Return the share of the volume that the surface encloses twice."""
-        axes = self._box[0]
-        frames = (axes, axes[[1, 2, 0]], axes[[2, 0, 1]])
+        frames = (self.axes, self.axes[[1, 2, 0]], self.axes[[2, 0, 1]])
         shares = (np.arange(24) + 0.5) / 24
         return max(doubled_share(self.solid, frame, shares * self._height(frame[2])) for frame in frames)
 
@@ -335,6 +305,21 @@ def _over(centre: np.ndarray, triangles: np.ndarray, normals: np.ndarray) -> np.
     sides = np.einsum("ijk,ik->ij", np.cross(corner, np.roll(corner, -1, axis=1)), normals)
     least = 1e-9 * np.abs(sides).max()
     return (sides >= -least).all(axis=1) | (sides <= least).all(axis=1)
+
+
+def _named_box(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return axes a, b and c as rows, and the sides of the box along them, of points around the centre of mass [m]."""
+    axes, sides = smallest_box(points)
+    order = np.argsort(-np.round(sides, 9), kind="stable")
+    axes, sides = axes[order], sides[order]
+    placed = points @ axes.T
+    middle = 0.5 * (placed.min(axis=0) + placed.max(axis=0))
+    # An end of a stone that is the same on both has no name of its own: it takes what makes the axes right-handed.
+    same = np.abs(middle) < 1e-6 * sides
+    axes *= np.sign(np.where(same, axes[range(3), np.abs(axes).argmax(axis=1)], middle))[:, None]
+    if np.linalg.det(axes) < 0.0:
+        axes[1 if same[1] else 0 if same[0] else 2] *= -1.0
+    return axes, sides
 
 
 SCREENED = 4096
