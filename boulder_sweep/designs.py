@@ -122,10 +122,6 @@ class Source:
         self.dictionary: tuple[np.ndarray | None, np.ndarray] = None, self.values
         """Indices into the dictionary for every value (None: its own index), and the dictionary."""
 
-    def to_numpy(self) -> np.ndarray:
-        """Return the values, shape (n,)."""
-        return self.values
-
     def find_dictionary(self) -> None:
         """Look for repeated values; called once, before the first block, so that all blocks cost the same."""
         head = self.values[: 2 * MAX_DICTIONARY]
@@ -280,12 +276,11 @@ class DesignPlan:
 
     def block(self, start: int, stop: int) -> DesignBlock:
         """Return the designs ``[start, stop)``; raise IndexError where these are not within the sweep."""
-        return self._block(self._rows(start, stop))
+        return self._block(_RowIndices(self, start, stop))
 
     def selection(self, numbers: np.ndarray) -> DesignBlock:
         """Return some designs by their numbers, int64, ascending, at least one; raise IndexError as `block`."""
-        first, stop = int(numbers[0]), int(numbers[-1]) + 1
-        return self._block(self._rows(first, stop, numbers))
+        return self._block(_RowIndices(self, int(numbers[0]), int(numbers[-1]) + 1, numbers))
 
     def _block(self, rows: _RowIndices) -> DesignBlock:
         """Return the designs of some rows."""
@@ -300,19 +295,13 @@ class DesignPlan:
 
         What differs in a case is there again under the name of `in_case`. Raises IndexError as `block`.
         """
-        rows = self._rows(start, stop)
+        rows = _RowIndices(self, start, stop)
         given = {name: rows.values(source) for name, source in self.given.items()}
         for number, case in enumerate(self.cases):
             for name, values in case.given_rows(start, stop).items():
                 if not np.array_equal(values, given[name]):
                     given[in_case(name, number)] = values
         return given
-
-    def _rows(self, start: int, stop: int, numbers: np.ndarray | None = None) -> _RowIndices:
-        """Return a range of rows that must be within the sweep, or some rows of it."""
-        if not 0 <= start <= stop <= self.n_designs:
-            raise IndexError(f"rows {start} to {stop} are not within the {self.n_designs} designs of this sweep")
-        return _RowIndices(self, start, stop, numbers)
 
 
 def in_case(name: str, number: int) -> str:
@@ -352,9 +341,11 @@ def some(block: DesignBlock, rows: np.ndarray) -> DesignBlock:
 
 
 class _RowIndices:
-    """Indices of a range of rows along the axes; of 32 bits where they fit, which divide several times as fast."""
+    """Indices of a range of rows, or of some, along the axes; of 32 bits where they fit, several times as fast."""
 
     def __init__(self, plan: DesignPlan, start: int, stop: int, numbers: np.ndarray | None = None) -> None:
+        if not 0 <= start <= stop <= plan.n_designs:
+            raise IndexError(f"rows {start} to {stop} are not within the {plan.n_designs} designs of this sweep")
         self.plan = plan
         self.start, self.stop, self.numbers = start, stop, numbers
         self.count = stop - start if numbers is None else len(numbers)

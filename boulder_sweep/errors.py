@@ -107,7 +107,6 @@ class Interrupted(KeyboardInterrupt):
     def __init__(self, signum: int, rows_done: int | None = 0, rows: int = 0, resume_command: str = ""):
         self.signum = signum
         self.rows_done, self.rows = rows_done, rows
-        self.resume_command = resume_command
         name = signal.Signals(signum).name
         text = f"interrupted by {name}"
         if resume_command:

@@ -23,7 +23,7 @@ from boulder_sweep.settings.units import UnitError, factor
 MOST_ROWS = 2_000_000
 _BRACKETS = re.compile(r"(?P<name>[^\[(]*?)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))\s*")
 _SUFFIXES = {"m_s2": "m/s^2", "ft_s2": "ft/s^2", "m_s": "m/s", "km_h": "km/h", "ft_s": "ft/s"}
-_PLAIN_SUFFIXES = ("s", "ms", "m", "mm", "cm", "in", "ft", "deg", "rad", "mph", "g")
+_SUFFIXES |= {unit: unit for unit in ("s", "ms", "m", "mm", "cm", "in", "ft", "deg", "rad", "mph", "g")}
 
 
 class Signal(NamedTuple):
@@ -162,7 +162,7 @@ def _split_header(cell: str) -> tuple[str, str]:
     match = _BRACKETS.fullmatch(cell)
     if match:
         return match["name"], (match["square"] or match["round"] or "").strip()
-    for suffix, unit in (*_SUFFIXES.items(), *((word, word) for word in _PLAIN_SUFFIXES)):
+    for suffix, unit in _SUFFIXES.items():
         if cell.endswith(f"_{suffix}"):
             return cell.removesuffix(f"_{suffix}"), unit
     return cell, ""

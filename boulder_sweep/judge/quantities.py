@@ -1,10 +1,9 @@
 """What a design takes to build: mass of the boulder, its height above ground, soil to excavate and to put back.
 
 The model relies on soil of the given density and friction angle on both sides of the boulder, since its springs act
-both ways: on each side as far as the wedge that moves with the boulder, d tan(pi/4 + phi/2) at the surface (Eq 1), and
-as the wedge that is compressed, d / tan(phi) (Eq 25), whichever is longer. Both taper to nothing at the base of the
-boulder. So what is excavated is a trench as wide as the boulder, L long at its base and L + 2 d t at the surface:
-``V = W d (L + d t)`` with t the larger of both slopes. What is put back is that less the buried part of the boulder.
+both ways: as far as the wedge that moves with it, d tan(pi/4 + phi/2) at the surface (Eq 1), or the wedge that is
+compressed, d / tan(phi) (Eq 25), whichever is longer. Both taper to nothing at the foot of the boulder, so the trench
+has a volume of ``W d (L + d t)``, with t the larger of both slopes.
 """
 
 from __future__ import annotations

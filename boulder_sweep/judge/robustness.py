@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 ROBUST, SENSITIVE, OPEN = range(len(GRADES))
 DECISIVE = "width_capped"
 """The soil model that decides: it resists least, except for slender boulders in dense soil (`resists_less`)."""
+_OTHERS = tuple(law for law in SECOND_OPINIONS if law != DECISIVE)
 IN_WORDS = (
     "stands with friction and vertical motion under the weakest of three soil models; not modelled: soil on one side "
     "only, rounded boulders"
@@ -211,10 +212,9 @@ def stands_under_the_weakest(
 ) -> np.ndarray:
     """Return which of n designs pass by the laws that decide, bool, shape (n,); arguments: see `stands`."""
     there = stands(designs, DECISIVE, model, limits, longest_s, tolerance_m=tolerance_m)
-    for law in SECOND_OPINIONS:
-        if law != DECISIVE:
-            rows = np.flatnonzero(there & resists_less(designs, law))
-            there[rows] = stands(designs.rows(rows), law, model, limits, longest_s, tolerance_m=tolerance_m)
+    for law in _OTHERS:
+        rows = np.flatnonzero(there & resists_less(designs, law))
+        there[rows] = stands(designs.rows(rows), law, model, limits, longest_s, tolerance_m=tolerance_m)
     return there
 
 
@@ -260,9 +260,8 @@ def with_second_opinions(
     for law in laws:
         ask(law, np.arange(len(passing)))
     if laws == (DECISIVE,):
-        for law in SECOND_OPINIONS:
-            if law != DECISIVE:
-                ask(law, np.flatnonzero(turned | resists_less(passes, law)))
+        for law in _OTHERS:
+            ask(law, np.flatnonzero(turned | resists_less(passes, law)))
     grade[passing[turned]] = SENSITIVE
     if DECISIVE in laws:
         studied = are_studied(passes, limits)

@@ -1,31 +1,18 @@
 """From computed outcomes to pass, fail, undecided or error, with the reason.
 
-The rules, worst first; the first that applies decides the row. `boulder_kernels.rules` applies them, for tables and
-for the page of a report:
+``docs/model.md`` says what the rules mean; `boulder_kernels.rules` applies them, for tables and for the page of a
+report: the worst first, and the first that applies decides the row. A boulder that overturns fails, however small the
+penetration is.
 
-1. ``error``: the row could not be computed; the reason says why.
-2. ``fail / no_contact``: the truck passes over the boulder, H - d <= bumper height.
-3. ``fail / overturns``: the rotation reached its limit. A small penetration does not change that.
-4. ``fail / penetration``: the truck's cargo bed ends further behind the boulder than its rating allows.
-5. ``fail / slower_truck``: a shallow boulder that slides would stop the truck, but a slower truck overturns it
-   (`boulder_kernels.rules.SLOWER_SPEEDS`).
-6. ``undecided / foot``: the foot of the boulder is rounded, on which the soil also lifts, or small.
-7. ``undecided / shape``: by its mass the boulder fills less than 40 % of the box of its sides, and has no profile.
-8. ``undecided / crush``: the front of the truck is crushed by more than its length; the model no longer describes it.
-9. ``undecided / override``: the boulder overlaps the bumper by less than is required; the truck may ride over.
-10. ``undecided / horizon``: the simulated time ended, the longer one of such rows too, without proof that rotation and
-    penetration stay below their limits. Where a reading lets forces feed energy, as the printed ones do, nothing can be
-    proved of later times: there every boulder that stands at the horizon is undecided.
-11. ``undecided / error``: a peak below its limit is closer to it than the estimated numerical error.
-12. ``undecided / validity``: it stands, but turns by more than 20 degrees, beyond which the model does not hold, or is
-    less deep than 0.35 of its height and slides by more than 0.5 m: then whether it stands changes with every hundredth
-    of the speed.
-13. ``pass``.
+Undecided for its horizon is a row of which the longer time, too, ended without proof. Where a reading lets forces feed
+energy, as the printed ones do, nothing can be proved of later times: there every boulder that stands at the horizon is
+undecided. Undecided for its validity is also a shallow boulder that slides: whether it stands changes with every
+hundredth of the speed.
 
 A peak beyond its limit is decided even where the error is larger than the excess: that is the safe side. But where only
 one of the two solutions from which the error is estimated overturns, the error is infinite and nothing is decided.
-Where errors are estimated from one solution, as by ``fast``, rows of rule 11 stay as they are, and motion beyond
-the horizon is not simulated, since nothing would confirm it; else finer steps decide them.
+Where errors are estimated from one solution, as by ``fast``, rows that are undecided for their error stay as they are,
+and motion beyond the horizon is not simulated, since nothing would confirm it; else finer steps decide them.
 """
 
 from __future__ import annotations
@@ -135,7 +122,7 @@ class Facts(NamedTuple):
 
 
 def judge(outcomes: OutcomeTable, designs: Designs, limits: Limits, only: tuple[str, ...] = ()) -> Judged:
-    """Apply the rules of this module to what the kernels computed of n rows (rad, m, N, s); no row is dropped.
+    """Apply the rules to what the kernels computed of n rows (rad, m, N, s); no row is dropped.
 
     The columns are those in `only`; all of the table where it is empty.
     """
