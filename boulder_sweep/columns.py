@@ -9,7 +9,7 @@ texts. Types are plain words that do not depend on any table library: ``int64``,
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -61,9 +61,9 @@ class ColumnSpec:
 class OutcomeColumn(ColumnSpec):
     """One column that a simulation fills."""
 
-    value: Callable[[Any], np.ndarray] = field(kw_only=True)
+    value: Callable[[Any], np.ndarray] | None = None
     """From what the judge knows of n rows (`boulder_sweep.judge.verdict.Facts`) to the values of the column, shape
-    (n,): numbers in `unit`, or codes."""
+    (n,): numbers in `unit`, or codes. None of flags and grades, which take more than a formula."""
     rows: RowKind = "computed"
     """Which rows have a value; null elsewhere. *Judged* are all but errors, *computed* all that were simulated, *free*
     all simulated ones that were not stopped at the limit of the rotation, *rated* all whose penetration counts: neither
@@ -248,7 +248,6 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "what lies outside what the model was tested on: flags joined by ; (docs/confidence.md), empty where nothing "
         "does; they do not change the verdict",
         "dictionary",
-        value=lambda facts: facts.validity,
         rows="judged",
         words=("",),
     ),
@@ -258,7 +257,6 @@ OUTCOMES: tuple[OutcomeColumn, ...] = (
         "of a pass: robust where it stands with friction and vertical motion under the weakest soil model, too, "
         "sensitive where it does not under a soil model that was asked, open where none was; null for no pass",
         "dictionary",
-        value=lambda facts: facts.robustness,
         rows="passing",
         words=GRADES,
     ),

@@ -53,15 +53,10 @@ class Reasons:
     """Why rows cannot be computed."""
 
     codes: np.ndarray
-    """0 where the row can be computed, otherwise an index into `texts`; int8, shape (n,)."""
-    texts: tuple[str, ...]
-    """The reasons; the first one is empty."""
-
-    def __len__(self) -> int:
-        return len(self.codes)
+    """0 where the row can be computed, otherwise an index into `REASONS`; int8, shape (n,)."""
 
     def __getitem__(self, row: int) -> str:
-        return self.texts[int(self.codes[row])]
+        return REASONS[int(self.codes[row])]
 
     @property
     def any(self) -> bool:
@@ -286,7 +281,7 @@ class DesignPlan:
         """Return the designs of some rows."""
         columns = {name: rows.column(quantity) for name, quantity in self.columns.items()}
         labels = {name: label.at(rows.index((label.axis,))) for name, label in self.labels.items()}
-        reasons = Reasons(rows.values(self.refusals), REASONS)
+        reasons = Reasons(rows.values(self.refusals))
         cases = tuple(case._block(_RowIndices(case, rows.start, rows.stop, rows.numbers)) for case in self.cases)
         return DesignBlock(rows.start, rows.stop, columns, reasons, labels, rows.numbers, cases)
 
@@ -328,15 +323,13 @@ def block_of(given: Mapping[str, np.ndarray]) -> DesignBlock:
         {input_of(name): values for name, values in given.items() if name == in_case(input_of(name), number)}
         for number in numbers
     )
-    return DesignBlock(
-        0, len(codes), columns, Reasons(codes, REASONS), cases=tuple(block_of(base | case) for case in cases)
-    )
+    return DesignBlock(0, len(codes), columns, Reasons(codes), cases=tuple(block_of(base | case) for case in cases))
 
 
 def some(block: DesignBlock, rows: np.ndarray) -> DesignBlock:
     """Return some rows of a block by their indices, without labels, numbered from 0."""
     columns = {name: Column(None, column.to_numpy()[rows]) for name, column in block.columns.items()}
-    reasons = Reasons(np.asarray(block.reasons.codes)[rows], block.reasons.texts)
+    reasons = Reasons(block.reasons.codes[rows])
     return DesignBlock(0, len(rows), columns, reasons, cases=tuple(some(case, rows) for case in block.cases))
 
 

@@ -18,6 +18,7 @@ from boulder_kernels._jit import plain
 from boulder_kernels.rules import RULES, SLOWER_SPEEDS, Rows, consider_rows, rule_by_slower
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_sweep.columns import SHAPES
+from boulder_sweep.designs import REASONS as REFUSALS
 from boulder_sweep.judge.accuracy import (
     LONGEST_HORIZON,
     Accuracy,
@@ -81,9 +82,8 @@ class Evaluation:
             return worst_of(self.by_case(block))
         if not block.reasons.any:
             return self.judged(self.designs(block))
-        codes = np.asarray(block.reasons.codes)
-        computable = codes == 0
-        refused = not_computed(tuple(block.reasons.texts[1:]), codes[~computable] - 1)
+        computable = block.reasons.codes == 0
+        refused = not_computed(REFUSALS[1:], block.reasons.codes[~computable] - 1)
         if not computable.any():
             return joined([refused])
         return merged(computable, self.judged(self.designs(block, computable)), refused)

@@ -225,4 +225,4 @@ def _spread(lengths: tuple[int, ...], count: int) -> np.ndarray:
 def sampled_designs(sweep: Sweep, count: int) -> Designs:
     """Return about this many designs of a sweep, without those that cannot be computed."""
     block = sweep.plan.selection(sampled_rows(sweep, count))
-    return designs_of(block, np.asarray(block.reasons.codes) == 0, sweep.model)
+    return designs_of(block, block.reasons.codes == 0, sweep.model)

@@ -113,12 +113,6 @@ class Facts(NamedTuple):
     """Codes of the reasons."""
     rating: np.ndarray
     """Codes of the ratings; -1 where there is none."""
-    validity: np.ndarray
-    """Codes of the flags."""
-    robustness: np.ndarray
-    """Codes of `GRADES`, of passes that no second opinion was asked of."""
-    words: dict[str, tuple[str, ...]]
-    """What the codes of a column stand for, where that depends on the rows."""
 
 
 def judge(outcomes: OutcomeTable, designs: Designs, limits: Limits, only: tuple[str, ...] = ()) -> Judged:
@@ -145,19 +139,17 @@ def rows_of(designs: Designs, limits: Limits) -> Rows:
 
 def judged_rows(rows: Rows, designs: Designs, limits: Limits, only: tuple[str, ...] = ()) -> Judged:
     """Return the columns of n rows as `boulder_kernels.rules.consider_rows` left their solutions and courses."""
-    facts = facts_of(rows, designs, limits)
+    facts, reasons = facts_of(rows, designs, limits)
     columns, words = {}, {}
     for spec in OUTCOMES:
         if only and spec.name not in only:
             continue
-        if spec.name == "validity":
-            flags, named = flagged(facts, rows.counted)
-            facts = facts._replace(validity=flags, words=facts.words | {"validity": named})
-        if spec.name == "robustness":
-            facts = facts._replace(robustness=grades_without_asking(facts))
-        values = spec.value(facts)
         if spec.type == "dictionary":
-            words[spec.name] = facts.words.get(spec.name, spec.words)
+            words[spec.name] = reasons if spec.name == "reason" else spec.words
+        if spec.name == "validity":
+            values, words[spec.name] = flagged(facts, rows.counted)
+        else:
+            values = spec.value(facts) if spec.value else grades_without_asking(facts)
         if spec.rows != "all":
             none = -1 if spec.type == "dictionary" else np.nan
             values = np.where(facts.rows[spec.rows], values, none).astype(values.dtype, copy=False)
@@ -165,8 +157,8 @@ def judged_rows(rows: Rows, designs: Designs, limits: Limits, only: tuple[str, .
     return Judged(columns, words)
 
 
-def facts_of(rows: Rows, designs: Designs, limits: Limits) -> Facts:
-    """Return what is known of n rows; see `judged_rows`."""
+def facts_of(rows: Rows, designs: Designs, limits: Limits) -> tuple[Facts, tuple[str, ...]]:
+    """Return what is known of n rows, see `judged_rows`, and the words of their reasons."""
     outcomes, courses = outcome_table(rows.counted), rows.courses
     status, rule, penetration = outcomes.status, courses["rule"].astype(np.intp), courses["penetration"]
     verdict, reason = _VERDICTS.take(rule), _REASONS.take(rule)
@@ -177,7 +169,7 @@ def facts_of(rows: Rows, designs: Designs, limits: Limits) -> Facts:
     standing, overturned = rule >= verdicts.PENETRATION, rule == verdicts.OVERTURNS
     computed = standing | overturned
     rated = standing & (rule != verdicts.SLOWER_TRUCK) & ~((verdict == UNDECIDED) & (reason != NUMERICAL_ERROR))
-    return Facts(
+    facts = Facts(
         outcomes=outcomes,
         designs=designs,
         limits=limits,
@@ -195,10 +187,8 @@ def facts_of(rows: Rows, designs: Designs, limits: Limits) -> Facts:
         verdict=verdict,
         reason=reason,
         rating=_ratings(penetration),
-        validity=reason,
-        robustness=reason,
-        words={"reason": reasons},
     )
+    return facts, reasons
 
 
 def limits_of(sweep: Sweep) -> Limits:
