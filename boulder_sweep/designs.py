@@ -288,7 +288,7 @@ class DesignPlan:
     def given_rows(self, start: int, stop: int) -> dict[str, np.ndarray]:
         """Return what is given of the designs ``[start, stop)``, one value a row; what follows from it is left out.
 
-        What differs in a case is there again under the name of `in_case`. Raises IndexError as `block`.
+        What differs in a case is there again under the name of `in_case`. Raise IndexError as `block`.
         """
         rows = _RowIndices(self, start, stop)
         given = {name: rows.values(source) for name, source in self.given.items()}

@@ -13,6 +13,6 @@ from typing import Any
 def draw(view: str, function: str, *args: Any, **options: Any) -> Any:
     """Call a function of a module of `boulder_sweep.views`.
 
-    Raises `PictureError` where the picture cannot be drawn, or matplotlib is not installed.
+    Raise `PictureError` where the picture cannot be drawn, or matplotlib is not installed.
     """
     return getattr(import_module(f"boulder_sweep.views.{view}"), function)(*args, **options)

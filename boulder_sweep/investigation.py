@@ -174,7 +174,7 @@ def angles_by_blow_count(n1_60: float) -> dict[str, float]:
 def angles_by_cone(resistance_MPa: float, stress_kPa: float) -> dict[str, float]:
     """Return the friction angle [deg] by each of `BY_CONE`.
 
-    Raises `OutsideError` where the lowest angle is outside `CONE_ANGLES`, or nothing resists the cone.
+    Raise `OutsideError` where the lowest angle is outside `CONE_ANGLES`, or nothing resists the cone.
     """
     if resistance_MPa <= 0.0:
         raise OutsideError(f"the resistance of the cone is {resistance_MPa:g} MPa; the correlation needs more than 0")
@@ -193,7 +193,7 @@ STRONGEST = {
 def angle_by_relative_density(ratio: float) -> float:
     """Return the friction angle [deg] by EM 1110-2-2504, Table 3-1, linear between the ends of its states.
 
-    Raises `OutsideError` outside `RELATIVE_DENSITIES`.
+    Raise `OutsideError` outside `RELATIVE_DENSITIES`.
     """
     RELATIVE_DENSITIES.check(ratio, "the relative density")
     ends = [LOOSEST, *((state.relative_density, state.friction_angle_deg) for state in STATES)]

@@ -56,7 +56,7 @@ class TableFile:
 
     It may have no more than `most_rows`; the columns that are read take at most `most_bytes`, each number as eight, and
     their text at most `most_text` where every row spells its words. In the schema, a column of text is a dictionary of
-    words. Raises `ParquetError` where it is no Parquet file, or damaged, and `ParquetLimitError` where a column is
+    words. Raise `ParquetError` where it is no Parquet file, or damaged, and `ParquetLimitError` where a column is
     nested or of a type that no table has, or there are too many rows or columns.
     """
 
@@ -101,7 +101,7 @@ class TableFile:
     def read(self, columns: Sequence[str] | None = None) -> pa.Table:
         """Return all rows, of the named columns or of all.
 
-        Raises `ParquetError` where the file is damaged, and `ParquetLimitError` where the columns have too many bytes,
+        Raise `ParquetError` where the file is damaged, and `ParquetLimitError` where the columns have too many bytes,
         or a word is too long.
         """
         with _in_words():

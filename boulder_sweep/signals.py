@@ -36,7 +36,7 @@ _undo: dict[object, Callable[[], object]] = {}
 def until_end(make: Callable[[], Returned], undo: Callable[[Returned], object]) -> tuple[Returned, object]:
     """Make something in short time, and undo it when the process ends, whatever ends that but SIGKILL.
 
-    Returns what was made, and its key for `undo_now`. What undoes it may be called again, and while it is running.
+    Return what was made, and its key for `undo_now`. What undoes it may be called again, and while it is running.
     """
     key = object()
     with _making:
@@ -108,7 +108,7 @@ class Signals:
     def call(self, function: Callable[[], Returned]) -> Returned:
         """Call a function in a thread of its own, and return what it returns or raise what it raises.
 
-        Raises `Interrupted` where a signal arrived; the function goes on until the process ends.
+        Raise `Interrupted` where a signal arrived; the function goes on until the process ends.
         """
         outcome: list[Returned] = []
         problem: list[BaseException] = []

@@ -302,7 +302,7 @@ class Validation:
 def validate(out: str | Path | None = None) -> Validation:
     """Simulate both crash tests under both presets and compare them with what the paper states.
 
-    Pictures and time histories go to the folder `out`, if one is given. Raises `PictureError` where it cannot be
+    Pictures and time histories go to the folder `out`, if one is given. Raise `PictureError` where it cannot be
     written, or matplotlib is not installed.
     """
     trajectories = {(test, preset): simulate(crash_test(test), readings=preset) for test in NAMES for preset in PRESETS}

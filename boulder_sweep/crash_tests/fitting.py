@@ -235,7 +235,7 @@ class _Problem:
 def fit_pulse(pulse: TimeHistory, mass_kg: float, *, speed_m_s: float | None = None) -> VehicleFit:
     """Fit spring and damper of a Maxwell element to a rigid-wall crash pulse; the speed too where it is not given.
 
-    Raises `FitError` where mass or speed are not a vehicle's, the record contradicts the speed, no vehicle comes near
+    Raise `FitError` where mass or speed are not a vehicle's, the record contradicts the speed, no vehicle comes near
     the record, the record does not determine spring or damper, or they are not a vehicle's.
     """
     for name, column, value in (("mass", "vehicle_mass_kg", mass_kg), ("speed", "impact_speed_m_s", speed_m_s)):

@@ -67,7 +67,7 @@ class TimeHistory:
 def read_history(path: str | Path, wanted: Sequence[Signal]) -> TimeHistory:
     """Read a CSV file of measurements over time; `wanted` are the quantities it may hold, time among them.
 
-    Returns at least one quantity beside time and at least two rows. Raises `SettingsError` with every mistake of the
+    Return at least one quantity besides time and at least two rows. Raise `SettingsError` with every mistake of the
     file, with line and column.
     """
     file = Path(path)
@@ -191,7 +191,7 @@ def pulse_of(history: TimeHistory) -> TimeHistory:
     """Return a measured history as a crash pulse; a deceleration becomes an acceleration.
 
     It has one or more of ``displacement`` [m], ``velocity`` [m/s] and ``acceleration`` [m/s^2]. Zero need not be first
-    touch exactly, and rows before it are of use. Raises `FitError` where a signal has fewer than 8 values, the vehicle
+    touch exactly, and rows before it are of use. Raise `FitError` where a signal has fewer than 8 values, the vehicle
     seems to be accelerated by the wall or to move away from it, or a signal does not change or has a size that no
     impact has.
     """

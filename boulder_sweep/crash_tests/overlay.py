@@ -87,7 +87,7 @@ def overlay(measured: str | Path, case: str) -> Overlay:
 
     The test is measured in a CSV file, see `read_history`; `case` is ``abg`` or ``rwg``, the tests of the paper, or a
     settings file with one design. Uncertain inputs are taken at their means: what the test was, not the worst that it
-    may have been. Raises `SettingsError` where a file is not valid, `ComparisonError` where the settings hold several
+    may have been. Raise `SettingsError` where a file is not valid, `ComparisonError` where the settings hold several
     designs, or there is nothing to compare.
     """
     history = files.read_history(measured, files.TEST_SIGNALS)

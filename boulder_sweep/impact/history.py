@@ -142,7 +142,7 @@ def _evaluated(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
 def soil_profile(motion: Motion, sample: int, slices: int) -> tuple[np.ndarray, np.ndarray]:
     """Cut the soil along the buried face into slices of equal height at one sample, from the soil line down.
 
-    Returns the depth of the middle of each slice [m], and its force on the boulder [N], spring and drag (Eq 19), by the
+    Return the depth of the middle of each slice [m], and its force on the boulder [N], spring and drag (Eq 19), by the
     soil element in its middle; shape (slices,).
     """
     c = motion.constants

@@ -76,7 +76,7 @@ class Recomputation:
 def recompute(out: str | Location, design_id: int) -> Recomputation:
     """Compute one row of the result in a folder again, from the result alone; the row must be in a finished part.
 
-    Raises `StoreError` where there is no result in the folder, or it is damaged, and IndexError where the table has no
+    Raise `StoreError` where there is no result in the folder, or it is damaged, and IndexError where the table has no
     such row, or not yet.
     """
     folder = location_of(out)
@@ -115,7 +115,7 @@ def recompute(out: str | Location, design_id: int) -> Recomputation:
 def one_design(settings: dict[str, Any], inputs: dict[str, float | None], control: Control, step_s: float) -> Sweep:
     """Return a sweep of the one design, with the model and the step its row was computed with, and its cases.
 
-    Raises LookupError where the table does not list the values of its uncertain inputs, because there are too many.
+    Raise LookupError where the table does not list the values of its uncertain inputs, because there are too many.
     """
     at = [_in_case(case, settings["inputs"], inputs) for case in settings.get("judged_at", ())]
     cases = tuple(one_design(settings | {"judged_at": ()}, case, control, step_s) for case in at)

@@ -115,7 +115,7 @@ def history_of(
 ) -> Trajectory:
     """Return the time history of a design that can be computed, by how its row was simulated.
 
-    The row is given as judged in each case: the history is of the one that decides. Raises ValueError where there would
+    The row is given as judged in each case: the history is of the one that decides. Raise ValueError where there would
     be too many samples, or `sample_s` is not positive.
     """
     judged, worst = worst_of(cases), int(worst_case(cases)[0])

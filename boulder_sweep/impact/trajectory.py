@@ -213,8 +213,10 @@ class Trajectory:
     def to_parquet(self, path: str | Path, *, energy: bool = False) -> None:
         """Write the time history to a Parquet file, with the energy ledger where asked for.
 
-        Raises `HistoryFileError` where the name does not end in ``.parquet``, its folder does not exist, or it cannot
-        be written.
+        Raises
+        ------
+        HistoryFileError
+            The name does not end in ``.parquet``, its folder does not exist, or it cannot be written.
         """
         import pyarrow.parquet as pq  # heavy, and only files need it
 
@@ -229,7 +231,10 @@ class Trajectory:
     def plot(self, path: str | Path, *, units: str = "si") -> None:
         """Draw rotation, displacements and force over time, in ``si`` or ``us`` units (.png, .svg, .pdf).
 
-        Raises `PictureError` where there is nothing to draw, the kind is unknown, or matplotlib is not installed.
+        Raises
+        ------
+        PictureError
+            There is nothing to draw, the kind is unknown, or matplotlib is not installed.
         """
         draw("time_curves", "draw_trajectory", self, path, units=units)
 

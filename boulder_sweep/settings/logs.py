@@ -130,7 +130,7 @@ class _Hole:
 def read_log(node: Scalar, hole: Scalar | None, folder: Path) -> Log:
     """Return the readings of one hole of a file, by its name or URL as written in the settings.
 
-    The hole is None where the file has only one; relative names begin in the folder. Raises `SettingsError` with every
+    The hole is None where the file has only one; relative names begin in the folder. Raise `SettingsError` with every
     mistake, at its line of the file.
     """
     problems = Problems()

@@ -150,7 +150,7 @@ def _reading(node: Node, method: str, density_kg_m3: float | None) -> dict[str, 
 def _without_signs(node: Node) -> tuple[Node, bool]:
     """Return a reading with plain numbers in place of ``>50``, ``50+``, ``50/75mm`` and ``R``, and whether it had one.
 
-    Raises `SettingsError` for blows over a penetration without a unit, or over more than the last 300 mm.
+    Raise `SettingsError` for blows over a penetration without a unit, or over more than the last 300 mm.
     """
     if not isinstance(node, Mapping):
         return node, False
@@ -199,7 +199,7 @@ def _leave_out(readings: Located, foot_m: float, topsoil_m: float) -> None:
 def _take_angles(node: Node, method: str, readings: Located, lacking: Collection[str]) -> None:
     """Give every reading that counts its friction angles, by the sources of the correlations.
 
-    One above the range of the correlations gets the angles at its end. Raises `SettingsError` for readings that are too
+    One above the range of the correlations gets the angles at its end. Raise `SettingsError` for readings that are too
     weak for the correlations, in one mistake, and where no reading counts.
     """
     counting = [(position, reading) for position, reading in readings if "left_out" not in reading]
@@ -658,7 +658,7 @@ def unfold_soils(
 ) -> list[dict[str, Any]]:
     """Replace the readings of every soil in the tree of a file by distributions of the constants that it does not give.
 
-    Returns what is kept of each as plain data, under the name of its soil where it is a named one. `listed` are keys of
+    Return what is kept of each as plain data, under the name of its soil where it is a named one. `listed` are keys of
     the soil that a table of designs gives; the feet are the shallowest and the deepest of all designs [m]; problems
     receive what is wrong with the readings; logs are read by the names of their file and hole.
     """

@@ -68,7 +68,7 @@ class Part:
 def parts_of(kind: str, data: bytes) -> list[Part]:
     """Return the surface in the bytes of a file whose name ends in `kind`, one of `READERS`.
 
-    Raises `ScanError` where it is damaged, of another format, too large, or holds what is not read; the words do not
+    Raise `ScanError` where it is damaged, of another format, too large, or holds what is not read; the words do not
     name the file.
     """
     try:
@@ -330,7 +330,7 @@ class ScannedSurface:
 def read_scan(path: str | Path, metres: float = 1.0) -> ScannedSurface:
     """Return the surface of a stone in a PLY, STL, OBJ or GLB file, whose unit has a length [m].
 
-    Raises `ScanError` where the file is missing, too large, of another kind, damaged, holds no surface, or no stone has
+    Raise `ScanError` where the file is missing, too large, of another kind, damaged, holds no surface, or no stone has
     its size.
     """
     path = Path(path)

@@ -67,7 +67,7 @@ class Solid:
 def solid_of(scan: ScannedSurface) -> Solid:
     """Return the stone that a scan is the surface of.
 
-    Raises `ScanError` where it is flat, holds several bodies, or is too open to be closed.
+    Raise `ScanError` where it is flat, holds several bodies, or is too open to be closed.
     """
     repairs: list[str] = []
     vertices, faces = _merge_points(scan.vertices, scan.faces)

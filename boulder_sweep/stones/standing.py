@@ -91,7 +91,7 @@ def has_foot(profile: Profile) -> bool:
 class Stone:
     """A stone that can be set up; its scan is named in messages.
 
-    Raises `ScanError` where its surface crosses itself.
+    Raise `ScanError` where its surface crosses itself.
     """
 
     def __init__(self, solid: Solid, file: str) -> None:
@@ -130,7 +130,7 @@ class Stone:
         """Return the stone with one end up and another to the road.
 
         With an end of its own axes up the stone may be tilted to a part of its surface on which it stands firmly; with
-        an axis of the scan up it stands as it was scanned. Raises `ScanError` where up or facing is no end, or they are
+        an axis of the scan up it stands as it was scanned. Raise `ScanError` where up or facing is no end, or they are
         ends of one axis, or of two kinds of axes.
         """
         for key, end in (("up", up), ("facing", facing)):

@@ -137,7 +137,7 @@ def scanned(
     """Read and weigh a stone; see `read_scan`.
 
     The density follows from the mass of the whole stone; it is the one given where no mass is, and `ROCK_KG_M3` where
-    neither is. Raises `ScanError` where the scan cannot be used.
+    neither is. Raise `ScanError` where the scan cannot be used.
     """
     scan = read_scan(path, metres)
     try:
