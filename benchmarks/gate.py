@@ -195,7 +195,6 @@ def calls() -> dict[str, int]:
 def designs_of_run() -> int:
     """Count the designs that a small run hands to the kernels."""
     import boulder_sweep
-    from boulder_sweep.judge.evaluation import by_kernels
     from boulder_sweep.runner.run import run
 
     simulated: list[int] = []  # appending from several threads at once loses nothing
@@ -203,7 +202,7 @@ def designs_of_run() -> int:
     def simulate(table: Any, *others: Any) -> Any:
         if threading.current_thread().name != PREPARING:
             simulated.append(len(table.L))
-        return by_kernels(table, *others)
+        return bk.simulate_table(table, *others)
 
     with tempfile.TemporaryDirectory(prefix="sweep-gate-") as name:
         file = Path(name, "gate.yaml")

@@ -46,75 +46,57 @@ RATINGS = ("P1", "P2", "P3")
 
 @dataclass(frozen=True, slots=True)
 class ColumnSpec:
-    """One column of the table.
-
-    Attributes
-    ----------
-    name : str
-        Name in the table; ends in its unit where it has one.
-    type : {'int64', 'float64', 'dictionary'}
-        Type of the values.
-    unit : str
-        Unit of the values, ``"1"`` for plain numbers, ``""`` for text and numbering.
-    meaning : str
-        One sentence for people who design barriers.
-    """
+    """One column of the table."""
 
     name: str
-    type: ColumnType
+    """Name in the table; ends in its unit where it has one."""
     unit: str
+    """Unit of the values, ``"1"`` for plain numbers, ``""`` for text and numbering."""
     meaning: str
+    """One sentence for people who design barriers."""
+    type: ColumnType = "float64"
 
 
 @dataclass(frozen=True, slots=True)
 class OutcomeColumn(ColumnSpec):
-    """One column that a simulation fills.
+    """One column that a simulation fills."""
 
-    Attributes
-    ----------
-    value : callable
-        From what the judge knows of n rows (`boulder_sweep.judge.verdict.Facts`) to the values of the column, shape
-        (n,): numbers in `unit`, or codes.
-    rows : {'all', 'judged', 'computed', 'free', 'rated', 'overturned', 'passing'}
-        Which rows have a value; null elsewhere. *Judged* are all but errors, *computed* all that were simulated, *free*
-        all simulated ones that were not stopped at the limit of the rotation, *rated* all whose penetration counts:
-        neither overturned nor left undecided by anything but the numerical error. *Passing* rows have the verdict pass.
-    words : tuple of str
-        What the codes of a dictionary column stand for; a row may add words of its own behind them. Code -1 is null.
-    """
-
-    value: Callable[[Any], np.ndarray]
+    value: Callable[[Any], np.ndarray] | None = None
+    """From what the judge knows of n rows (`boulder_sweep.judge.verdict.Facts`) to the values of the column, shape
+    (n,): numbers in `unit`, or codes. None of flags and grades, which take more than a formula."""
     rows: RowKind = "computed"
+    """Which rows have a value; null elsewhere. *Judged* are all but errors, *computed* all that were simulated, *free*
+    all simulated ones that were not stopped at the limit of the rotation, *rated* all whose penetration counts: neither
+    overturned nor left undecided by anything but the numerical error. *Passing* rows have the verdict pass."""
     words: tuple[str, ...] = ()
+    """What the codes of a dictionary column stand for; a row may add words of its own behind them. Code -1 is null."""
 
 
 DESIGN_ID = ColumnSpec(
-    "design_id", "int64", "", "number of the design: its position in the grid (last axis fastest), from 0"
+    "design_id", "", "number of the design: its position in the grid (last axis fastest), from 0", "int64"
 )
 
 INPUTS: tuple[ColumnSpec, ...] = (
-    ColumnSpec("boulder_length_m", "float64", "m", "length L of the boulder along the direction of travel"),
-    ColumnSpec("boulder_width_m", "float64", "m", "width W of the boulder across the direction of travel"),
-    ColumnSpec("boulder_height_m", "float64", "m", "whole height H of the boulder, buried part included"),
-    ColumnSpec("boulder_density_kg_m3", "float64", "kg/m^3", "density of the boulder"),
-    ColumnSpec("embedment_depth_m", "float64", "m", "depth d of the boulder's foot below the soil line"),
-    ColumnSpec("impact_height_m", "float64", "m", "height e of the impact above the soil line (Eq 9, or as given)"),
-    ColumnSpec("soil_density_kg_m3", "float64", "kg/m^3", "density of the compacted soil"),
-    ColumnSpec("friction_angle_deg", "float64", "deg", "effective friction angle of the soil"),
-    ColumnSpec("subgrade_reaction_MN_m3", "float64", "MN/m^3", "constant of horizontal subgrade reaction of the soil"),
-    ColumnSpec("strain_rate_factor", "float64", "1", "factor K_epsilon on the soil's strength under rapid loading"),
-    ColumnSpec("vehicle_mass_kg", "float64", "kg", "mass of the vehicle with its ballast"),
-    ColumnSpec("impact_speed_m_s", "float64", "m/s", "speed of the vehicle at first contact"),
-    ColumnSpec("vehicle_spring_N_m", "float64", "N/m", "spring of the vehicle's front (Maxwell element)"),
-    ColumnSpec("vehicle_damper_N_s_m", "float64", "N*s/m", "damper of the vehicle's front (Maxwell element)"),
-    ColumnSpec("bumper_height_m", "float64", "m", "height of the underside of the vehicle's bumper over the ground"),
-    ColumnSpec("hood_height_m", "float64", "m", "height of the top of the vehicle's hood over the ground"),
-    ColumnSpec("bed_offset_m", "float64", "m", "distance from the front bumper to the leading edge of the cargo bed"),
+    ColumnSpec("boulder_length_m", "m", "length L of the boulder along the direction of travel"),
+    ColumnSpec("boulder_width_m", "m", "width W of the boulder across the direction of travel"),
+    ColumnSpec("boulder_height_m", "m", "whole height H of the boulder, buried part included"),
+    ColumnSpec("boulder_density_kg_m3", "kg/m^3", "density of the boulder"),
+    ColumnSpec("embedment_depth_m", "m", "depth d of the boulder's foot below the soil line"),
+    ColumnSpec("impact_height_m", "m", "height e of the impact above the soil line (Eq 9, or as given)"),
+    ColumnSpec("soil_density_kg_m3", "kg/m^3", "density of the compacted soil"),
+    ColumnSpec("friction_angle_deg", "deg", "effective friction angle of the soil"),
+    ColumnSpec("subgrade_reaction_MN_m3", "MN/m^3", "constant of horizontal subgrade reaction of the soil"),
+    ColumnSpec("strain_rate_factor", "1", "factor K_epsilon on the soil's strength under rapid loading"),
+    ColumnSpec("vehicle_mass_kg", "kg", "mass of the vehicle with its ballast"),
+    ColumnSpec("impact_speed_m_s", "m/s", "speed of the vehicle at first contact"),
+    ColumnSpec("vehicle_spring_N_m", "N/m", "spring of the vehicle's front (Maxwell element)"),
+    ColumnSpec("vehicle_damper_N_s_m", "N*s/m", "damper of the vehicle's front (Maxwell element)"),
+    ColumnSpec("bumper_height_m", "m", "height of the underside of the vehicle's bumper over the ground"),
+    ColumnSpec("hood_height_m", "m", "height of the top of the vehicle's hood over the ground"),
+    ColumnSpec("bed_offset_m", "m", "distance from the front bumper to the leading edge of the cargo bed"),
 )
 
-OPTIONAL_INPUTS: tuple[ColumnSpec, ...] = (
-    ColumnSpec("boulder_mass_kg", "float64", "kg", "mass of the boulder as weighed"),
-)
+OPTIONAL_INPUTS: tuple[ColumnSpec, ...] = (ColumnSpec("boulder_mass_kg", "kg", "mass of the boulder as weighed"),)
 """Inputs that a file may leave out without a default: their columns are in its tables only where it gives them."""
 
 
@@ -126,204 +108,185 @@ def _known(errors: np.ndarray) -> np.ndarray:
 OUTCOMES: tuple[OutcomeColumn, ...] = (
     OutcomeColumn(
         "verdict",
-        "dictionary",
         "",
         "pass, fail, undecided or error",
-        lambda facts: facts.verdict,
+        "dictionary",
+        value=lambda facts: facts.verdict,
         rows="all",
         words=VERDICTS,
     ),
     OutcomeColumn(
         "reason",
-        "dictionary",
         "",
         "why: empty for a pass; no_contact, overturns, penetration or slower_truck (it stops this truck, but a slower "
         "one overturns it) for a fail; horizon, error, crush, override, foot, shape or validity where undecided; or "
         "why the design could not be computed",
-        lambda facts: facts.reason,
+        "dictionary",
+        value=lambda facts: facts.reason,
         rows="all",
         words=REASONS,
     ),
     OutcomeColumn(
         "margin",
-        "float64",
         "1",
         "least distance to a limit as a fraction of that limit, positive where the design passes; "
         "null where it overturned, was not touched, fails by a slower truck, or is undecided for another reason than "
         "error",
-        lambda facts: facts.margin,
+        value=lambda facts: facts.margin,
         rows="rated",
     ),
     OutcomeColumn(
         "max_rotation_deg",
-        "float64",
         "deg",
         "largest rotation of the boulder, in either direction, up to end_time_s",
-        lambda facts: np.degrees(facts.outcomes.theta_max),
+        value=lambda facts: np.degrees(facts.outcomes.theta_max),
     ),
     OutcomeColumn(
         "max_displacement_m",
-        "float64",
         "m",
         "largest displacement of the centre of mass of boulder and soil wedge, up to end_time_s",
-        lambda facts: facts.outcomes.x_b_max,
+        value=lambda facts: facts.outcomes.x_b_max,
     ),
     OutcomeColumn(
         "max_vehicle_displacement_m",
-        "float64",
         "m",
         "largest displacement of the vehicle, up to end_time_s",
-        lambda facts: facts.outcomes.x_v_max,
+        value=lambda facts: facts.outcomes.x_v_max,
     ),
     OutcomeColumn(
         "peak_force_kN",
-        "float64",
         "kN",
         "largest force between vehicle and boulder, up to end_time_s",
-        lambda facts: facts.outcomes.F_v_max / 1000.0,
+        value=lambda facts: facts.outcomes.F_v_max / 1000.0,
     ),
     OutcomeColumn(
         "penetration_m",
-        "float64",
         "m",
         "how far the leading edge of the cargo bed gets beyond the far face of the boulder "
         "(negative: it stays short of it), up to end_time_s",
-        lambda facts: facts.penetration,
+        value=lambda facts: facts.penetration,
     ),
     OutcomeColumn(
         "rating",
-        "dictionary",
         "",
         "penetration rating reached (P1, P2, P3), by simulation, not by test; null beyond P3 and where margin is null",
-        lambda facts: facts.rating,
+        "dictionary",
+        value=lambda facts: facts.rating,
         rows="rated",
         words=RATINGS,
     ),
     OutcomeColumn(
         "time_to_limit_s",
-        "float64",
         "s",
         "time at which the rotation reached the limit; null where never",
-        lambda facts: facts.outcomes.t_limit,
+        value=lambda facts: facts.outcomes.t_limit,
         rows="overturned",
     ),
     OutcomeColumn(
         "end_time_s",
-        "float64",
         "s",
         "time simulated: until the rotation reached the limit, nothing could grow any more, or the horizon",
-        lambda facts: facts.outcomes.t_end,
+        value=lambda facts: facts.outcomes.t_end,
     ),
     OutcomeColumn(
         "rotation_error_deg",
-        "float64",
         "deg",
         "estimated numerical error of max_rotation_deg; null where that is the limit itself, or where it is not known",
-        lambda facts: np.degrees(_known(facts.outcomes.theta_error)),
+        value=lambda facts: np.degrees(_known(facts.outcomes.theta_error)),
         rows="free",
     ),
     OutcomeColumn(
         "displacement_error_m",
-        "float64",
         "m",
         "estimated numerical error of the displacements; null where it is not known",
-        lambda facts: _known(facts.outcomes.x_error),
+        value=lambda facts: _known(facts.outcomes.x_error),
     ),
     OutcomeColumn(
         "time_to_limit_error_s",
-        "float64",
         "s",
         "estimated numerical error of time_to_limit_s: error of the displacements over the speed of impact",
-        lambda facts: (
+        value=lambda facts: (
             _known(facts.outcomes.x_error) / np.where(facts.rows["overturned"], facts.designs.table.v_0, np.nan)
         ),
         rows="overturned",
     ),
     OutcomeColumn(
         "vehicle_crush_m",
-        "float64",
         "m",
         "largest crush of the vehicle's front while it drives forward: displacement of the vehicle less the point of "
         "contact's",
-        lambda facts: facts.outcomes.crush_max,
+        value=lambda facts: facts.outcomes.crush_max,
     ),
     OutcomeColumn(
         "overlap_m",
-        "float64",
         "m",
         "height of the top of the boulder over the underside of the bumper",
-        lambda facts: facts.overlap,
+        value=lambda facts: facts.overlap,
         rows="judged",
     ),
     OutcomeColumn(
         "solidity",
-        "float64",
         "1",
         "volume of the boulder over the volume of the box of its length, width and height, by its mass and the density "
         "of its rock; 1 where no mass is given",
-        lambda facts: facts.designs.solidity,
+        value=lambda facts: facts.designs.solidity,
         rows="judged",
     ),
     OutcomeColumn(
         "shape",
-        "dictionary",
         "",
         "of a boulder as taped and weighed, which fills less than 95 % of the box of its sizes: the shape that decides "
         "the verdict, the worst of those with its mass and sizes; null for any other",
-        lambda facts: np.full(facts.designs.size, facts.designs.shape, dtype=np.int32),
+        "dictionary",
+        value=lambda facts: np.full(facts.designs.size, facts.designs.shape, dtype=np.int32),
         rows="judged",
         words=SHAPES,
     ),
     OutcomeColumn(
         "validity",
-        "dictionary",
         "",
         "what lies outside what the model was tested on: flags joined by ; (docs/confidence.md), empty where nothing "
         "does; they do not change the verdict",
-        lambda facts: facts.validity,
+        "dictionary",
         rows="judged",
         words=("",),
     ),
     OutcomeColumn(
         "robustness",
-        "dictionary",
         "",
         "of a pass: robust where it stands with friction and vertical motion under the weakest soil model, too, "
         "sensitive where it does not under a soil model that was asked, open where none was; null for no pass",
-        lambda facts: facts.robustness,
+        "dictionary",
         rows="passing",
         words=GRADES,
     ),
     OutcomeColumn(
         "stands_under",
-        "dictionary",
         "",
         "of a pass: of the models that were simulated, those it stands under, joined by ; (paper, broms, "
         "width_capped); null where there was no second opinion",
-        lambda facts: facts.stands_under,
+        "dictionary",
+        value=lambda facts: np.full(facts.designs.size, -1, dtype=np.int32),  # before second opinions are asked
         rows="passing",
         words=STANDINGS,
     ),
     OutcomeColumn(
         "step_s",
-        "float64",
         "s",
         "time step that decided the verdict, shortened further where stability asks for it",
-        lambda facts: facts.outcomes.step,
+        value=lambda facts: facts.outcomes.step,
     ),
 )
 
 TO_BUILD: tuple[ColumnSpec, ColumnSpec, ColumnSpec] = (
-    ColumnSpec("height_above_ground_m", "float64", "m", "height of the top of the boulder above the ground"),
+    ColumnSpec("height_above_ground_m", "m", "height of the top of the boulder above the ground"),
     ColumnSpec(
         "excavated_m3",
-        "float64",
         "m^3",
         "soil to excavate: as wide as the boulder, on both sides as far as the wedge that the model relies on",
     ),
     ColumnSpec(
         "backfill_m3",
-        "float64",
         "m^3",
         "compacted soil to put back: what is excavated less the buried part of the boulder",
     ),
@@ -342,4 +305,4 @@ BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in (*COLUMNS, *OPTION
 
 def column_spec(name: str) -> ColumnSpec:
     """Return the register's entry of a column; any other column of a result is text from the settings file."""
-    return BY_NAME.get(name) or ColumnSpec(name, "dictionary", "", "text that the settings file gives with the design")
+    return BY_NAME.get(name) or ColumnSpec(name, "", "text that the settings file gives with the design", "dictionary")

@@ -29,18 +29,12 @@ MAX_DICTIONARY = 1 << 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Column:
-    """One input of a block of designs.
-
-    Attributes
-    ----------
-    codes : ndarray of int32, shape (n,), or None
-        Row i has ``values[codes[i]]``; None where `values` has one entry per row.
-    values : ndarray of float64
-        Values in the unit of the column.
-    """
+    """One input of a block of designs, of n rows."""
 
     codes: np.ndarray | None
+    """Row i has ``values[codes[i]]``, int32, shape (n,); None where `values` has one entry per row."""
     values: np.ndarray
+    """Values in the unit of the column, float64."""
 
     def __len__(self) -> int:
         return len(self.values if self.codes is None else self.codes)
@@ -56,24 +50,13 @@ class Column:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reasons:
-    """Why rows cannot be computed.
-
-    Attributes
-    ----------
-    codes : ndarray of int8, shape (n,)
-        0 where the row can be computed, otherwise an index into `texts`.
-    texts : tuple of str
-        The reasons; the first one is empty.
-    """
+    """Why rows cannot be computed."""
 
     codes: np.ndarray
-    texts: tuple[str, ...]
-
-    def __len__(self) -> int:
-        return len(self.codes)
+    """0 where the row can be computed, otherwise an index into `REASONS`; int8, shape (n,)."""
 
     def __getitem__(self, row: int) -> str:
-        return self.texts[int(self.codes[row])]
+        return REASONS[int(self.codes[row])]
 
     @property
     def any(self) -> bool:
@@ -83,21 +66,13 @@ class Reasons:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Label:
-    """Text that belongs to the designs and decides nothing: an ID, or the name of a soil.
-
-    Attributes
-    ----------
-    codes : ndarray of int32, shape (n,)
-        Row i has ``words[codes[i]]``. In a `DesignPlan` n is the length of the axis `axis`, in a block its rows.
-    words : tuple of str
-        The texts.
-    axis : int
-        Position of the axis it goes along; of no meaning in a block.
-    """
+    """Text that belongs to the designs and decides nothing: an ID, or the name of a soil."""
 
     codes: np.ndarray
+    """Row i has ``words[codes[i]]``, int32. A `DesignPlan` has one along the axis `axis`, a block one for each row."""
     words: tuple[str, ...]
     axis: int = 0
+    """Position of the axis it goes along; of no meaning in a block."""
 
     def at(self, indices: np.ndarray) -> Label:
         """Return the label at some indices along its axis, with no more words than these need."""
@@ -107,31 +82,19 @@ class Label:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DesignBlock:
-    """Rows ``[start, stop)`` of a sweep, or some of them.
-
-    Attributes
-    ----------
-    start, stop : int
-        Numbers of the first design and of the one after the last.
-    columns : dict of str to Column
-        Every input column of the table but ``design_id``, in the order of the table.
-    reasons : Reasons
-        Why single rows cannot be computed.
-    labels : dict of str to Label
-        Text columns that are carried along.
-    numbers : ndarray of int64, shape (n,), or None
-        Numbers of the designs where they are not all of ``[start, stop)``.
-    cases : tuple of DesignBlock
-        The same rows with other values of their uncertain inputs, by which they are judged, too; none as a rule.
-    """
+    """Rows ``[start, stop)`` of a sweep, or some of them."""
 
     start: int
     stop: int
+    """Numbers of the first design and of the one after the last."""
     columns: dict[str, Column]
+    """Every input column of the table but ``design_id``, in the order of the table."""
     reasons: Reasons
     labels: dict[str, Label] = field(default_factory=dict)
     numbers: np.ndarray | None = None
+    """Numbers of the designs where they are not all of ``[start, stop)``, int64, shape (n,)."""
     cases: tuple[DesignBlock, ...] = ()
+    """The same rows with other values of their uncertain inputs, by which they are judged, too; none as a rule."""
 
     def __len__(self) -> int:
         return self.stop - self.start if self.numbers is None else len(self.numbers)
@@ -142,14 +105,9 @@ class DesignBlock:
 
 
 class Source:
-    """Values of one quantity over some axes of the grid.
+    """Values of one quantity over some axes of the grid, the last axis changing fastest.
 
-    Parameters
-    ----------
-    values : ndarray, shape (product of the lengths of `axes`,)
-        Values, the last of `axes` changing fastest.
-    axes : tuple of int
-        Positions of the axes it depends on, ascending; empty for a constant.
+    The axes are given by their positions, ascending; there are none for a constant.
     """
 
     def __init__(self, values: np.ndarray, axes: tuple[int, ...] = ()) -> None:
@@ -158,10 +116,6 @@ class Source:
 
         self.dictionary: tuple[np.ndarray | None, np.ndarray] = None, self.values
         """Indices into the dictionary for every value (None: its own index), and the dictionary."""
-
-    def to_numpy(self) -> np.ndarray:
-        """Return the values, shape (n,)."""
-        return self.values
 
     def find_dictionary(self) -> None:
         """Look for repeated values; called once, before the first block, so that all blocks cost the same."""
@@ -252,15 +206,9 @@ def _completed(
 ) -> tuple[dict[str, Known], Known]:
     """Return every input column of designs by name, and for every row the index in `REASONS`.
 
-    Parameters
-    ----------
-    given
-        By column name; ``embedment_ratio`` may stand in place of ``embedment_depth_m``, and ``impact_height_m`` may be
-        missing, as in a file.
-    zero
-        Stands for the impact height where it is missing, and lies on every boulder.
-    combine
-        Called with a function of arrays and what it is to be applied to; returns its values.
+    ``embedment_ratio`` may be given in place of ``embedment_depth_m``, and ``impact_height_m`` may be missing, as in a
+    file; `zero` then stands for it, and lies on every boulder. `combine` is called with a function of arrays and what
+    it is to be applied to; it returns its values.
     """
     known = dict(given)
     height, bumper, hood = known["boulder_height_m"], known["bumper_height_m"], known["hood_height_m"]
@@ -281,19 +229,10 @@ def _completed(
 
 
 class DesignPlan:
-    """How every input column of a sweep follows from its axes.
+    """How every input column of a sweep follows from its axes, whose lengths are in the order of the file.
 
-    Parameters
-    ----------
-    lengths : sequence of int
-        Lengths of the axes in the order of the file.
-    given : dict of str to Source
-        By column name; ``embedment_ratio`` in place of ``embedment_depth_m`` and a missing
-        ``impact_height_m`` are computed here.
-    labels : mapping of str to Label
-        Text columns to carry along.
-    cases : sequence of DesignPlan
-        Plans of the same lengths with other values of uncertain inputs, see `DesignBlock.cases`.
+    What is given may lack columns as in `_completed`. The cases are plans of the same lengths with other values of
+    uncertain inputs, see `DesignBlock.cases`.
     """
 
     def __init__(
@@ -331,57 +270,33 @@ class DesignPlan:
         return Source(function(*grids).reshape(-1), axes)
 
     def block(self, start: int, stop: int) -> DesignBlock:
-        """Return the designs ``[start, stop)``.
-
-        Raises
-        ------
-        IndexError
-            The rows are not within the sweep.
-        """
-        return self._block(self._rows(start, stop))
+        """Return the designs ``[start, stop)``; raise IndexError where these are not within the sweep."""
+        return self._block(_RowIndices(self, start, stop))
 
     def selection(self, numbers: np.ndarray) -> DesignBlock:
-        """Return some designs by their numbers, int64, ascending, at least one.
-
-        Raises
-        ------
-        IndexError
-            The rows are not within the sweep.
-        """
-        first, stop = int(numbers[0]), int(numbers[-1]) + 1
-        return self._block(self._rows(first, stop, numbers))
+        """Return some designs by their numbers, int64, ascending, at least one; raise IndexError as `block`."""
+        return self._block(_RowIndices(self, int(numbers[0]), int(numbers[-1]) + 1, numbers))
 
     def _block(self, rows: _RowIndices) -> DesignBlock:
         """Return the designs of some rows."""
         columns = {name: rows.column(quantity) for name, quantity in self.columns.items()}
         labels = {name: label.at(rows.index((label.axis,))) for name, label in self.labels.items()}
-        reasons = Reasons(rows.values(self.refusals), REASONS)
+        reasons = Reasons(rows.values(self.refusals))
         cases = tuple(case._block(_RowIndices(case, rows.start, rows.stop, rows.numbers)) for case in self.cases)
         return DesignBlock(rows.start, rows.stop, columns, reasons, labels, rows.numbers, cases)
 
     def given_rows(self, start: int, stop: int) -> dict[str, np.ndarray]:
         """Return what is given of the designs ``[start, stop)``, one value a row; what follows from it is left out.
 
-        What differs in a case is there again under the name of `in_case`.
-
-        Raises
-        ------
-        IndexError
-            The rows are not within the sweep.
+        What differs in a case is there again under the name of `in_case`. Raise IndexError as `block`.
         """
-        rows = self._rows(start, stop)
+        rows = _RowIndices(self, start, stop)
         given = {name: rows.values(source) for name, source in self.given.items()}
         for number, case in enumerate(self.cases):
             for name, values in case.given_rows(start, stop).items():
                 if not np.array_equal(values, given[name]):
                     given[in_case(name, number)] = values
         return given
-
-    def _rows(self, start: int, stop: int, numbers: np.ndarray | None = None) -> _RowIndices:
-        """Return a range of rows that must be within the sweep, or some rows of it."""
-        if not 0 <= start <= stop <= self.n_designs:
-            raise IndexError(f"rows {start} to {stop} are not within the {self.n_designs} designs of this sweep")
-        return _RowIndices(self, start, stop, numbers)
 
 
 def in_case(name: str, number: int) -> str:
@@ -395,19 +310,10 @@ def input_of(name: str) -> str:
 
 
 def block_of(given: Mapping[str, np.ndarray]) -> DesignBlock:
-    """Return designs given row by row as a block.
+    """Return designs given row by row as a block, numbered from 0, with the same bits as the same designs in a grid.
 
-    Parameters
-    ----------
-    given
-        Arrays of shape (n,) by column name, in the units of the table; ``embedment_ratio`` may stand in place of
-        ``embedment_depth_m``, and ``impact_height_m`` may be missing, as in a file. What differs in a case of the
-        block stands under the name of `in_case`.
-
-    Returns
-    -------
-    DesignBlock
-        The designs, numbered from 0, with the same bits as the same designs in a grid.
+    Arrays have the shape (n,) and the units of the table; columns may be missing as in `_completed`. What differs in a
+    case of the block stands under the name of `in_case`.
     """
     base = {name: values for name, values in given.items() if input_of(name) == name}
     values, codes = _completed(base, np.zeros(1), lambda function, *inputs: function(*inputs))
@@ -417,22 +323,22 @@ def block_of(given: Mapping[str, np.ndarray]) -> DesignBlock:
         {input_of(name): values for name, values in given.items() if name == in_case(input_of(name), number)}
         for number in numbers
     )
-    return DesignBlock(
-        0, len(codes), columns, Reasons(codes, REASONS), cases=tuple(block_of(base | case) for case in cases)
-    )
+    return DesignBlock(0, len(codes), columns, Reasons(codes), cases=tuple(block_of(base | case) for case in cases))
 
 
 def some(block: DesignBlock, rows: np.ndarray) -> DesignBlock:
     """Return some rows of a block by their indices, without labels, numbered from 0."""
     columns = {name: Column(None, column.to_numpy()[rows]) for name, column in block.columns.items()}
-    reasons = Reasons(np.asarray(block.reasons.codes)[rows], block.reasons.texts)
+    reasons = Reasons(block.reasons.codes[rows])
     return DesignBlock(0, len(rows), columns, reasons, cases=tuple(some(case, rows) for case in block.cases))
 
 
 class _RowIndices:
-    """Indices of a range of rows along the axes; of 32 bits where they fit, which divide several times as fast."""
+    """Indices of a range of rows, or of some, along the axes; of 32 bits where they fit, several times as fast."""
 
     def __init__(self, plan: DesignPlan, start: int, stop: int, numbers: np.ndarray | None = None) -> None:
+        if not 0 <= start <= stop <= plan.n_designs:
+            raise IndexError(f"rows {start} to {stop} are not within the {plan.n_designs} designs of this sweep")
         self.plan = plan
         self.start, self.stop, self.numbers = start, stop, numbers
         self.count = stop - start if numbers is None else len(numbers)

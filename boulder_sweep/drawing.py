@@ -11,20 +11,8 @@ from typing import Any
 
 
 def draw(view: str, function: str, *args: Any, **options: Any) -> Any:
-    """Call a function of a view.
+    """Call a function of a module of `boulder_sweep.views`.
 
-    Parameters
-    ----------
-    view
-        Module of `boulder_sweep.views`.
-    function
-        Its function.
-    *args, **options
-        What it is called with.
-
-    Raises
-    ------
-    PictureError
-        The picture cannot be drawn, or matplotlib is not installed.
+    Raise `PictureError` where the picture cannot be drawn, or matplotlib is not installed.
     """
     return getattr(import_module(f"boulder_sweep.views.{view}"), function)(*args, **options)

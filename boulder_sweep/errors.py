@@ -17,13 +17,7 @@ EXIT_INTERRUPTED = 130
 
 
 class BoulderSweepError(Exception):
-    """Base of all errors meant for a user.
-
-    Attributes
-    ----------
-    exit_code : int
-        Exit code of the command line.
-    """
+    """Base of all errors meant for a user, with the exit code of the command line."""
 
     exit_code = EXIT_WRONG_USE
 
@@ -104,24 +98,15 @@ def safe_words(rows_done: int | None, rows: int) -> str:
 
 
 class Interrupted(KeyboardInterrupt):
-    """A run was stopped by a signal; the finished rows are safe and the run can be resumed.
+    """A run was stopped by a signal; the finished rows are safe and the run can be resumed by a command.
 
-    Not a `BoulderSweepError`, because code that handles errors must not swallow an interruption.
-
-    Parameters
-    ----------
-    signum
-        The signal.
-    rows_done, rows
-        Rows that are safe on disk, None where they were not counted yet, and rows of the whole table.
-    resume_command
-        Command that resumes the run.
+    Not a `BoulderSweepError`, because code that handles errors must not swallow an interruption. The rows on disk are
+    None where they were not counted yet.
     """
 
     def __init__(self, signum: int, rows_done: int | None = 0, rows: int = 0, resume_command: str = ""):
         self.signum = signum
         self.rows_done, self.rows = rows_done, rows
-        self.resume_command = resume_command
         name = signal.Signals(signum).name
         text = f"interrupted by {name}"
         if resume_command:

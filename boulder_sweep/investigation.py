@@ -114,18 +114,10 @@ def rod_factor(length_m: float) -> float:
 
 
 def normalized_blow_count(n: float, energy_ratio: float, depth_m: float, stress_kPa: float) -> float:
-    """Return (N1)60 = N (ER / 0.6) C_R C_N of a raw blow count.
+    """Return (N1)60 = N (ER / 0.6) C_R C_N of a raw blow count, of the last 300 mm (1 ft) as logged.
 
-    Parameters
-    ----------
-    n
-        Blows for the last 300 mm (1 ft), as logged.
-    energy_ratio
-        Energy of the hammer that reaches the rods, a fraction.
-    depth_m
-        Depth of the reading, and least length of the rods [m].
-    stress_kPa
-        Effective vertical stress there [kPa].
+    The energy ratio is the fraction of the hammer's energy that reaches the rods; the depth of the reading [m] counts
+    as the length of the rods; the stress there is the effective vertical one [kPa].
     """
     return n * energy_ratio / 0.6 * rod_factor(depth_m) * stress_factor(stress_kPa)
 
@@ -174,13 +166,7 @@ BY_CONE: dict[str, Callable[[float, float], float]] = {
 
 
 def angles_by_blow_count(n1_60: float) -> dict[str, float]:
-    """Return the friction angle [deg] by each of `BY_BLOW_COUNT`.
-
-    Raises
-    ------
-    OutsideError
-        Outside `BLOW_COUNTS`; `AboveError` above it.
-    """
+    """Return the friction angle [deg] by each of `BY_BLOW_COUNT`; raise `OutsideError` outside `BLOW_COUNTS`."""
     BLOW_COUNTS.check(n1_60, "(N1)60")
     return {source: angle(n1_60) for source, angle in BY_BLOW_COUNT.items()}
 
@@ -188,10 +174,7 @@ def angles_by_blow_count(n1_60: float) -> dict[str, float]:
 def angles_by_cone(resistance_MPa: float, stress_kPa: float) -> dict[str, float]:
     """Return the friction angle [deg] by each of `BY_CONE`.
 
-    Raises
-    ------
-    OutsideError
-        The lowest angle is outside `CONE_ANGLES`, or nothing resists the cone; `AboveError` above the range.
+    Raise `OutsideError` where the lowest angle is outside `CONE_ANGLES`, or nothing resists the cone.
     """
     if resistance_MPa <= 0.0:
         raise OutsideError(f"the resistance of the cone is {resistance_MPa:g} MPa; the correlation needs more than 0")
@@ -210,10 +193,7 @@ STRONGEST = {
 def angle_by_relative_density(ratio: float) -> float:
     """Return the friction angle [deg] by EM 1110-2-2504, Table 3-1, linear between the ends of its states.
 
-    Raises
-    ------
-    OutsideError
-        Outside `RELATIVE_DENSITIES`.
+    Raise `OutsideError` outside `RELATIVE_DENSITIES`.
     """
     RELATIVE_DENSITIES.check(ratio, "the relative density")
     ends = [LOOSEST, *((state.relative_density, state.friction_angle_deg) for state in STATES)]
@@ -244,13 +224,7 @@ def _log_line(angle: np.ndarray, angles: np.ndarray, values: np.ndarray) -> np.n
 
 
 def off_families(angle: np.ndarray, reaction: np.ndarray) -> np.ndarray:
-    """Return which pairs of soil constants belong to neither family of data, bool.
-
-    Parameters
-    ----------
-    angle, reaction : ndarray
-        Friction angles [deg] and constants of horizontal subgrade reaction [MN/m^3].
-    """
+    """Return which pairs of friction angle [deg] and subgrade reaction [MN/m^3] are of neither family of data."""
     least, most = family_bounds(angle)
     return (reaction < least) | (reaction > most)
 

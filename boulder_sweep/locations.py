@@ -67,10 +67,7 @@ def is_url(text: str) -> bool:
 def location_of(text: str | Location) -> Location:
     """Return the file or folder that a path or URL names.
 
-    Raises
-    ------
-    LocationError
-        The URL has a user name, password or query in it, or no package can open it.
+    Raise `LocationError` where the URL has a user name, password or query in it, or no package can open it.
     """
     if not isinstance(text, str):
         return text if hasattr(text, "fs") else Path(text)
@@ -198,13 +195,7 @@ def beside(location: Location, suffix: str) -> Path:
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is a file of a name that is about to be written.
-
-    Raises
-    ------
-    LinkError
-        There is something else, such as a link.
-    """
+    """Whether there is a file of a name that is about to be written; raises `LinkError` for a link or anything else."""
     try:
         mode = path.lstat().st_mode
     except FileNotFoundError:
@@ -260,19 +251,7 @@ def _remove(path: Path) -> None:
 def created(folder: Path, before: str = "", at: int | None = None) -> Iterator[tuple[Path, BinaryIO]]:
     """Create a file that is gone at the end of the block or of the process, unless it was renamed.
 
-    Parameters
-    ----------
-    folder
-        Where.
-    before
-        What its name begins with.
-    at
-        Descriptor of the folder.
-
-    Raises
-    ------
-    OSError
-        It cannot be created.
+    Its name begins with `before`; `at` is the descriptor of the folder. Raise OSError where it cannot be created.
     """
     path = folder / _passing_name(before)
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
@@ -298,12 +277,7 @@ def gather_temporary_files() -> None:
 def replacing(target: Path) -> Iterator[BinaryIO]:
     """Give a file to write that takes the place of another when it is complete, or is removed.
 
-    Raises
-    ------
-    LinkError
-        A link has the name.
-    OSError
-        It cannot be written; an old file is untouched.
+    Raise `LinkError` where a link has the name, and OSError where it cannot be written; an old file is untouched.
     """
     is_file(target)
     remove_abandoned(target.parent)

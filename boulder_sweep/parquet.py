@@ -54,30 +54,10 @@ class ParquetLimitError(ParquetError):
 class TableFile:
     """A Parquet file of plain columns; its rows are not read yet.
 
-    Parameters
-    ----------
-    source
-        The opened file.
-    most_rows
-        Most rows that it may have.
-    most_bytes
-        Most bytes that the columns may take that are read, each number as eight.
-    most_text
-        Most bytes that their text may take where every row spells its words.
-
-    Attributes
-    ----------
-    schema : pyarrow.Schema
-        Names and types; a column of text is a dictionary of words.
-    rows : int
-        Number of rows.
-
-    Raises
-    ------
-    ParquetError
-        It is no Parquet file, or damaged.
-    ParquetLimitError
-        A column is nested or of a type that no table has, or there are too many rows or columns.
+    It may have no more than `most_rows`; the columns that are read take at most `most_bytes`, each number as eight, and
+    their text at most `most_text` where every row spells its words. In the schema, a column of text is a dictionary of
+    words. Raise `ParquetError` where it is no Parquet file, or damaged, and `ParquetLimitError` where a column is
+    nested or of a type that no table has, or there are too many rows or columns.
     """
 
     def __init__(
@@ -88,6 +68,7 @@ class TableFile:
         most_text: float = MOST_BYTES,
     ) -> None:
         import pyarrow.parquet as pq  # takes a third of a second to import: only where there is such a file
+        import pyarrow.types as kinds
 
         self._source, self._most_bytes, self._most_text = source, most_bytes, most_text
         self._taken, self._text = 0, 0
@@ -105,7 +86,7 @@ class TableFile:
             if self.rows > most_rows:
                 raise ParquetLimitError(f"has {self.rows:,} rows; at most {most_rows:,} are read")
             for index, field in enumerate(self.schema):
-                stored = footer.schema.column(index) if _is_decimal(field.type) else None
+                stored = footer.schema.column(index) if kinds.is_decimal(field.type) else None
                 if stored and (stored.physical_type == "BYTE_ARRAY" or stored.length > _WIDEST_NUMBER):
                     raise ParquetLimitError(f"column {_shown(field.name)} holds decimals of any length; {_REMEDY}")
             self._check_chunks()
@@ -120,12 +101,8 @@ class TableFile:
     def read(self, columns: Sequence[str] | None = None) -> pa.Table:
         """Return all rows, of the named columns or of all.
 
-        Raises
-        ------
-        ParquetError
-            The file is damaged.
-        ParquetLimitError
-            The columns have too many bytes, or a word is too long.
+        Raise `ParquetError` where the file is damaged, and `ParquetLimitError` where the columns have too many bytes,
+        or a word is too long.
         """
         with _in_words():
             spelled = self._check_bytes(columns)
@@ -322,10 +299,3 @@ def _is_string(kind: pa.DataType) -> bool:
     import pyarrow.types as kinds
 
     return bool(kinds.is_string(kind) or kinds.is_large_string(kind))
-
-
-@lru_cache(maxsize=64)
-def _is_decimal(kind: pa.DataType) -> bool:
-    import pyarrow.types as kinds
-
-    return bool(kinds.is_decimal(kind))

@@ -34,21 +34,9 @@ _undo: dict[object, Callable[[], object]] = {}
 
 
 def until_end(make: Callable[[], Returned], undo: Callable[[Returned], object]) -> tuple[Returned, object]:
-    """Make something, and undo it when the process ends, whatever ends that but SIGKILL.
+    """Make something in short time, and undo it when the process ends, whatever ends that but SIGKILL.
 
-    Parameters
-    ----------
-    make
-        What makes it, in short time; what it raises is raised.
-    undo
-        What undoes it; it may be called again, and while it is running.
-
-    Returns
-    -------
-    made
-        What was made.
-    key
-        For `undo_now`.
+    Return what was made, and its key for `undo_now`. What undoes it may be called again, and while it is running.
     """
     key = object()
     with _making:
@@ -105,13 +93,7 @@ def end_group(process: subprocess.Popen[bytes]) -> None:
 
 
 class Signals:
-    """Signals noted so far.
-
-    Attributes
-    ----------
-    caught : int or None
-        The first signal that arrived.
-    """
+    """Signals noted so far: `caught` is the first that arrived, or None."""
 
     def __init__(self) -> None:
         self.caught: int | None = None
@@ -126,10 +108,7 @@ class Signals:
     def call(self, function: Callable[[], Returned]) -> Returned:
         """Call a function in a thread of its own, and return what it returns or raise what it raises.
 
-        Raises
-        ------
-        Interrupted
-            A signal arrived. The function goes on until the process ends.
+        Raise `Interrupted` where a signal arrived; the function goes on until the process ends.
         """
         outcome: list[Returned] = []
         problem: list[BaseException] = []

@@ -29,22 +29,7 @@ def coefficients(table: DesignTable, law: str) -> np.ndarray:
 
 
 def with_law(table: Any, law: str, present: str = RESISTANCES[0]) -> Any:
-    """Return n designs with the ultimate resistance of another law.
-
-    Parameters
-    ----------
-    table
-        The designs, SI, boxes.
-    law
-        A name of `boulder_sweep.settings.model.RESISTANCES`.
-    present
-        The law that the designs have.
-
-    Returns
-    -------
-    DesignTable or PiecewiseTable
-        The designs themselves where the law is the present one.
-    """
+    """Return n designs, SI, boxes, with the ultimate resistance of another law than the `present` one they have."""
     if law == present:
         return table
     ratios = layer_coefficients(table, law) / layer_coefficients(table, present)
@@ -56,15 +41,7 @@ def with_law(table: Any, law: str, present: str = RESISTANCES[0]) -> Any:
 
 
 def layer_coefficients(table: Any, law: str) -> np.ndarray:
-    """Return the coefficient K of a law [-] in every layer of n designs, shape (n, M); M is 1 of a uniform soil.
-
-    Parameters
-    ----------
-    table
-        The designs, SI.
-    law
-        See `with_law`.
-    """
+    """Return the coefficient K of a law [-] in every layer of n designs, shape (n, M); M is 1 of a uniform soil."""
     if not isinstance(table, PiecewiseTable):
         return coefficients(table, law)[:, None]
     angles = np.moveaxis(table.layers[:, :, FRICTION], 1, 0)
@@ -96,23 +73,10 @@ def profile_of(shape: Shape) -> np.ndarray:
 
 
 def with_soil(table: DesignTable, law: str, ground: Ground, shape: Shape | None = None) -> Any:
-    """Return n designs with the ultimate resistance of a law in the soil as it lies.
+    """Return n designs, SI, with the ultimate resistance of a law in the soil as it lies; boxes by default.
 
-    Parameters
-    ----------
-    table
-        The designs, SI; their soil is the uppermost layer.
-    law
-        A name of `boulder_sweep.settings.model.RESISTANCES`.
-    ground
-        The rest.
-    shape
-        Shape of the boulders; boxes by default.
-
-    Returns
-    -------
-    DesignTable or PiecewiseTable
-        The first where boulders are boxes and the resistance is proportional to depth.
+    Their own soil is the uppermost layer. Where boulders are boxes and the resistance is proportional to depth they
+    stay a `DesignTable`, else they become a `PiecewiseTable`.
     """
     shape = shape or Shape()
     if shape.is_box and ground.is_usual:
@@ -126,16 +90,9 @@ def with_soil(table: DesignTable, law: str, ground: Ground, shape: Shape | None 
 
 
 def with_shape(table: DesignTable, law: str, ground: Ground, shape: str, fills: np.ndarray) -> PiecewiseTable:
-    """Return the same for boulders as taped and weighed, by one of the shapes that they may have.
+    """Return the same for boulders as taped and weighed, by one of `boulder_sweep.columns.SHAPES` that they may have.
 
-    Parameters
-    ----------
-    table, law, ground
-        See `with_soil`; the density of the rock.
-    shape
-        One of `boulder_sweep.columns.SHAPES`.
-    fills
-        Volume of each boulder over the volume of the box of its sides, shape (n,).
+    Their density is the rock's; `fills` are their volumes over the volumes of the boxes of their sides, shape (n,).
     """
     profiles = taped_profiles(shape, fills)
     if law != "width_capped":  # no other looks at the width

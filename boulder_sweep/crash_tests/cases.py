@@ -232,17 +232,7 @@ NOT_COMPARED = (
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """Result of `validate`.
-
-    Attributes
-    ----------
-    trajectories : dict of (str, str) to Trajectory
-        By test (``abg``, ``rwg``) and preset (``as_printed``, ``corrected``).
-    wall : RigidWall
-        The paper's truck against a rigid wall.
-    files : list of Path
-        What was written.
-    """
+    """Result of `validate`: by test and preset of readings, the truck against a rigid wall, and the files written."""
 
     trajectories: dict[tuple[str, str], Trajectory]
     wall: RigidWall
@@ -294,7 +284,16 @@ class Validation:
                 for (test, preset), row in self.rows().items()
             ],
             "statements": [asdict(statement) for statement in self.statements],
-            "rigid_wall": wall_figures(self.wall),
+            "rigid_wall": {
+                "a_per_s": self.wall.a,
+                "b_per_s": self.wall.b,
+                "max_displacement_m": self.wall.max_displacement_m,
+                "time_of_max_displacement_s": self.wall.max_displacement_time_s,
+                "peak_force_kN": self.wall.peak_force / 1e3,
+                "time_of_peak_force_s": self.wall.peak_force_time_s,
+                "separation_time_s": self.wall.separation_time_s,
+                "rebound_speed_m_s": -self.wall.rebound_speed_m_s,
+            },
             "not_compared": NOT_COMPARED,
             "files": [str(file) for file in self.files],
         }
@@ -303,15 +302,8 @@ class Validation:
 def validate(out: str | Path | None = None) -> Validation:
     """Simulate both crash tests under both presets and compare them with what the paper states.
 
-    Parameters
-    ----------
-    out
-        Folder for pictures and time histories; nothing is written without one.
-
-    Raises
-    ------
-    PictureError
-        The folder cannot be written, or matplotlib is not installed.
+    Pictures and time histories go to the folder `out`, if one is given. Raise `PictureError` where it cannot be
+    written, or matplotlib is not installed.
     """
     trajectories = {(test, preset): simulate(crash_test(test), readings=preset) for test in NAMES for preset in PRESETS}
     wall = rigid_wall_test()
@@ -319,20 +311,6 @@ def validate(out: str | Path | None = None) -> Validation:
     if out is not None:
         result.files.extend(draw("crash_curves", "write_validation", result, Path(out)))
     return result
-
-
-def wall_figures(wall: RigidWall) -> dict[str, float]:
-    """Return the characteristic figures of a rigid-wall impact."""
-    return {
-        "a_per_s": wall.a,
-        "b_per_s": wall.b,
-        "max_displacement_m": wall.max_displacement_m,
-        "time_of_max_displacement_s": wall.max_displacement_time_s,
-        "peak_force_kN": wall.peak_force / 1e3,
-        "time_of_peak_force_s": wall.peak_force_time_s,
-        "separation_time_s": wall.separation_time_s,
-        "rebound_speed_m_s": -wall.rebound_speed_m_s,
-    }
 
 
 def _row(trajectory: Trajectory) -> dict[str, Any]:

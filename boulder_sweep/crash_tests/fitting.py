@@ -61,32 +61,20 @@ class SignalMisfit(NamedTuple):
 class VehicleFit:
     """Result of `fit_pulse`. Every error is half the width of a 95 % interval.
 
-    Attributes
-    ----------
-    wall : RigidWall
-        The fitted vehicle: mass, speed, spring, damper.
-    touch_s : float
-        First touch, in times of the pulse [s].
-    offset_m_s2 : float or None
-        Zero offset of the acceleration [m/s^2]; None where no rows before first touch show it.
-    spring_error_N_m, damper_error_N_s_m, touch_error_s : float
-        Errors by the scatter of the record. They say nothing about whether a Maxwell element is right at all.
-    speed_error_m_s : float or None
-        Error of the speed; None where the speed was given.
-    misfits : dict of str to SignalMisfit
-        By signal.
-    warnings : tuple of str
-        What the user of the fit should know before trusting it.
+    Errors follow from the scatter of the record. They say nothing about whether a Maxwell element is right at all.
     """
 
     pulse: TimeHistory
     wall: RigidWall
     touch_s: float
+    """First touch, in times of the pulse [s]."""
     offset_m_s2: float | None
+    """Zero offset of the acceleration; None where no rows before first touch show it."""
     spring_error_N_m: float
     damper_error_N_s_m: float
     touch_error_s: float
     speed_error_m_s: float | None
+    """Error of the speed; None where the speed was given."""
     misfits: dict[str, SignalMisfit]
     warnings: tuple[str, ...]
 
@@ -247,11 +235,8 @@ class _Problem:
 def fit_pulse(pulse: TimeHistory, mass_kg: float, *, speed_m_s: float | None = None) -> VehicleFit:
     """Fit spring and damper of a Maxwell element to a rigid-wall crash pulse; the speed too where it is not given.
 
-    Raises
-    ------
-    FitError
-        Mass or speed are not a vehicle's, the record contradicts the speed, no vehicle comes near the record,
-        the record does not determine spring or damper, or they are not a vehicle's.
+    Raise `FitError` where mass or speed are not a vehicle's, the record contradicts the speed, no vehicle comes near
+    the record, the record does not determine spring or damper, or they are not a vehicle's.
     """
     for name, column, value in (("mass", "vehicle_mass_kg", mass_kg), ("speed", "impact_speed_m_s", speed_m_s)):
         if value is not None and not 0.0 < value < math.inf:

@@ -16,21 +16,14 @@ from typing import NamedTuple
 import numpy as np
 
 from boulder_sweep.errors import FitError
-from boulder_sweep.settings.problems import (
-    Position,
-    Problems,
-    check_regular_file,
-    did_you_mean,
-    refuse,
-    shorten,
-)
+from boulder_sweep.settings.problems import Position, Problems, check_regular_file, did_you_mean, refuse, shorten
 from boulder_sweep.settings.tables import MAX_BYTES, TextTable, open_table
 from boulder_sweep.settings.units import UnitError, factor
 
 MOST_ROWS = 2_000_000
 _BRACKETS = re.compile(r"(?P<name>[^\[(]*?)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))\s*")
 _SUFFIXES = {"m_s2": "m/s^2", "ft_s2": "ft/s^2", "m_s": "m/s", "km_h": "km/h", "ft_s": "ft/s"}
-_PLAIN_SUFFIXES = ("s", "ms", "m", "mm", "cm", "in", "ft", "deg", "rad", "mph", "g")
+_SUFFIXES |= {unit: unit for unit in ("s", "ms", "m", "mm", "cm", "in", "ft", "deg", "rad", "mph", "g")}
 
 
 class Signal(NamedTuple):
@@ -63,33 +56,19 @@ TEST_SIGNALS = (TIME, ROTATION, BOULDER, VEHICLE, VEHICLE_ACCELERATION)
 
 @dataclass(frozen=True, eq=False)
 class TimeHistory:
-    """A measured time history.
-
-    Attributes
-    ----------
-    time_s : ndarray, shape (n,)
-        Times, ascending [s].
-    signals : dict of str to ndarray, shape (n,)
-        Values by name in SI units (angles in degrees), NaN where there is a gap.
-    """
+    """A measured time history of n ascending times."""
 
     path: Path
     time_s: np.ndarray
     signals: Mapping[str, np.ndarray]
+    """Values by name in SI units (angles in degrees), shape (n,), NaN where there is a gap."""
 
 
 def read_history(path: str | Path, wanted: Sequence[Signal]) -> TimeHistory:
     """Read a CSV file of measurements over time; `wanted` are the quantities it may hold, time among them.
 
-    Returns
-    -------
-    TimeHistory
-        With at least one quantity beside time and at least two rows.
-
-    Raises
-    ------
-    SettingsError
-        Every mistake of the file, with line and column.
+    Return at least one quantity besides time and at least two rows. Raise `SettingsError` with every mistake of the
+    file, with line and column.
     """
     file = Path(path)
     check_regular_file(file, MAX_BYTES, "Keep the impact, and leave out what comes before and after")
@@ -183,7 +162,7 @@ def _split_header(cell: str) -> tuple[str, str]:
     match = _BRACKETS.fullmatch(cell)
     if match:
         return match["name"], (match["square"] or match["round"] or "").strip()
-    for suffix, unit in (*_SUFFIXES.items(), *((word, word) for word in _PLAIN_SUFFIXES)):
+    for suffix, unit in _SUFFIXES.items():
         if cell.endswith(f"_{suffix}"):
             return cell.removesuffix(f"_{suffix}"), unit
     return cell, ""
@@ -204,15 +183,7 @@ SIZES = (1e-9, 1e9)
 
 
 def read_pulse(path: str | Path) -> TimeHistory:
-    """Read a crash pulse from a CSV file; see `boulder_sweep.crash_tests.measured` for its header.
-
-    Raises
-    ------
-    SettingsError
-        The file is not valid.
-    FitError
-        Its signals contradict the direction of an impact.
-    """
+    """Read a crash pulse from a CSV file; see `boulder_sweep.crash_tests.measured` for its header, and `pulse_of`."""
     return pulse_of(read_history(path, PULSE_SIGNALS))
 
 
@@ -220,13 +191,9 @@ def pulse_of(history: TimeHistory) -> TimeHistory:
     """Return a measured history as a crash pulse; a deceleration becomes an acceleration.
 
     It has one or more of ``displacement`` [m], ``velocity`` [m/s] and ``acceleration`` [m/s^2]. Zero need not be first
-    touch exactly, and rows before it are of use.
-
-    Raises
-    ------
-    FitError
-        A signal has fewer than 8 values, the vehicle seems to be accelerated by the wall or to move away from it, or a
-        signal does not change or has a size that no impact has.
+    touch exactly, and rows before it are of use. Raise `FitError` where a signal has fewer than 8 values, the vehicle
+    seems to be accelerated by the wall or to move away from it, or a signal does not change or has a size that no
+    impact has.
     """
     signals = dict(history.signals)
     if "deceleration" in signals:

@@ -76,13 +76,7 @@ class Overlay:
         return {"peaks": [asdict(peak) for peak in self.peaks], "notes": self.notes}
 
     def plot(self, folder: Path) -> Path:
-        """Draw the curves into a folder, and return the picture.
-
-        Raises
-        ------
-        PictureError
-            The picture cannot be written, or matplotlib is not installed.
-        """
+        """Draw the curves into a folder, and return the picture; raise `PictureError` where that fails."""
         target = folder / f"measured_{self.measured.path.stem}.png"
         draw("crash_curves", "draw_crash_test", self.name, self.trajectories, target, self.measured)
         return target
@@ -91,21 +85,10 @@ class Overlay:
 def overlay(measured: str | Path, case: str) -> Overlay:
     """Simulate a crash test that a user has made, under both presets, for as long as it was measured.
 
-    Uncertain inputs are taken at their means: what the test was, not the worst that it may have been.
-
-    Parameters
-    ----------
-    measured
-        CSV file, see `boulder_sweep.crash_tests.measured.read_history`.
-    case
-        ``abg`` or ``rwg``, the tests of the paper, or a settings file with one design.
-
-    Raises
-    ------
-    SettingsError
-        A file is not valid.
-    ComparisonError
-        The settings hold several designs, or there is nothing to compare.
+    The test is measured in a CSV file, see `read_history`; `case` is ``abg`` or ``rwg``, the tests of the paper, or a
+    settings file with one design. Uncertain inputs are taken at their means: what the test was, not the worst that it
+    may have been. Raise `SettingsError` where a file is not valid, `ComparisonError` where the settings hold several
+    designs, or there is nothing to compare.
     """
     history = files.read_history(measured, files.TEST_SIGNALS)
     sweep = crash_test(case) if case in NAMES else load(case)

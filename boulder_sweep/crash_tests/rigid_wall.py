@@ -23,17 +23,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class RigidWall:
-    """A vehicle that hits a rigid wall.
-
-    Parameters
-    ----------
-    mass_kg : float
-        Mass m_v of the vehicle.
-    speed_m_s : float
-        Speed v_0 of impact.
-    spring_N_m, damper_N_s_m : float
-        Spring k_v and damper c_v of its Maxwell element.
-    """
+    """A vehicle of mass m_v that hits a rigid wall at v_0, with spring k_v and damper c_v of its Maxwell element."""
 
     mass_kg: float
     speed_m_s: float
@@ -85,41 +75,22 @@ class RigidWall:
         """Largest displacement of the truck [m]."""
         if self.over_damped:  # v and v' both end at 0
             return self.mass_kg * self.speed_m_s / self.damper_N_s_m
-        return float(self.displacement(np.array([self.max_displacement_time_s]))[0])
+        return float(self.response(np.array([self.max_displacement_time_s]))[0][0])
 
     @property
     def peak_force(self) -> float:
         """Largest force on the wall [N]."""
-        return -self.mass_kg * float(self.acceleration(np.array([self.peak_force_time_s]))[0])
+        return -self.mass_kg * float(self.response(np.array([self.peak_force_time_s]))[2][0])
 
     @property
     def rebound_speed_m_s(self) -> float:
         """Velocity after separation [m/s], zero or negative."""
         return 0.0 if self.over_damped else -self.speed_m_s * math.exp(self.a * math.pi / self.b)
 
-    def velocity(self, time_s: np.ndarray) -> np.ndarray:
-        """Velocity [m/s] at times [s], shape (n,)."""
-        return self.response(time_s)[1]
-
-    def acceleration(self, time_s: np.ndarray) -> np.ndarray:
-        """Acceleration [m/s^2] at times [s], shape (n,)."""
-        return self.response(time_s)[2]
-
-    def displacement(self, time_s: np.ndarray) -> np.ndarray:
-        """Displacement [m] at times [s], shape (n,)."""
-        return self.response(time_s)[0]
-
     def response(self, time_s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Displacement [m], velocity [m/s] and acceleration [m/s^2] (Eq 49 corrected, with the release of Eq 47).
+        """Displacement [m], velocity [m/s] and acceleration [m/s^2] at times since first touch [s], shape (n,) each.
 
-        Parameters
-        ----------
-        time_s : ndarray, shape (n,)
-            Times since first touch [s]; before it the vehicle keeps its speed.
-
-        Returns
-        -------
-        tuple of three ndarrays, shape (n,)
+        Eq 49 corrected, with the release of Eq 47; before first touch the vehicle keeps its speed.
         """
         asked = np.asarray(time_s, dtype=float)
         t = np.clip(asked, 0.0, self.separation_time_s)

@@ -2,36 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from boulder_kernels import Constants, Control, Design, Outcome, Readings, Record
+from boulder_kernels import dynamics as modes
 from boulder_kernels.design import Body, body_with
-from boulder_kernels.dynamics import (
-    BOX,
-    FREE,
-    HELD,
-    LIMITED_BACK,
-    LIMITED_FORWARD,
-    SEATED,
-    TURNING_BACK,
-    TURNING_FORWARD,
-    Acceleration,
-)
 from boulder_kernels.outcomes import StoredEnergies, evaluate_samples
 from boulder_kernels.pieces import ManyPieces, Piece
 from boulder_kernels.soil import soil_kinematics
 
 MODE_NAMES = {
-    SEATED: "seated",
-    TURNING_FORWARD: "turning",
-    TURNING_BACK: "turning",
-    HELD: "held",
-    LIMITED_FORWARD: "limited",
-    LIMITED_BACK: "limited",
-    FREE: "free",
+    modes.SEATED: "seated",
+    modes.TURNING_FORWARD: "turning",
+    modes.TURNING_BACK: "turning",
+    modes.HELD: "held",
+    modes.LIMITED_FORWARD: "limited",
+    modes.LIMITED_BACK: "limited",
+    modes.FREE: "free",
 }
 """Mode of rotation in words: gravity reading ``seated`` or ``turning``; printed reading ``held`` (the restoring
 moment equals the net moment), ``limited`` (it is at its limit), ``free`` (there is none)."""
@@ -48,8 +38,7 @@ class Motion:
     record: Record
     outcome: Outcome
     """Outcome of the whole recorded motion, beyond the limit."""
-
-    given_outline: np.ndarray = field(default_factory=lambda: BOX)
+    given_outline: np.ndarray
     """Outline of the boulder, shape (P, 4), see `boulder_kernels.design`; P = 0 of a box."""
 
     @property
@@ -144,26 +133,17 @@ def _evaluated(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     """Return rates and stored energies at the samples of a record, see `evaluate_samples`."""
     record, c, m_v = motion.record, motion.constants, motion.design.m_v
     n = len(record.times)
-    rates, stored = np.empty((len(Acceleration._fields), n)), np.empty((len(StoredEnergies._fields), n))
+    rates, stored = np.empty((len(modes.Acceleration._fields), n)), np.empty((len(StoredEnergies._fields), n))
     if n:
         evaluate_samples(record, c, m_v, motion.readings, rates, stored)
     return rates, stored
 
 
-@dataclass(frozen=True, eq=False)
-class SoilForces:
-    """The soil along the buried face at one sample, arrays of shape (n,) from the soil line down."""
+def soil_profile(motion: Motion, sample: int, slices: int) -> tuple[np.ndarray, np.ndarray]:
+    """Cut the soil along the buried face into slices of equal height at one sample, from the soil line down.
 
-    depth_m: np.ndarray
-    """Depth of the middle of each slice below the soil line."""
-    force_N: np.ndarray
-    """Force of each slice on the boulder, spring and drag (Eq 19)."""
-
-
-def soil_profile(motion: Motion, sample: int, slices: int) -> SoilForces:
-    """Cut the soil along the buried face into slices of equal height at one sample.
-
-    Each slice stands for the soil element in its middle.
+    Return the depth of the middle of each slice [m], and its force on the boulder [N], spring and drag (Eq 19), by the
+    soil element in its middle; shape (slices,).
     """
     c = motion.constants
     x_b, v_b, theta, omega, _, _ = (float(value) for value in motion.record.states[sample])
@@ -171,7 +151,7 @@ def soil_profile(motion: Motion, sample: int, slices: int) -> SoilForces:
     k = soil_kinematics(x_b, v_b, omega, float(np.sin(theta)), float(versine), c)
     ratio = (np.arange(slices) + 0.5) / slices
     pressed = _pressed_at(ratio, k.A - k.slope_x * ratio, k.B - k.slope_v * ratio, c)
-    return SoilForces(ratio * c.d, -pressed / slices)
+    return ratio * c.d, -pressed / slices
 
 
 def _pressed_at(ratio: np.ndarray, displacement: np.ndarray, velocity: np.ndarray, c: Any) -> np.ndarray:

@@ -32,40 +32,27 @@ from boulder_sweep.store.reading import FinishedRows
 if TYPE_CHECKING:
     from boulder_sweep.impact.trajectory import Trajectory
 
-__all__ = ["Recomputation", "recompute"]
-
 
 @dataclass(frozen=True, eq=False)
 class Recomputation:
-    """A row of a result, and what it is now.
-
-    Attributes
-    ----------
-    design_id, designs : int
-        Number of the row, and how many the result has.
-    sweep : Sweep
-        The one design, with the model and the step that its row was computed with.
-    inputs : dict
-        Its inputs by the names of the table's columns.
-    stored, recomputed : dict
-        Its outcomes, as the table has them and as they come out now; None stands for null.
-    changed : tuple of str
-        What is different now from when the table was computed: versions, kernels, rules. Empty where nothing is.
-    trajectory : Trajectory or None
-        The impact over time; None where the design cannot be computed.
-    judged_by : str
-        Whose rules judged the row; empty where this version's did.
-    """
+    """A row of a result, and what it is now."""
 
     design_id: int
     designs: int
+    """Number of the row, and how many the result has."""
     sweep: Sweep
+    """The one design, with the model and the step that its row was computed with."""
     inputs: dict[str, float | None]
+    """Its inputs by the names of the table's columns."""
     stored: dict[str, Any]
     recomputed: dict[str, Any]
+    """Its outcomes, as the table has them and as they come out now; None stands for null."""
     changed: tuple[str, ...]
+    """What is different now from when the table was computed: versions, kernels, rules. Empty where nothing is."""
     trajectory: Trajectory | None
+    """The impact over time; None where the design cannot be computed."""
     judged_by: str
+    """Whose rules judged the row; empty where this version's did."""
 
     @property
     def unequal(self) -> tuple[str, ...]:
@@ -87,21 +74,10 @@ class Recomputation:
 
 
 def recompute(out: str | Location, design_id: int) -> Recomputation:
-    """Compute one row of a result again, from the result alone.
+    """Compute one row of the result in a folder again, from the result alone; the row must be in a finished part.
 
-    Parameters
-    ----------
-    out
-        Folder that a sweep wrote; the row must be in a finished part.
-    design_id
-        Number of the row.
-
-    Raises
-    ------
-    StoreError
-        There is no result in the folder, or it is damaged.
-    IndexError
-        The table has no such row, or not yet.
+    Raise `StoreError` where there is no result in the folder, or it is damaged, and IndexError where the table has no
+    such row, or not yet.
     """
     folder = location_of(out)
     finished = FinishedRows(folder)
@@ -139,10 +115,7 @@ def recompute(out: str | Location, design_id: int) -> Recomputation:
 def one_design(settings: dict[str, Any], inputs: dict[str, float | None], control: Control, step_s: float) -> Sweep:
     """Return a sweep of the one design, with the model and the step its row was computed with, and its cases.
 
-    Raises
-    ------
-    LookupError
-        The table does not list the values of its uncertain inputs, because there are too many.
+    Raise LookupError where the table does not list the values of its uncertain inputs, because there are too many.
     """
     at = [_in_case(case, settings["inputs"], inputs) for case in settings.get("judged_at", ())]
     cases = tuple(one_design(settings | {"judged_at": ()}, case, control, step_s) for case in at)
@@ -157,11 +130,7 @@ def one_design(settings: dict[str, Any], inputs: dict[str, float | None], contro
         table=DesignList("", {name: np.array([value]) for name, value in given.items()}) if is_listed else None,
         criterion=Criterion(**settings["criterion"]),
         model=model_of(settings, control),
-        solver=SolverSettings(
-            accuracy=None,
-            step_s=step_s,
-            horizon_s=control.horizon,
-        ),
+        solver=SolverSettings(accuracy=None, step_s=step_s, horizon_s=control.horizon),
         units=units_in(settings),
         allowed=allowed_in(settings),
     )
@@ -170,12 +139,8 @@ def one_design(settings: dict[str, Any], inputs: dict[str, float | None], contro
 def _in_case(case: dict[str, Any], given: dict[str, Any], inputs: dict[str, float | None]) -> dict[str, float | None]:
     """Return the inputs of a row in a case, by the place of its own values among the values of the settings.
 
-    Parameters
-    ----------
-    case
-        What was taken in the case, and the values of these inputs by column name: a number, or a list.
-    given, inputs
-        All inputs of the table by the same names, and the inputs of the row.
+    A case has what was taken in it, and the values of these inputs by column name: a number, or a list. `given` are all
+    inputs of the table by the same names, `inputs` the row's.
     """
     height = inputs["boulder_height_m"]
     own = inputs | {"embedment_ratio": inputs["embedment_depth_m"]}  # of a list of ratios the depths are compared

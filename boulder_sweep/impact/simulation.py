@@ -19,11 +19,10 @@ from boulder_kernels.dynamics import BOX, constants_in
 from boulder_kernels.outcomes import FINER, NONE_NEEDED
 from boulder_kernels.table import is_layered, is_paired, problem_at, step_of_solution
 from boulder_sweep.columns import BOULDER_MASS, BY_NAME, INPUT_COLUMNS, OPTIONAL_COLUMNS, SHAPES
-from boulder_sweep.impact.history import Motion
+from boulder_sweep.impact.history import MODE_NAMES, Motion, forces_along
 from boulder_sweep.impact.trajectory import Trajectory
 from boulder_sweep.judge.accuracy import accuracy_of, finer_controls, reported_step_s
 from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
-from boulder_sweep.judge.inputs import Designs
 from boulder_sweep.judge.judged import Judged, worst_case, worst_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.settings import Sweep, load
@@ -114,21 +113,10 @@ def simulate(
 def history_of(
     sweep: Sweep, design_id: int, evaluation: Evaluation, cases: list[Judged], sample_s: float = SAMPLE_S
 ) -> Trajectory:
-    """Return the time history of a design whose row is known.
+    """Return the time history of a design that can be computed, by how its row was simulated.
 
-    Parameters
-    ----------
-    sweep, design_id
-        The design, one that can be computed.
-    evaluation, cases
-        How its row was simulated, and the row as judged in each case: the history is of the one that decides.
-    sample_s
-        Time between two samples [s].
-
-    Raises
-    ------
-    ValueError
-        There would be too many samples, or `sample_s` is not positive.
+    The row is given as judged in each case: the history is of the one that decides. Raise ValueError where there would
+    be too many samples, or `sample_s` is not positive.
     """
     judged, worst = worst_of(cases), int(worst_case(cases)[0])
     sweep = (sweep, *sweep.cases)[worst]
@@ -147,9 +135,31 @@ def history_of(
     outcome = simulate_impact(problem, how, drawn, record)
     c = constants_in(problem.design, how, drawn.elements, problem.profile)
     outline = BOX if problem.profile is None else problem.profile.outline
-    motion = Motion(problem.design, how, c, drawn, _kept(record, times, outcome), outcome, outline)
-    decided = _decided(designs, how, deciding)
-    return Trajectory.of(sweep.name, design_id, inputs, sweep.resolved(), motion, judged, decided)
+    record = _kept(record, times, outcome)
+    motion = Motion(problem.design, how, c, drawn, record, outcome, outline)
+    decided = simulate_impact(problem_at(designs.table, 0, deciding), how, deciding, no_record())
+    x_b, v_b, theta, omega, x_v, v_v = record.states.T
+    along, up = motion.body.x - c.c_x, motion.body.y - c.c_y
+    return Trajectory(
+        name=sweep.name,
+        design_id=design_id,
+        inputs=inputs,
+        settings=sweep.resolved(),
+        time_s=record.times,
+        boulder_displacement_m=x_b,
+        boulder_centre_displacement_m=x_b - along * 2.0 * np.sin(0.5 * theta) ** 2 + up * np.sin(theta),
+        boulder_velocity_m_s=v_b,
+        rotation_rad=theta,
+        angular_velocity_rad_s=omega,
+        vehicle_displacement_m=x_v,
+        vehicle_velocity_m_s=v_v,
+        **forces_along(motion),
+        rotation_mode=np.array([MODE_NAMES[int(mode)] for mode in record.turning], dtype=object),
+        in_contact=np.where(record.touching, "touching", "coasting").astype(object),
+        judged=judged,
+        decided=decided,
+        motion=motion,
+    )
 
 
 def _as_sweep(design: Sweep | str | Path | Mapping[str, Any]) -> Sweep:
@@ -219,12 +229,6 @@ def _deciding(control: Control, how: Readings, step_s: float | None, *, layered:
     first, finer = (plain(control_for)(solution, control) for solution in (NONE_NEEDED, FINER))
     checked = control.error_estimate and not is_paired(how, control, layered=layered)
     return finer if checked and step_s not in (None, step_of_solution(first)) else first
-
-
-def _decided(designs: Designs, how: Readings, control: Control) -> Outcome:
-    """Return the impact up to where its row ends."""
-    problem = problem_at(designs.table, 0, control)
-    return simulate_impact(problem, how, control, no_record())
 
 
 def _drawn_s(row: Mapping[str, Any], horizon: float) -> float:

@@ -14,7 +14,7 @@ from boulder_kernels import Outcome, Readings
 from boulder_sweep.columns import ColumnSpec
 from boulder_sweep.drawing import draw
 from boulder_sweep.errors import HistoryFileError
-from boulder_sweep.impact.history import MODE_NAMES, EnergyLedger, Motion, forces_along, ledger_of
+from boulder_sweep.impact.history import EnergyLedger, Motion, ledger_of
 from boulder_sweep.judge.judged import Judged
 from boulder_sweep.locations import replacing
 from boulder_sweep.settings.model import ReadingChoice
@@ -32,53 +32,51 @@ _PEAK_TIMES = {
 }
 
 
-def _number(name: str, unit: str, meaning: str) -> ColumnSpec:
-    return ColumnSpec(name, "float64", unit, meaning)
-
-
 HISTORY: tuple[ColumnSpec, ...] = (
-    _number("time_s", "s", "time since the first touch"),
-    _number("boulder_displacement_m", "m", "displacement x_b of the common centre of mass of boulder and soil wedge"),
-    _number(
+    ColumnSpec("time_s", "s", "time since the first touch"),
+    ColumnSpec(
+        "boulder_displacement_m", "m", "displacement x_b of the common centre of mass of boulder and soil wedge"
+    ),
+    ColumnSpec(
         "boulder_centre_displacement_m",
         "m",
         "displacement of the boulder's own centre of mass, as a camera tracks it (Eqs 53 to 55, corrected)",
     ),
-    _number("boulder_velocity_m_s", "m/s", "velocity of the common centre of mass"),
-    _number("rotation_rad", "rad", "rotation theta_b of the boulder, positive with its top away from the vehicle"),
-    _number("angular_velocity_rad_s", "rad/s", "angular velocity of the boulder"),
-    _number("vehicle_displacement_m", "m", "displacement x_v of the vehicle"),
-    _number("vehicle_velocity_m_s", "m/s", "velocity of the vehicle"),
-    _number("vehicle_acceleration_m_s2", "m/s^2", "acceleration of the vehicle"),
-    _number("contact_force_N", "N", "force F_v of the vehicle on the boulder (Eq 47)"),
-    _number("contact_moment_N_m", "N*m", "its moment M_v about the common centre of mass (Eq 48)"),
-    _number("soil_force_N", "N", "sum of the soil's forces on the boulder (Eq 19)"),
-    _number("soil_moment_N_m", "N*m", "sum of the soil's moments about the common centre of mass (Eq 20)"),
-    _number("restoring_moment_N_m", "N*m", "restoring moment M_R of the boulder's weight (Eqs 37 to 39)"),
-    ColumnSpec("rotation_mode", "dictionary", "", "seated, turning, held, limited or free"),
-    ColumnSpec("in_contact", "dictionary", "", "touching or coasting"),
+    ColumnSpec("boulder_velocity_m_s", "m/s", "velocity of the common centre of mass"),
+    ColumnSpec("rotation_rad", "rad", "rotation theta_b of the boulder, positive with its top away from the vehicle"),
+    ColumnSpec("angular_velocity_rad_s", "rad/s", "angular velocity of the boulder"),
+    ColumnSpec("vehicle_displacement_m", "m", "displacement x_v of the vehicle"),
+    ColumnSpec("vehicle_velocity_m_s", "m/s", "velocity of the vehicle"),
+    ColumnSpec("vehicle_acceleration_m_s2", "m/s^2", "acceleration of the vehicle"),
+    ColumnSpec("contact_force_N", "N", "force F_v of the vehicle on the boulder (Eq 47)"),
+    ColumnSpec("contact_moment_N_m", "N*m", "its moment M_v about the common centre of mass (Eq 48)"),
+    ColumnSpec("soil_force_N", "N", "sum of the soil's forces on the boulder (Eq 19)"),
+    ColumnSpec("soil_moment_N_m", "N*m", "sum of the soil's moments about the common centre of mass (Eq 20)"),
+    ColumnSpec("restoring_moment_N_m", "N*m", "restoring moment M_R of the boulder's weight (Eqs 37 to 39)"),
+    ColumnSpec("rotation_mode", "", "seated, turning, held, limited or free", "dictionary"),
+    ColumnSpec("in_contact", "", "touching or coasting", "dictionary"),
 )
 
 ENERGY: tuple[ColumnSpec, ...] = (
-    _number("energy_vehicle_kinetic_J", "J", "kinetic energy of the vehicle"),
-    _number("energy_crush_spring_J", "J", "stored in the spring of the vehicle's front"),
-    _number("energy_crush_damper_J", "J", "dissipated in the damper of the vehicle's front: permanent crush"),
-    _number("energy_boulder_linear_J", "J", "kinetic energy of boulder and soil wedge in translation"),
-    _number("energy_boulder_angular_J", "J", "kinetic energy of boulder and soil wedge in rotation"),
-    _number("energy_soil_elastic_J", "J", "stored in the springs of the soil"),
-    _number("energy_soil_drag_J", "J", "dissipated by the drag of the soil"),
-    _number(
+    ColumnSpec("energy_vehicle_kinetic_J", "J", "kinetic energy of the vehicle"),
+    ColumnSpec("energy_crush_spring_J", "J", "stored in the spring of the vehicle's front"),
+    ColumnSpec("energy_crush_damper_J", "J", "dissipated in the damper of the vehicle's front: permanent crush"),
+    ColumnSpec("energy_boulder_linear_J", "J", "kinetic energy of boulder and soil wedge in translation"),
+    ColumnSpec("energy_boulder_angular_J", "J", "kinetic energy of boulder and soil wedge in rotation"),
+    ColumnSpec("energy_soil_elastic_J", "J", "stored in the springs of the soil"),
+    ColumnSpec("energy_soil_drag_J", "J", "dissipated by the drag of the soil"),
+    ColumnSpec(
         "energy_gravity_J",
         "J",
         "done against the boulder's weight: potential energy of the gravity couple; as printed the work of M_R",
     ),
-    _number(
+    ColumnSpec(
         "energy_pull_J",
         "J",
         "printed separation only: work of the pull on the vehicle that nothing on the boulder answers, negative "
         "where energy appears from nowhere",
     ),
-    _number("energy_residual_J", "J", "sum of all parts minus the vehicle's energy at first touch"),
+    ColumnSpec("energy_residual_J", "J", "sum of all parts minus the vehicle's energy at first touch"),
 )
 
 _BY_NAME: dict[str, ColumnSpec] = {spec.name: spec for spec in (*HISTORY, *ENERGY)}
@@ -134,43 +132,6 @@ class Trajectory:
     judged: Judged
     decided: Outcome
     motion: Motion
-
-    @classmethod
-    def of(
-        cls,
-        name: str,
-        design_id: int,
-        inputs: dict[str, float],
-        settings: dict[str, Any],
-        motion: Motion,
-        judged: Judged,
-        decided: Outcome,
-    ) -> Trajectory:
-        """Work out the whole time history from what the kernels recorded."""
-        record, c = motion.record, motion.constants
-        x_b, v_b, theta, omega, x_v, v_v = record.states.T
-        body = motion.body
-        along, up = body.x - c.c_x, body.y - c.c_y
-        return cls(
-            name=name,
-            design_id=design_id,
-            inputs=inputs,
-            settings=settings,
-            time_s=record.times,
-            boulder_displacement_m=x_b,
-            boulder_centre_displacement_m=x_b - along * 2.0 * np.sin(0.5 * theta) ** 2 + up * np.sin(theta),
-            boulder_velocity_m_s=v_b,
-            rotation_rad=theta,
-            angular_velocity_rad_s=omega,
-            vehicle_displacement_m=x_v,
-            vehicle_velocity_m_s=v_v,
-            **forces_along(motion),
-            rotation_mode=np.array([MODE_NAMES[int(mode)] for mode in record.turning], dtype=object),
-            in_contact=np.where(record.touching, "touching", "coasting").astype(object),
-            judged=judged,
-            decided=decided,
-            motion=motion,
-        )
 
     def __len__(self) -> int:
         """Return the number of samples."""

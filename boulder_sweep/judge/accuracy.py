@@ -52,25 +52,17 @@ LONGEST_HORIZON = 10.0
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How accurately a sweep is computed.
-
-    Parameters
-    ----------
-    asked
-        ``fast``, ``balanced``, ``fine`` or ``step``.
-    steps
-        Steps of the integrator; where ``error_estimate``, a solution with a third of the step is reported.
-    error_estimate
-        Whether doubtful rows are solved a second time, and rows closer to a limit than their error again by finer
-        steps; without, the error of a row is estimated from the steps of one solution, and such rows stay undecided.
-    paired
-        Whether every row is solved twice for its error, see `boulder_kernels.table.is_paired`.
-    """
+    """How accurately a sweep is computed."""
 
     asked: str
+    """``fast``, ``balanced``, ``fine`` or ``step``."""
     steps: Steps
+    """Steps of the integrator; where `error_estimate`, a solution with a third of the step is reported."""
     error_estimate: bool
+    """Whether doubtful rows are solved a second time, and rows closer to a limit than their error again by finer steps;
+    without, the error of a row is estimated from the steps of one solution, and such rows stay undecided."""
     paired: bool = False
+    """Whether every row is solved twice for its error, see `boulder_kernels.table.is_paired`."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data, for the metadata of the table."""
@@ -125,16 +117,9 @@ def goes_in_lanes(pieces: int, designs: int) -> bool:
 def finer_controls(control: Control) -> Iterator[Control]:
     """Yield the controls by which open rows are simulated again, each finer than the one before.
 
-    Parameters
-    ----------
-    control
-        How they were simulated first.
-
-    Notes
-    -----
-    The budget of a row is the last of these controls; sums over soil elements are too slow for it. It
-    depends on the settings alone, so a row is the same whatever rows are simulated beside it. Where errors are
-    estimated there are enough of them to confirm a late row, however slow.
+    The budget of a row is the last of these controls; sums over soil elements are too slow for it. It depends on the
+    settings alone, so a row is the same whatever rows are simulated beside it. Where errors are estimated there are
+    enough of them to confirm a late row, however slow.
     """
     finest = control.horizon / MOST_STEPS * max(1.0, control.elements / ELEMENTS_AS_FAST)
     h = control.h

@@ -15,15 +15,10 @@ import numpy as np
 
 from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, simulate_table
 from boulder_kernels._jit import plain
-from boulder_kernels.rules import (
-    RULES,
-    SLOWER_SPEEDS,
-    Rows,
-    consider_rows,
-    rule_by_slower,
-)
+from boulder_kernels.rules import RULES, SLOWER_SPEEDS, Rows, consider_rows, rule_by_slower
 from boulder_kernels.second_opinion import HeaveControl, second_opinions
 from boulder_sweep.columns import SHAPES
+from boulder_sweep.designs import REASONS as REFUSALS
 from boulder_sweep.judge.accuracy import (
     LONGEST_HORIZON,
     Accuracy,
@@ -55,80 +50,40 @@ SLOWER_AT_ONCE = 150
 BY_SLOWER = np.array([plain(rule_by_slower)(rule) for rule in range(len(RULES))])
 """The worst rule that a slower truck can impose on a row, by the rule that decides the slower truck."""
 Simulate = Callable[..., OutcomeTable]
-"""Function that simulates a table of designs, with the arguments of `by_kernels`, which it always is outside tests."""
-
-
-def by_kernels(table: DesignTable, readings: Readings, control: Control) -> OutcomeTable:
-    """Simulate with the compiled kernels.
-
-    A plain function, so that worker processes import it by name and use the compiled code on disk; the kernel
-    itself would be sent as source and compiled again.
-    """
-    return simulate_table(table, readings, control)
+"""Function that simulates a table of designs, as `simulate_table`, which it always is outside tests."""
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """How the designs of one sweep are simulated and judged; the same for every row, sent to every worker.
-
-    Parameters
-    ----------
-    readings
-        Which formulas are read as printed.
-    control
-        How the motion is integrated.
-    limits
-        Limits of the criterion.
-    simulate
-        Function that simulates a table of designs.
-    only
-        Outcome columns wanted, verdict and reason among them; all of the table where empty.
-    model
-        Resistance, layers, water, cohesion and slope of the soil, and shape of the boulders.
-    least_margin
-        Margin that a question asks for, from 0 to less than 1; see `judged`.
-    second_opinion
-        Laws of the soil's resistance under which every pass is simulated again, see `boulder_sweep.judge.robustness`.
-    askable
-        Whether second opinions know such designs.
-    against_slower
-        Whether shallow boulders that slide are judged against slower trucks, too; not where the caller does so.
-    barrels_in_lanes
-        Whether there are so many designs that barrels, of two pieces, are simulated several at a time.
-    """
+    """How the designs of one sweep are simulated and judged; the same for every row, sent to every worker."""
 
     readings: Readings
     control: Control
     limits: Limits
-    simulate: Simulate = by_kernels
+    simulate: Simulate = simulate_table
     only: tuple[str, ...] = ()
+    """Outcome columns wanted, verdict and reason among them; all of the table where empty."""
     model: Model = field(default_factory=Model)
+    """Resistance, layers, water, cohesion and slope of the soil, and shape of the boulders."""
     least_margin: float = 0.0
+    """Margin that a question asks for, from 0 to less than 1; see `judged`."""
     second_opinion: tuple[str, ...] = ()
+    """Laws of the soil's resistance under which every pass is simulated again, see `boulder_sweep.judge.robustness`."""
     askable: bool = False
+    """Whether second opinions know such designs."""
     against_slower: bool = True
+    """Whether shallow boulders that slide are judged against slower trucks, too; not where the caller does so."""
     barrels_in_lanes: bool = False
+    """Whether there are so many designs that barrels, of two pieces, are simulated several at a time."""
 
     def __call__(self, block: DesignBlock) -> Judged:
-        """Simulate and judge a block.
-
-        Parameters
-        ----------
-        block
-            Inputs of n rows.
-
-        Returns
-        -------
-        Judged
-            n rows, in the same order. Of a block with cases, each row has the worst of their verdicts.
-        """
+        """Simulate and judge the n rows of a block, in its order; with cases, each has the worst of their verdicts."""
         if block.cases:
             return worst_of(self.by_case(block))
         if not block.reasons.any:
             return self.judged(self.designs(block))
-        codes = np.asarray(block.reasons.codes)
-        computable = codes == 0
-        refused = not_computed(tuple(block.reasons.texts[1:]), codes[~computable] - 1)
+        computable = block.reasons.codes == 0
+        refused = not_computed(REFUSALS[1:], block.reasons.codes[~computable] - 1)
         if not computable.any():
             return joined([refused])
         return merged(computable, self.judged(self.designs(block, computable)), refused)
@@ -142,24 +97,12 @@ class Evaluation:
         return designs_of(block, rows, self.model)
 
     def judged(self, designs: Designs) -> Judged:
-        """Simulate and judge designs that can be computed.
+        """Simulate and judge n designs that can be computed, in their order.
 
-        Rows that are refused for their time steps, undecided for their numerical error, or late are simulated again
-        by finer steps until they are decided or `finer_controls` ends, see `boulder_kernels.rules`. Shallow boulders
-        that would pass and slide are simulated with slower trucks, too. A row depends on nothing but its own design.
+        Rows that are refused for their time steps, undecided for their numerical error, or late are simulated again by
+        finer steps until they are decided or `finer_controls` ends, see `boulder_kernels.rules`. Shallow boulders that
+        would pass and slide are simulated with slower trucks, too. A row depends on nothing but its own design.
 
-        Parameters
-        ----------
-        designs
-            n designs.
-
-        Returns
-        -------
-        Judged
-            n rows, in the same order.
-
-        Notes
-        -----
         A simulation may end with a proof of its verdict while the rotation can still grow, so its margin is one up to
         then. Where a question asks for a margin, the rows that have it are simulated again with the limit of rotation
         reduced by it. Those that do not pass so, too, keep their verdict and get a margin just below the one asked for.
@@ -323,7 +266,7 @@ PLAIN_DESIGN = DesignTable(
 """One usual design, in the units of the kernels."""
 
 
-def evaluation_of(sweep: Sweep, accuracy: Accuracy, simulate: Simulate = by_kernels) -> Evaluation:
+def evaluation_of(sweep: Sweep, accuracy: Accuracy, simulate: Simulate = simulate_table) -> Evaluation:
     """Return how the designs of a sweep are simulated, with a given accuracy, and judged."""
     askable = can_be_asked(sweep)
     return Evaluation(

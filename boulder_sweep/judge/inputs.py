@@ -144,22 +144,11 @@ class Designs(NamedTuple):
         return (self.solidity >= LEAST_SOLIDITY) | self.has_outlines
 
 
-def designs_of(
-    block: DesignBlock,
-    rows: np.ndarray | None = None,
-    model: Model | None = None,
-) -> Designs:
-    """Return the designs of a block.
+def designs_of(block: DesignBlock, rows: np.ndarray | None = None, model: Model | None = None) -> Designs:
+    """Return the designs of a block, or some of its n rows (bool or indices), as the kernels take them.
 
-    Parameters
-    ----------
-    block
-        Inputs of n rows under the names and units of the table.
-    rows
-        Which of them (bool, shape (n,)); all by default.
-    model
-        What is not in the block: the law of the soil's resistance, its layers, water, cohesion and slope, and the shape
-        of the boulders. By default the paper's law, the usual soil, and boxes.
+    The model says what is not in the block: the law of the soil's resistance, its layers, water, cohesion and slope,
+    and the shape of the boulders. By default it has the paper's law, the usual soil, and boxes.
     """
     model = model or Model()
     shape = model.shape
@@ -192,20 +181,10 @@ MOST_CORNERS = 64
 
 
 def sampled_rows(sweep: Sweep, count: int) -> np.ndarray:
-    """Choose rows of a sweep.
+    """Return the numbers of about so many rows of a sweep, int64, ascending, each once; all if it has no more.
 
-    Parameters
-    ----------
-    sweep
-        The sweep.
-    count
-        Approximate number of rows; all rows if the sweep has no more.
-
-    Returns
-    -------
-    ndarray of int64, shape (n,)
-        Row numbers, ascending, each once: the corners of the grid, and rows along a sequence that fills all axes
-        evenly at once (every axis is cut into as many strata as it has values). A list of designs has one axis.
+    They are the corners of the grid, and rows along a sequence that fills all axes evenly at once (every axis is cut
+    into as many strata as it has values). A list of designs has one axis.
     """
     lengths = sweep.plan.lengths
     if sweep.n_designs <= count:
@@ -246,4 +225,4 @@ def _spread(lengths: tuple[int, ...], count: int) -> np.ndarray:
 def sampled_designs(sweep: Sweep, count: int) -> Designs:
     """Return about this many designs of a sweep, without those that cannot be computed."""
     block = sweep.plan.selection(sampled_rows(sweep, count))
-    return designs_of(block, np.asarray(block.reasons.codes) == 0, sweep.model)
+    return designs_of(block, block.reasons.codes == 0, sweep.model)

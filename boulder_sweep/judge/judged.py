@@ -23,18 +23,13 @@ NO_REASON, NO_CONTACT, OVERTURNS, PENETRATION, HORIZON, NUMERICAL_ERROR, CRUSH, 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judged:
-    """Outcomes of n rows.
-
-    Attributes
-    ----------
-    columns : dict of str to ndarray, shape (n,)
-        Every outcome column of the table by its name: float64, NaN for no value, or int32 codes of words, -1 for none.
-    words : dict of str to tuple of str
-        What the codes of each dictionary column stand for: first the register's words, then these rows'.
-    """
+    """Outcomes of n rows."""
 
     columns: dict[str, np.ndarray]
+    """Every outcome column of the table by its name: float64, NaN for no value, or int32 codes of words, -1 for none;
+    shape (n,)."""
     words: dict[str, tuple[str, ...]]
+    """What the codes of each dictionary column stand for: first the register's words, then these rows'."""
 
     def __len__(self) -> int:
         return len(self.verdict)
@@ -74,20 +69,7 @@ class Judged:
 
 
 def not_computed(reasons: tuple[str, ...], codes: np.ndarray) -> Judged:
-    """Return rows of verdict ``error`` without any value.
-
-    Parameters
-    ----------
-    reasons
-        Why, in words; none of them empty.
-    codes
-        Index into `reasons` of each row, shape (n,).
-
-    Returns
-    -------
-    Judged
-        As many rows as `codes` has.
-    """
+    """Return rows of verdict ``error`` without any value, by the index of each into reasons in words, shape (n,)."""
     n = len(codes)
     nothing, no_word = np.full(n, np.nan), np.full(n, -1, dtype=np.int32)
     columns = {spec.name: no_word if spec.type == "dictionary" else nothing for spec in OUTCOMES}
@@ -100,15 +82,7 @@ def not_computed(reasons: tuple[str, ...], codes: np.ndarray) -> Judged:
 def joined(pieces: list[Judged]) -> Judged:
     """Put consecutive pieces together; the words in use end up sorted behind the words of the register.
 
-    Parameters
-    ----------
-    pieces
-        At least one. What comes out has the columns that all of them have.
-
-    Returns
-    -------
-    Judged
-        All rows, in the order of the pieces. The same rows give the same words and codes, however they were cut.
+    The columns are those that all pieces have. The same rows give the same words and codes, however they were cut.
     """
     columns: dict[str, np.ndarray] = {}
     words: dict[str, tuple[str, ...]] = {}
@@ -138,16 +112,8 @@ def with_rows(judged: Judged, indices: np.ndarray, rows: Judged) -> Judged:
 def worst_of(cases: list[Judged]) -> Judged:
     """Return for every row the worst of several judgements, and flag those on whose verdict they differ.
 
-    Parameters
-    ----------
-    cases
-        The same n rows under different inputs, at least once.
-
-    Returns
-    -------
-    Judged
-        Each row whole from one of them: a fail before an error, what is undecided, and a pass; of equal verdicts the
-        one with the least reserve, and of equal reserves the first. A pass is graded by the worst of its grades.
+    Each row is whole from one of them: a fail before an error, what is undecided, and a pass; of equal verdicts the one
+    with the least reserve, and of equal reserves the first. A pass is graded by the worst of its grades.
     """
     n = len(cases[0])
     worst = joined(cases).rows(n * worst_case(cases) + np.arange(n))

@@ -158,16 +158,9 @@ def words_of(sweep: Sweep, units: str = "si") -> str:
 
 
 def values_of(spread: Distribution, mean: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Return the quantiles of a distribution at standard normal numbers.
+    """Return the quantiles of a distribution at standard normal numbers, shape (n,), by its means, shape (n,).
 
-    Parameters
-    ----------
-    spread
-        The distribution.
-    mean
-        Means, before truncation where that is possible, shape (n,).
-    z
-        Standard normal numbers, shape (n,).
+    The means are those before truncation where that is possible.
     """
     from scipy.special import betainccinv, betaincinv, ndtr
 

@@ -1,10 +1,9 @@
 """What a design takes to build: mass of the boulder, its height above ground, soil to excavate and to put back.
 
 The model relies on soil of the given density and friction angle on both sides of the boulder, since its springs act
-both ways: on each side as far as the wedge that moves with the boulder, d tan(pi/4 + phi/2) at the surface (Eq 1), and
-as the wedge that is compressed, d / tan(phi) (Eq 25), whichever is longer. Both taper to nothing at the base of the
-boulder. So what is excavated is a trench as wide as the boulder, L long at its base and L + 2 d t at the surface:
-``V = W d (L + d t)`` with t the larger of both slopes. What is put back is that less the buried part of the boulder.
+both ways: as far as the wedge that moves with it, d tan(pi/4 + phi/2) at the surface (Eq 1), or the wedge that is
+compressed, d / tan(phi) (Eq 25), whichever is longer. Both taper to nothing at the foot of the boulder, so the trench
+has a volume of ``W d (L + d t)``, with t the larger of both slopes.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from boulder_sweep import elementary
 from boulder_sweep.columns import BOULDER_MASS, TO_BUILD, ColumnSpec
 from boulder_sweep.settings.model import BOX, Ground, Shape
 
-MASS = ColumnSpec(BOULDER_MASS, "float64", "kg", "mass of the boulder, its volume times its density")
+MASS = ColumnSpec(BOULDER_MASS, "kg", "mass of the boulder, its volume times its density")
 ABOVE, EXCAVATED, BACKFILLED = TO_BUILD
 QUANTITIES = (MASS, *TO_BUILD)
 NEEDED = (
@@ -32,15 +31,9 @@ NEEDED = (
 def quantities(rows: Mapping[str, Any], shape: Shape, ground: Ground) -> dict[str, np.ndarray]:
     """Return the quantities of n designs by the names of `QUANTITIES`, shape (n,) each.
 
-    Parameters
-    ----------
-    rows
-        Values of the columns `NEEDED`, and of ``boulder_mass_kg`` where the boulders are weighed, in the units of the
-        table; numbers, or arrays that broadcast against each other.
-    shape
-        Shape of the boulders.
-    ground
-        Layers below the uppermost; the wedge follows the one of those above the base that makes it the longest.
+    The rows are values of the columns `NEEDED`, and of ``boulder_mass_kg`` where the boulders are weighed, in the units
+    of the table: numbers, or arrays that broadcast against each other. Of all layers above the base, the wedge follows
+    the one that makes it the longest.
     """
     L, W, H, density, d, phi = (np.asarray(rows[name], dtype=np.float64) for name in NEEDED)
     box, weighed = L * W * H, rows.get(BOULDER_MASS)
@@ -71,12 +64,7 @@ def wedge_slope(phi_deg: np.ndarray) -> np.ndarray:
 def buried_share(shape: Shape, ratio: np.ndarray) -> np.ndarray:
     """Return the volume of a boulder below a height over the volume of its box, exactly.
 
-    Parameters
-    ----------
-    shape
-        Shape of the boulder.
-    ratio
-        The height as a share of the boulder's; above its top all of it lies below.
+    The height is a share of the boulder's; above its top all of it lies below.
     """
     total = np.zeros(np.shape(ratio))
     for low, high in pairwise(shape.points or BOX):

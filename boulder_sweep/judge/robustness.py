@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 ROBUST, SENSITIVE, OPEN = range(len(GRADES))
 DECISIVE = "width_capped"
 """The soil model that decides: it resists least, except for slender boulders in dense soil (`resists_less`)."""
+_OTHERS = tuple(law for law in SECOND_OPINIONS if law != DECISIVE)
 IN_WORDS = (
     "stands with friction and vertical motion under the weakest of three soil models; not modelled: soil on one side "
     "only, rounded boulders"
@@ -123,13 +124,7 @@ def meaning_of(row: Mapping[str, Any]) -> str | None:
 
 
 def grades_without_asking(facts: Any) -> np.ndarray:
-    """Return the codes of `GRADES` that passes have without a second opinion, shape (n,).
-
-    Parameters
-    ----------
-    facts
-        What is known of n rows (`boulder_sweep.judge.verdict.Facts`).
-    """
+    """Return the codes of `GRADES` that passes have without a second opinion, shape (n,), by the `Facts` of n rows."""
     grades = np.full(len(facts.verdict), OPEN, dtype=np.int32)
     limits, outcomes = facts.limits, facts.outcomes
     if limits.studied and limits.rotation >= least_free_rotation():
@@ -172,22 +167,11 @@ def resists_less(designs: Designs, law: str) -> np.ndarray:
 def stands(
     designs: Designs, law: str, model: Model, limits: Any, longest_s: float, *, tolerance_m: float | None = None
 ) -> np.ndarray:
-    """Return which of n designs pass by a second opinion, bool, shape (n,).
+    """Return which of n designs, all of which the vehicle hits, pass by a second opinion, bool, shape (n,).
 
-    Parameters
-    ----------
-    designs
-        The designs, all of which the vehicle hits. Taped ones pass if each of their shapes does.
-    law
-        Soil model of the second opinion, one of `SECOND_OPINIONS`.
-    model
-        Soil model and ground of the designs.
-    limits
-        Limits of the criterion (`boulder_sweep.judge.verdict.Limits`).
-    longest_s
-        Longest simulated time; what is not proved to stand by then does not.
-    tolerance_m
-        Error of a step [m] of one solution that decides in place of a quick and a fine one, nearly as they do.
+    Taped designs pass if each of their shapes does. What is not proved to stand by the longest simulated time does not.
+    With a tolerance, an error of a step [m], one solution decides in place of a quick and a fine one, nearly as they
+    do.
     """
     passes, taped = np.ones(designs.size, dtype=bool), designs.taped
     if taped.any():
@@ -228,10 +212,9 @@ def stands_under_the_weakest(
 ) -> np.ndarray:
     """Return which of n designs pass by the laws that decide, bool, shape (n,); arguments: see `stands`."""
     there = stands(designs, DECISIVE, model, limits, longest_s, tolerance_m=tolerance_m)
-    for law in SECOND_OPINIONS:
-        if law != DECISIVE:
-            rows = np.flatnonzero(there & resists_less(designs, law))
-            there[rows] = stands(designs.rows(rows), law, model, limits, longest_s, tolerance_m=tolerance_m)
+    for law in _OTHERS:
+        rows = np.flatnonzero(there & resists_less(designs, law))
+        there[rows] = stands(designs.rows(rows), law, model, limits, longest_s, tolerance_m=tolerance_m)
     return there
 
 
@@ -250,22 +233,12 @@ def with_second_opinions(
     longest_s: float,
     stand: np.ndarray | None = None,
 ) -> Judged:
-    """Return judged rows with passes simulated again.
+    """Return judged rows with the designs of those that pass simulated again.
 
     Where `DECISIVE` is asked and a pass stands, it is robust, or open outside the study; where a law overturns it, it
     is sensitive. If `DECISIVE` alone is asked, passes that are robust without asking are not simulated. Passes that it
-    overturns, and passes where another law resists less, are simulated under that law, too.
-
-    Parameters
-    ----------
-    judged
-        The rows.
-    passes
-        Designs of those that pass.
-    laws, model, limits, longest_s
-        See `stands`.
-    stand
-        Which passes are known to stand under all laws that decide, bool; none by default.
+    overturns, and passes where another law resists less, are simulated under that law, too. Passes that are known to
+    `stand` under all laws that decide are not simulated.
     """
     passing = np.flatnonzero(judged.verdict == PASS)
     grade, under = judged["robustness"].copy(), judged["stands_under"].copy()
@@ -287,9 +260,8 @@ def with_second_opinions(
     for law in laws:
         ask(law, np.arange(len(passing)))
     if laws == (DECISIVE,):
-        for law in SECOND_OPINIONS:
-            if law != DECISIVE:
-                ask(law, np.flatnonzero(turned | resists_less(passes, law)))
+        for law in _OTHERS:
+            ask(law, np.flatnonzero(turned | resists_less(passes, law)))
     grade[passing[turned]] = SENSITIVE
     if DECISIVE in laws:
         studied = are_studied(passes, limits)

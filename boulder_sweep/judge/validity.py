@@ -35,31 +35,21 @@ NOT_A_RATING = "a simulation, not a rating by test"
 
 @dataclass(frozen=True)
 class Flag:
-    """One flag.
-
-    Attributes
-    ----------
-    name : str
-        Its name in the column.
-    meaning : str
-        What is outside, in words that follow "passes with".
-    raised_where : str
-        The condition.
-    why : str
-        Why it matters, and where the threshold comes from.
-    """
+    """One flag, by its name in the column."""
 
     name: str
     meaning: str
+    """What is outside, in words that follow "passes with"."""
     raised_where: str
+    """The condition on which it is raised."""
     why: str
+    """Why it matters, and where the threshold comes from."""
 
 
-def usual_range(name: str) -> tuple[float, float]:
+def _usual_range(name: str) -> tuple[float, float]:
     """Range met in practice, from the register of settings, rounding allowed for."""
     usual = BY_NAME[name].usual
-    if usual is None:
-        raise KeyError(name)
+    assert usual is not None
     return _rounded(usual.low, usual.high)
 
 
@@ -84,10 +74,10 @@ DAMPING = (
 """Damper of these vehicles over sqrt(k m) [-]."""
 NOWHERE = 1e9
 """A friction angle that no soil has [deg]."""
-_SIZES = [usual_range(f"boulder_{side}_m") for side in ("length", "width", "height")]
-_EMBEDMENT, _ROCK = usual_range("embedment_ratio"), (2400.0, 3074.0)
-_ANGLE, _SOIL = usual_range("friction_angle_deg"), usual_range("soil_density_kg_m3")
-_RATE_FACTOR = usual_range("strain_rate_factor")
+_SIZES = [_usual_range(f"boulder_{side}_m") for side in ("length", "width", "height")]
+_EMBEDMENT, _ROCK = _usual_range("embedment_ratio"), (2400.0, 3074.0)
+_ANGLE, _SOIL = _usual_range("friction_angle_deg"), _usual_range("soil_density_kg_m3")
+_RATE_FACTOR = _usual_range("strain_rate_factor")
 
 FLAGS = (
     Flag(
@@ -203,14 +193,9 @@ def has_odd_layers(ground: Ground) -> bool:
 
 
 def run_by_run(function: Callable[[np.ndarray], np.ndarray], column: np.ndarray) -> np.ndarray:
-    """Return a function of n values, computed once for neighbours that are equal.
+    """Return a function of n values, one along its last axis for each, computed once for neighbours that are equal.
 
-    Parameters
-    ----------
-    function
-        Takes values and returns numbers for each, along the last axis.
-    column
-        Values of shape (n,), such as a soil's: from one design of a grid to the next they seldom change.
+    Values such as a soil's seldom change from one design of a grid to the next.
     """
     starts = np.flatnonzero(column[1:] != column[:-1]) + 1
     if 4 * len(starts) >= len(column):

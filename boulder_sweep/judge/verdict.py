@@ -1,31 +1,18 @@
 """From computed outcomes to pass, fail, undecided or error, with the reason.
 
-The rules, worst first; the first that applies decides the row. `boulder_kernels.rules` applies them, for tables and
-for the page of a report:
+``docs/model.md`` says what the rules mean; `boulder_kernels.rules` applies them, for tables and for the page of a
+report: the worst first, and the first that applies decides the row. A boulder that overturns fails, however small the
+penetration is.
 
-1. ``error``: the row could not be computed; the reason says why.
-2. ``fail / no_contact``: the truck passes over the boulder, H - d <= bumper height.
-3. ``fail / overturns``: the rotation reached its limit. A small penetration does not change that.
-4. ``fail / penetration``: the truck's cargo bed ends further behind the boulder than its rating allows.
-5. ``fail / slower_truck``: a shallow boulder that slides would stop the truck, but a slower truck overturns it
-   (`boulder_kernels.rules.SLOWER_SPEEDS`).
-6. ``undecided / foot``: the foot of the boulder is rounded, on which the soil also lifts, or small.
-7. ``undecided / shape``: by its mass the boulder fills less than 40 % of the box of its sides, and has no profile.
-8. ``undecided / crush``: the front of the truck is crushed by more than its length; the model no longer describes it.
-9. ``undecided / override``: the boulder overlaps the bumper by less than is required; the truck may ride over.
-10. ``undecided / horizon``: the simulated time ended, the longer one of such rows too, without proof that rotation and
-    penetration stay below their limits. Where a reading lets forces feed energy, as the printed ones do, nothing can be
-    proved of later times: there every boulder that stands at the horizon is undecided.
-11. ``undecided / error``: a peak below its limit is closer to it than the estimated numerical error.
-12. ``undecided / validity``: it stands, but turns by more than 20 degrees, beyond which the model does not hold, or is
-    less deep than 0.35 of its height and slides by more than 0.5 m: then whether it stands changes with every hundredth
-    of the speed.
-13. ``pass``.
+Undecided for its horizon is a row of which the longer time, too, ended without proof. Where a reading lets forces feed
+energy, as the printed ones do, nothing can be proved of later times: there every boulder that stands at the horizon is
+undecided. Undecided for its validity is also a shallow boulder that slides: whether it stands changes with every
+hundredth of the speed.
 
 A peak beyond its limit is decided even where the error is larger than the excess: that is the safe side. But where only
 one of the two solutions from which the error is estimated overturns, the error is infinite and nothing is decided.
-Where errors are estimated from one solution, as by ``fast``, rows of rule 11 stay as they are, and motion beyond
-the horizon is not simulated, since nothing would confirm it; else finer steps decide them.
+Where errors are estimated from one solution, as by ``fast``, rows that are undecided for their error stay as they are,
+and motion beyond the horizon is not simulated, since nothing would confirm it; else finer steps decide them.
 """
 
 from __future__ import annotations
@@ -120,47 +107,18 @@ class Facts(NamedTuple):
     """How far the leading edge of the cargo bed came past the far face of the boulder [m]."""
     margin: np.ndarray
     """Least (limit - value) / limit over the criteria."""
-    rule: np.ndarray
-    """The rule that decides each row, one of `boulder_kernels.rules.RULES`."""
     verdict: np.ndarray
     """Codes of the verdicts."""
     reason: np.ndarray
     """Codes of the reasons."""
     rating: np.ndarray
     """Codes of the ratings; -1 where there is none."""
-    validity: np.ndarray
-    """Codes of the flags."""
-    robustness: np.ndarray
-    """Codes of `GRADES`, of passes that no second opinion was asked of."""
-    stands_under: np.ndarray
-    """Codes of `STANDINGS`; -1 before a second opinion was asked for."""
-    words: dict[str, tuple[str, ...]]
-    """What the codes of a column stand for, where that depends on the rows."""
 
 
-def judge(
-    outcomes: OutcomeTable,
-    designs: Designs,
-    limits: Limits,
-    only: tuple[str, ...] = (),
-) -> Judged:
-    """Apply the rules of this module to n rows.
+def judge(outcomes: OutcomeTable, designs: Designs, limits: Limits, only: tuple[str, ...] = ()) -> Judged:
+    """Apply the rules to what the kernels computed of n rows (rad, m, N, s); no row is dropped.
 
-    Parameters
-    ----------
-    outcomes
-        What the kernels computed, arrays of shape (n,); rad, m, N, s.
-    designs
-        Inputs of the same rows.
-    limits
-        Limits of the criterion, and what the model was tested on.
-    only
-        Columns wanted; all of the table where empty.
-
-    Returns
-    -------
-    Judged
-        One verdict a row; no row is dropped.
+    The columns are those in `only`; all of the table where it is empty.
     """
     rows = rows_of(designs, limits)
     consider_rows(*rows, np.arange(designs.size), np.stack(outcomes), 0, UNCONFIRMED, limits.of_rules)
@@ -180,28 +138,18 @@ def rows_of(designs: Designs, limits: Limits) -> Rows:
 
 
 def judged_rows(rows: Rows, designs: Designs, limits: Limits, only: tuple[str, ...] = ()) -> Judged:
-    """Return the columns of n rows as their solutions and courses have them.
-
-    Parameters
-    ----------
-    rows
-        The rows, after `boulder_kernels.rules.consider_rows`.
-    designs, limits, only
-        See `judge`.
-    """
-    facts = facts_of(rows, designs, limits)
+    """Return the columns of n rows as `boulder_kernels.rules.consider_rows` left their solutions and courses."""
+    facts, reasons = facts_of(rows, designs, limits)
     columns, words = {}, {}
     for spec in OUTCOMES:
         if only and spec.name not in only:
             continue
-        if spec.name == "validity":
-            flags, named = flagged(facts, rows.counted)
-            facts = facts._replace(validity=flags, words=facts.words | {"validity": named})
-        if spec.name == "robustness":
-            facts = facts._replace(robustness=grades_without_asking(facts))
-        values = spec.value(facts)
         if spec.type == "dictionary":
-            words[spec.name] = facts.words.get(spec.name, spec.words)
+            words[spec.name] = reasons if spec.name == "reason" else spec.words
+        if spec.name == "validity":
+            values, words[spec.name] = flagged(facts, rows.counted)
+        else:
+            values = spec.value(facts) if spec.value else grades_without_asking(facts)
         if spec.rows != "all":
             none = -1 if spec.type == "dictionary" else np.nan
             values = np.where(facts.rows[spec.rows], values, none).astype(values.dtype, copy=False)
@@ -209,8 +157,8 @@ def judged_rows(rows: Rows, designs: Designs, limits: Limits, only: tuple[str, .
     return Judged(columns, words)
 
 
-def facts_of(rows: Rows, designs: Designs, limits: Limits) -> Facts:
-    """Return what is known of n rows; see `judged_rows`."""
+def facts_of(rows: Rows, designs: Designs, limits: Limits) -> tuple[Facts, tuple[str, ...]]:
+    """Return what is known of n rows, see `judged_rows`, and the words of their reasons."""
     outcomes, courses = outcome_table(rows.counted), rows.courses
     status, rule, penetration = outcomes.status, courses["rule"].astype(np.intp), courses["penetration"]
     verdict, reason = _VERDICTS.take(rule), _REASONS.take(rule)
@@ -221,7 +169,7 @@ def facts_of(rows: Rows, designs: Designs, limits: Limits) -> Facts:
     standing, overturned = rule >= verdicts.PENETRATION, rule == verdicts.OVERTURNS
     computed = standing | overturned
     rated = standing & (rule != verdicts.SLOWER_TRUCK) & ~((verdict == UNDECIDED) & (reason != NUMERICAL_ERROR))
-    return Facts(
+    facts = Facts(
         outcomes=outcomes,
         designs=designs,
         limits=limits,
@@ -236,15 +184,11 @@ def facts_of(rows: Rows, designs: Designs, limits: Limits) -> Facts:
         overlap=courses["overlap"],
         penetration=penetration,
         margin=courses["margin"],
-        rule=rule,
         verdict=verdict,
         reason=reason,
         rating=_ratings(penetration),
-        validity=reason,
-        robustness=reason,
-        stands_under=np.full(len(status), -1, dtype=np.int32),
-        words={"reason": reasons},
     )
+    return facts, reasons
 
 
 def limits_of(sweep: Sweep) -> Limits:

@@ -19,9 +19,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from boulder_kernels import simulate_table
 from boulder_sweep.errors import BackendError, ClusterLostError, ComputationError, Interrupted, safe_words
 from boulder_sweep.judge.accuracy import accuracy_of
-from boulder_sweep.judge.evaluation import Evaluation, Simulate, by_kernels, evaluation_of
+from boulder_sweep.judge.evaluation import Evaluation, Simulate, evaluation_of
 from boulder_sweep.judge.quantiles import at_values
 from boulder_sweep.locations import Location, location_of, names_in
 from boulder_sweep.runner.pool import (
@@ -106,7 +107,7 @@ def run(
     resume: bool = False,
     overwrite: bool = False,
     progress: Report | None = None,
-    simulate: Simulate = by_kernels,
+    simulate: Simulate = simulate_table,
 ) -> Summary:
     """Simulate every design of a sweep and store the table.
 
@@ -424,7 +425,7 @@ def estimate(
     *,
     jobs: int | None = None,
     resume: bool = False,
-    simulate: Simulate = by_kernels,
+    simulate: Simulate = simulate_table,
 ) -> Estimate:
     """Estimate what a run will take from a timed sample of a tenth of a second; nothing is written.
 

@@ -76,15 +76,7 @@ _BRO_EMPTY = "-999999"
 
 
 class _Hole:
-    """The readings of one hole, and the names of all.
-
-    Parameters
-    ----------
-    label
-        The file.
-    name
-        The hole that is meant; None where the file has only one.
-    """
+    """The readings of one hole of a file, and the names of all; without a name the file has only one."""
 
     def __init__(self, label: str, name: str | None) -> None:
         self.label, self.name = label, name
@@ -136,21 +128,10 @@ class _Hole:
 
 
 def read_log(node: Scalar, hole: Scalar | None, folder: Path) -> Log:
-    """Return the readings of one hole.
+    """Return the readings of one hole of a file, by its name or URL as written in the settings.
 
-    Parameters
-    ----------
-    node
-        Name of the file as written in the settings, or its URL.
-    hole
-        Name of the hole; None where the file has only one.
-    folder
-        Where relative names begin.
-
-    Raises
-    ------
-    SettingsError
-        With every mistake, at its line of the file.
+    The hole is None where the file has only one; relative names begin in the folder. Raise `SettingsError` with every
+    mistake, at its line of the file.
     """
     problems = Problems()
     with problems.under(named=node.position):
@@ -175,7 +156,7 @@ def _log_of(found: _Hole, node: Scalar, hole: Scalar) -> Log:
         raise wrong(hole.position, unknown_word(hole.text, f"a hole of {found.label} with readings", shown))
     key = CONE if CONE in found.readings else next(iter(found.readings), "")
     given = found.readings.get(key, [])
-    readings = sorted((one for one in given if one.is_whole), key=lambda one: one.depth_m)
+    readings = sorted((one for one in given if one.text and math.isfinite(one.depth_m)), key=lambda one: one.depth_m)
     if not readings:
         raise wrong(node.position, f"{found.label} has no rows with a depth and a reading")
     unused = [*found.unused, *("blow counts" for other in found.readings if other != key)]

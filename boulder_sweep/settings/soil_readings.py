@@ -150,10 +150,7 @@ def _reading(node: Node, method: str, density_kg_m3: float | None) -> dict[str, 
 def _without_signs(node: Node) -> tuple[Node, bool]:
     """Return a reading with plain numbers in place of ``>50``, ``50+``, ``50/75mm`` and ``R``, and whether it had one.
 
-    Raises
-    ------
-    SettingsError
-        Blows over a penetration without a unit, or over more than the last 300 mm.
+    Raise `SettingsError` for blows over a penetration without a unit, or over more than the last 300 mm.
     """
     if not isinstance(node, Mapping):
         return node, False
@@ -202,12 +199,8 @@ def _leave_out(readings: Located, foot_m: float, topsoil_m: float) -> None:
 def _take_angles(node: Node, method: str, readings: Located, lacking: Collection[str]) -> None:
     """Give every reading that counts its friction angles, by the sources of the correlations.
 
-    One above the range of the correlations gets the angles at its end.
-
-    Raises
-    ------
-    SettingsError
-        Readings that are too weak for the correlations, in one mistake; or no reading counts.
+    One above the range of the correlations gets the angles at its end. Raise `SettingsError` for readings that are too
+    weak for the correlations, in one mistake, and where no reading counts.
     """
     counting = [(position, reading) for position, reading in readings if "left_out" not in reading]
     if not counting:
@@ -281,41 +274,24 @@ class LogReading(NamedTuple):
     text: str
     energy_ratio: str
 
-    @property
-    def is_whole(self) -> bool:
-        """Whether it has a depth and a value."""
-        return bool(self.text) and math.isfinite(self.depth_m)
-
 
 class Log(NamedTuple):
-    """The readings of a hole, from the top down.
-
-    Attributes
-    ----------
-    key : str
-        What they are by the keys of a reading: ``n``, ``n60``, ``n1_60`` or ``q_c``.
-    readings : tuple of LogReading
-        All with a depth and a value.
-    file, hole : str
-        The file as it is named in the settings, and the hole in it.
-    remarks : tuple of str
-        What of the file was not used.
-    water_m : float or None
-        Least depth of the ground water that the file gives [m].
-    may_be_layered : bool
-        Whether the soil may have layers: it is no named one, and the file gives no constant that is not one value.
-    shallowest_m : float
-        The shallowest foot of all designs [m].
-    """
+    """The readings of a hole, from the top down, all with a depth and a value."""
 
     key: str
+    """What they are by the keys of a reading: ``n``, ``n60``, ``n1_60`` or ``q_c``."""
     readings: tuple[LogReading, ...]
     file: str
     hole: str
+    """The file as it is named in the settings, and the hole in it."""
     remarks: tuple[str, ...]
+    """What of the file was not used."""
     water_m: float | None = None
+    """Least depth of the ground water that the file gives [m]."""
     may_be_layered: bool = True
+    """Whether the soil may have layers: it is no named one, and the file gives no constant that is not one value."""
     shallowest_m: float = math.inf
+    """The shallowest foot of all designs [m]."""
 
     def averaged(self, topsoil_m: float) -> tuple[LogReading, ...]:
         """Return one reading for each `WINDOW_M` below the topsoil: the lower of mean and median of the cone."""
@@ -332,25 +308,16 @@ def _average(window: list[LogReading]) -> LogReading:
 
 
 class LogLayer(NamedTuple):
-    """Readings that belong to one layer.
-
-    Attributes
-    ----------
-    from_m, to_m : float
-        Its boundaries [m].
-    readings : int
-        Their number.
-    angles : dict of str to float
-        Friction angles [deg] by the sources of the correlations.
-    scatter_deg : float
-        Standard deviation of their mean [deg]; 0 for fewer than `FEWEST` readings.
-    """
+    """Readings that belong to one layer."""
 
     from_m: float
     to_m: float
     readings: int
+    """How many there are."""
     angles: dict[str, float]
+    """Friction angles [deg] by the sources of the correlations."""
     scatter_deg: float
+    """Standard deviation of their mean [deg]; 0 for fewer than `FEWEST` readings."""
 
 
 def layers_of(
@@ -361,26 +328,15 @@ def layers_of(
     is_cone: bool,
     shallowest_m: float = math.inf,
 ) -> list[LogLayer]:
-    """Return the layers of a log, from the ground down.
+    """Return the layers of a log, from the ground down, by the depths and friction angles of the readings that count.
 
     No boulder is judged in soil that only a deeper foot reaches: of the means of a layer down to any foot, the lowest
-    counts.
-
-    Parameters
-    ----------
-    readings
-        What counts, with depths and friction angles, see `boulder_sweep.settings.soil_readings`. Those that are no
-        layer of their own, strong alone between weaker ones, are marked as left out.
-    foot_m
-        The deepest foot [m]; the last reading stands for the soil down to it. One below it counts in full where it is
-        weaker than the one above, else for its share of the soil down to the foot.
-    scatter_deg
-        Standard deviation of the correlation [deg]: means that differ by more belong to two layers.
-    is_cone
-        Whether a reading is the mean of `WINDOW_M`; a boundary then lies at its end, else at the depth of the stronger
-        reading of the two.
-    shallowest_m
-        The shallowest foot [m]; infinity where there is one foot only.
+    counts. The shallowest foot [m] is infinity where there is one foot only. The last reading stands for the soil down
+    to the deepest foot [m]; one below it counts in full where it is weaker than the one above, else for its share of
+    the soil down to the foot. Means that differ by more than the standard deviation of the correlation [deg] belong to
+    two layers. Of a cone a reading is the mean of `WINDOW_M`, and a boundary lies at its end, else at the depth of the
+    stronger reading of the two. Readings that are no layer of their own, strong alone between weaker ones, are marked
+    as left out.
     """
     by_depth = sorted(readings, key=lambda one: (one["depth_m"], -one["friction_angle_deg"]))
     readings = list({round(one["depth_m"], 3): one for one in by_depth}.values())  # of one depth the weakest
@@ -700,25 +656,11 @@ def unfold_soils(
     problems: Problems,
     read_log: Callable[[Scalar, Scalar | None], Log],
 ) -> list[dict[str, Any]]:
-    """Replace the readings of every soil by distributions of the constants that it does not give.
+    """Replace the readings of every soil in the tree of a file by distributions of the constants that it does not give.
 
-    Parameters
-    ----------
-    root : Mapping
-        The tree of the file, changed in place.
-    listed : collection of str
-        Keys of the soil that a table of designs gives.
-    feet_m : tuple of float
-        The shallowest and the deepest foot of all designs [m].
-    problems : Problems
-        Receives what is wrong with them.
-    read_log : callable
-        Reads a log, by the names of its file and hole.
-
-    Returns
-    -------
-    list of dict
-        What is kept of each as plain data, under the name of its soil where it is a named one.
+    Return what is kept of each as plain data, under the name of its soil where it is a named one. `listed` are keys of
+    the soil that a table of designs gives; the feet are the shallowest and the deepest of all designs [m]; problems
+    receive what is wrong with the readings; logs are read by the names of their file and hole.
     """
     data: list[dict[str, Any]] = []
     shallowest_m, foot_m = feet_m

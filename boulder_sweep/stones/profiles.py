@@ -26,28 +26,19 @@ SCAN_LINES = 24
 
 @dataclass(frozen=True, eq=False)
 class Sections:
-    """Sections of a stone by m horizontal planes, of axes x and y.
-
-    Attributes
-    ----------
-    height : ndarray, shape (m,)
-        Height of each over the lowest point of the stone [m].
-    area : ndarray, shape (m,)
-        Area [m^2].
-    middle : ndarray, shape (m, 2)
-        Centroid, in x and y [m]; the origin is the centre of mass of the stone.
-    low, high : ndarray, shape (m, 2)
-        Extent in x and y [m].
-    second : ndarray, shape (m, 2)
-        Integrals of x^2 and y^2 over the section [m^4].
-    """
+    """Sections of a stone by m horizontal planes, of axes x and y; the origin is the centre of mass of the stone."""
 
     height: np.ndarray
+    """Height of each over the lowest point of the stone [m], shape (m,)."""
     area: np.ndarray
+    """Area [m^2], shape (m,)."""
     middle: np.ndarray
+    """Centroids, in x and y [m], shape (m, 2)."""
     low: np.ndarray
     high: np.ndarray
+    """Extent in x and y [m], shape (m, 2)."""
     second: np.ndarray
+    """Integrals of x^2 and y^2 over the section [m^4], shape (m, 2)."""
 
     def turned(self, quarters: int) -> Sections:
         """Return the sections in axes that are turned anticlockwise by some quarters of a circle."""
@@ -63,16 +54,9 @@ class Sections:
 
 
 def sections_of(solid: Solid, axes: np.ndarray, heights: np.ndarray) -> Sections:
-    """Return sections of a stone.
+    """Return sections of a stone at heights over its lowest point [m], shape (m,).
 
-    Parameters
-    ----------
-    solid
-        The stone.
-    axes
-        Unit vectors x, y and z (up) in the axes of the scan, right-handed, shape (3, 3).
-    heights
-        Heights over the lowest point [m], shape (m,).
+    The axes are unit vectors x, y and z (up) in the axes of the scan, right-handed, shape (3, 3).
     """
     count = len(heights)
     area = np.zeros(count)
@@ -165,28 +149,20 @@ LEAST_SIDE = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """A stone of rectangular sections, between n heights linear.
-
-    Attributes
-    ----------
-    height : ndarray, shape (n,)
-        Heights over the foot, from 0 [m].
-    width : ndarray, shape (n,)
-        Across the direction of travel [m].
-    near, far : ndarray, shape (n,)
-        Distances of the near and the far face from the middle of the foot [m].
-    foot_x : float
-        Middle of the foot in the axes of the sections, whose origin is below the centre of mass of the uncut stone [m].
-    error : float
-        Root mean square, over the volume, of the error of length, width and middle against the sections [m].
-    """
+    """A stone of rectangular sections, between n heights linear."""
 
     height: np.ndarray
+    """Heights over the foot, from 0 [m], shape (n,)."""
     width: np.ndarray
+    """Across the direction of travel [m], shape (n,)."""
     near: np.ndarray
     far: np.ndarray
+    """Distances of the near and the far face from the middle of the foot [m], shape (n,)."""
     foot_x: float
+    """Middle of the foot in the axes of the sections, whose origin is below the centre of mass of the uncut stone
+    [m]."""
     error: float
+    """Root mean square, over the volume, of the error of length, width and middle against the sections [m]."""
 
     @property
     def length(self) -> np.ndarray:
@@ -230,19 +206,11 @@ def sides_of(sections: Sections) -> tuple[np.ndarray, np.ndarray]:
 
 
 def fitted(sections: Sections, foot: float, top: float, volume: float) -> Profile:
-    """Return the profile of a stone that has been cut off at its foot.
+    """Return the profile of a stone that has been cut off at its foot, with a volume above that [m^3].
 
-    The points of the pieces are chosen by dynamic programming, the sides there by least squares, weighted by the area
-    of the sections and a little more. The lengths are then changed in proportion, so that the volume is kept.
-
-    Parameters
-    ----------
-    sections
-        Its sections, in the axes in which it will stand.
-    foot, top
-        Heights of the foot and of the top in the heights of the sections [m].
-    volume
-        Volume above the foot [m^3].
+    Foot and top are in the heights of the sections [m]. The points of the pieces are chosen by dynamic programming, the
+    sides there by least squares, weighted by the area of the sections and a little more. The lengths are then changed
+    in proportion, so that the volume is kept.
     """
     within = (sections.height > foot) & (sections.height < top)
     z = sections.height[within] - foot

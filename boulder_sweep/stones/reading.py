@@ -9,6 +9,7 @@ files. What it returns must have the points and triangles that were counted.
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import io
 import json
 import re
@@ -52,40 +53,23 @@ _Counted = tuple[int, int, bytes]
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A piece of a surface as it is stored.
-
-    Attributes
-    ----------
-    points : ndarray, shape (n, 3)
-        Points.
-    faces : ndarray of int64, shape (m, 3)
-        Triangles, as numbers of points.
-    placing : ndarray of float64, shape (4, 4)
-        What moves the points to their places.
-    step : float
-        Least distance between neighbouring numbers: 1 where the file stores whole ones.
-    """
+    """A piece of a surface as it is stored."""
 
     points: np.ndarray
+    """Points, shape (n, 3)."""
     faces: np.ndarray
+    """Triangles, as numbers of points, int64, shape (m, 3)."""
     placing: np.ndarray
+    """What moves the points to their places, shape (4, 4)."""
     step: float = 0.0
+    """Least distance between neighbouring numbers: 1 where the file stores whole ones."""
 
 
 def parts_of(kind: str, data: bytes) -> list[Part]:
-    """Read a file.
+    """Return the surface in the bytes of a file whose name ends in `kind`, one of `READERS`.
 
-    Parameters
-    ----------
-    kind
-        The end of its name, one of `READERS`.
-    data
-        Its bytes.
-
-    Raises
-    ------
-    ScanError
-        It is damaged, of another format, too large, or holds what is not read. The words do not name the file.
+    Raise `ScanError` where it is damaged, of another format, too large, or holds what is not read; the words do not
+    name the file.
     """
     try:
         points, faces, plain = READERS[kind](data)
@@ -121,13 +105,7 @@ def _loaded(kind: str, data: bytes) -> list[Part]:
 
 
 def check_count(count: int, each: int = 1) -> None:
-    """Refuse more faces than are read, or more of what each face may have several of.
-
-    Raises
-    ------
-    ScanError
-        There are more.
-    """
+    """Raise `ScanError` for more faces than are read, or more of what each face may have several of."""
     if count > each * MAX_FACES:
         raise ScanError(f"has {count:,} faces or points; at most {MAX_FACES:,} are read: {DECIMATE}")
 
@@ -337,63 +315,30 @@ OTHER_UNITS = {"mm": 1e-3, "cm": 1e-2, "in": 0.0254, "ft": 0.3048}
 
 @dataclass(frozen=True, eq=False)
 class ScannedSurface:
-    """The surface in a file, as it is.
-
-    Attributes
-    ----------
-    file : str
-        The file.
-    sha256 : str
-        Hash of its content.
-    vertices : ndarray of float64, shape (n, 3)
-        Points [m].
-    faces : ndarray of int64, shape (m, 3)
-        Triangles, as numbers of points.
-    step_m : float
-        Distance between neighbouring numbers at its largest coordinate, as the file stores them [m].
-    """
+    """The surface in a file, as it is."""
 
     file: str
     sha256: str
     vertices: np.ndarray
+    """Points [m], shape (n, 3)."""
     faces: np.ndarray
+    """Triangles, as numbers of points, int64, shape (m, 3)."""
     step_m: float = 0.0
-
-
-def require_trimesh() -> None:
-    """Check that trimesh is installed.
-
-    Raises
-    ------
-    ScanError
-        trimesh is not installed.
-    """
-    from importlib.util import find_spec  # an extra: files with sizes or profiles do not need it
-
-    if find_spec("trimesh") is None:
-        raise ScanError(f"scans need trimesh, which is not installed: {install('scan')}")
+    """Distance between neighbouring numbers at its largest coordinate, as the file stores them [m]."""
 
 
 def read_scan(path: str | Path, metres: float = 1.0) -> ScannedSurface:
-    """Read the surface of a stone.
+    """Return the surface of a stone in a PLY, STL, OBJ or GLB file, whose unit has a length [m].
 
-    Parameters
-    ----------
-    path
-        PLY, STL, OBJ or GLB file.
-    metres
-        Length of its unit [m].
-
-    Raises
-    ------
-    ScanError
-        The file is missing, too large, of another kind, damaged, holds no surface, or no stone has its size.
+    Raise `ScanError` where the file is missing, too large, of another kind, damaged, holds no surface, or no stone has
+    its size.
     """
     path = Path(path)
     kind = path.suffix.lower()
     if kind not in READERS:
         raise ScanError(f"{path}: is not a scan that can be read; use one of {', '.join(READERS)}")
-    require_trimesh()
+    if importlib.util.find_spec("trimesh") is None:  # an extra: files with sizes or profiles do not need it
+        raise ScanError(f"scans need trimesh, which is not installed: {install('scan')}")
     data = _content(path)
     try:
         vertices, faces, step = _placed(parts_of(kind, data))

@@ -38,39 +38,26 @@ SAME_POINT = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A closed stone.
-
-    Attributes
-    ----------
-    vertices : ndarray of float64, shape (n, 3)
-        Points in the axes of the scan [m].
-    faces : ndarray of int64, shape (m, 3)
-        Triangles with their outer side where their points run anticlockwise.
-    volume : float
-        Volume [m^3].
-    centre : ndarray, shape (3,)
-        Centre of mass of a homogeneous stone [m].
-    inertia : ndarray, shape (3, 3)
-        Moments of inertia about the centre for a density of 1 kg/m^3 [m^5].
-    repairs : tuple of str
-        What was done to the surface, in words; nothing where it was closed.
-    closed : float
-        Part of the surface that was added to close holes, without the base.
-    base : float
-        Part of the surface that is a flat lid on a plane rim, the base on which the stone lay; 0 where it has none.
-    over : float
-        Part of the volume between all that was added and the centre of mass.
-    """
+    """A closed stone, homogeneous."""
 
     vertices: np.ndarray
+    """Points in the axes of the scan [m], shape (n, 3)."""
     faces: np.ndarray
+    """Triangles with their outer side where their points run anticlockwise, int64, shape (m, 3)."""
     volume: float
+    """Volume within the surface [m^3]."""
     centre: np.ndarray
+    """Centre of mass [m], shape (3,)."""
     inertia: np.ndarray
+    """Moments of inertia about the centre for a density of 1 kg/m^3 [m^5], shape (3, 3)."""
     repairs: tuple[str, ...] = ()
+    """What was done to the surface, in words; nothing where it was closed."""
     closed: float = 0.0
+    """Part of the surface that was added to close holes, without the base."""
     base: float = 0.0
+    """Part of the surface that is a flat lid on a plane rim, the base on which the stone lay; 0 where it has none."""
     over: float = 0.0
+    """Part of the volume between all that was added and the centre of mass."""
 
     def moment(self, axis: np.ndarray) -> float:
         """Return the moment of inertia about an axis (unit vector) through the centre, for 1 kg/m^3 [m^5]."""
@@ -80,15 +67,7 @@ class Solid:
 def solid_of(scan: ScannedSurface) -> Solid:
     """Return the stone that a scan is the surface of.
 
-    Parameters
-    ----------
-    scan
-        The surface.
-
-    Raises
-    ------
-    ScanError
-        It is flat, holds several bodies, or is too open to be closed.
+    Raise `ScanError` where it is flat, holds several bodies, or is too open to be closed.
     """
     repairs: list[str] = []
     vertices, faces = _merge_points(scan.vertices, scan.faces)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -43,47 +42,32 @@ MOST_DOUBLED = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """A stone on its foot, with one face to the road.
-
-    Attributes
-    ----------
-    up, facing : str
-        Which end is up, and which faces the vehicle: names of `DIRECTIONS`.
-    axes : ndarray, shape (3, 3)
-        Direction of travel, across it to the left, and up, in the axes of the scan.
-    stands : bool
-        Whether the stone stands by itself before it is cut, its centre of mass over what it rests on.
-    cut_m : float
-        What is cut off at the foot [m].
-    cut_share : float
-        The same as a share of the volume.
-    rests : float
-        Section of the uncut stone just above what it lies on, as a share of its largest section.
-    profile : Profile
-        The stone above the cut.
-    centre : tuple of float
-        Centre of mass of the cut stone: beyond the middle of the foot of the profile, and above the cut [m].
-    moment : float
-        Its moment of inertia about the axis across the travel through the centre, for 1 kg/m^3 [m^5].
-    volume : float
-        Volume of the cut stone [m^3].
-    outline : ndarray, shape (m, 3)
-        The stone as it is, cut or not: height above the foot, distances of its sides before and behind the middle of
-        the foot [m].
-    """
+    """A stone on its foot, with one face to the road."""
 
     up: str
     facing: str
+    """Which end is up, and which faces the vehicle: names of `DIRECTIONS`."""
     axes: np.ndarray
+    """Direction of travel, across it to the left, and up, in the axes of the scan, shape (3, 3)."""
     stands: bool
+    """Whether the stone stands by itself before it is cut, its centre of mass over what it rests on."""
     cut_m: float
+    """What is cut off at the foot [m]."""
     cut_share: float
+    """What is cut off, as a share of the volume."""
     rests: float
+    """Section of the uncut stone just above what it lies on, as a share of its largest section."""
     profile: Profile
+    """The stone above the cut."""
     centre: tuple[float, float]
+    """Centre of mass of the cut stone: beyond the middle of the foot of the profile, and above the cut [m]."""
     moment: float
+    """Its moment of inertia about the axis across the travel through the centre, for 1 kg/m^3 [m^5]."""
     volume: float
+    """Volume of the cut stone [m^3]."""
     outline: np.ndarray
+    """The stone as it is, cut or not: height above the foot, distances of its sides before and behind the middle of the
+    foot [m], shape (m, 3)."""
 
     @property
     def has_foot(self) -> bool:
@@ -105,23 +89,18 @@ def has_foot(profile: Profile) -> bool:
 
 
 class Stone:
-    """A stone that can be set up.
+    """A stone that can be set up; its scan is named in messages.
 
-    Parameters
-    ----------
-    solid
-        The stone.
-    file
-        Its scan, for messages.
-
-    Raises
-    ------
-    ScanError
-        Its surface crosses itself.
+    Raise `ScanError` where its surface crosses itself.
     """
 
     def __init__(self, solid: Solid, file: str) -> None:
+        import trimesh
+
         self.solid = solid
+        self._hull: Any = trimesh.Trimesh(solid.vertices, solid.faces, process=False).convex_hull
+        self.axes, self.sides_m = _named_box(self._hull.vertices - solid.centre)
+        """Directions of a, b and c in the axes of the scan, shape (3, 3), and sides of the smallest box along them."""
         self._ups: dict[str, _Up] = {}
         doubled = self._whole_doubled()
         if doubled > MOST_DOUBLED:
@@ -129,39 +108,6 @@ class Stone:
                 f"{file}: the surface crosses itself: {doubled:.0%} of the boulder lies inside it twice or inside out; "
                 "repair the scan first, for example in MeshLab"
             )
-
-    @cached_property
-    def _box(self) -> tuple[np.ndarray, np.ndarray]:
-        """Axes a, b and c as rows, and the sides of the box along them [m]."""
-        points = self._hull.vertices - self.solid.centre
-        axes, sides = smallest_box(points)
-        order = np.argsort(-np.round(sides, 9), kind="stable")
-        axes, sides = axes[order], sides[order]
-        placed = points @ axes.T
-        middle = 0.5 * (placed.min(axis=0) + placed.max(axis=0))
-        # An end of a stone that is the same on both has no name of its own: it takes what makes the axes right-handed.
-        same = np.abs(middle) < 1e-6 * sides
-        axes *= np.sign(np.where(same, axes[range(3), np.abs(axes).argmax(axis=1)], middle))[:, None]
-        if np.linalg.det(axes) < 0.0:
-            axes[1 if same[1] else 0 if same[0] else 2] *= -1.0
-        return axes, sides
-
-    @cached_property
-    def _hull(self) -> Any:
-        """Convex hull of the scan."""
-        import trimesh
-
-        return trimesh.Trimesh(self.solid.vertices, self.solid.faces, process=False).convex_hull
-
-    @property
-    def axes(self) -> np.ndarray:
-        """Directions of a, b and c in the axes of the scan, shape (3, 3)."""
-        return self._box[0]
-
-    @property
-    def sides_m(self) -> np.ndarray:
-        """Sides a, b and c of the smallest box around the stone [m], shape (3,)."""
-        return self._box[1]
 
     @property
     def solidity(self) -> float:
@@ -184,12 +130,8 @@ class Stone:
         """Return the stone with one end up and another to the road.
 
         With an end of its own axes up the stone may be tilted to a part of its surface on which it stands firmly; with
-        an axis of the scan up it stands as it was scanned.
-
-        Raises
-        ------
-        ScanError
-            Up or facing is no end, or they are ends of one axis, or of two kinds of axes.
+        an axis of the scan up it stands as it was scanned. Raise `ScanError` where up or facing is no end, or they are
+        ends of one axis, or of two kinds of axes.
         """
         for key, end in (("up", up), ("facing", facing)):
             if end not in DIRECTIONS:
@@ -227,7 +169,7 @@ class Stone:
 
     def _direction(self, end: str) -> np.ndarray:
         """Return an end as a unit vector in the axes of the scan."""
-        axes, names = (self._box[0], OF_STONE) if end[-1] in OF_STONE else (np.eye(3), OF_SCAN)
+        axes, names = (self.axes, OF_STONE) if end[-1] in OF_STONE else (np.eye(3), OF_SCAN)
         return (-1.0 if end[0] == "-" else 1.0) * axes[names.index(end[-1])]
 
     def _set_up(self, up: str) -> _Up:
@@ -281,8 +223,7 @@ class Stone:
 
     def _whole_doubled(self) -> float:
         """Return the share of the volume that the surface encloses twice."""
-        axes = self._box[0]
-        frames = (axes, axes[[1, 2, 0]], axes[[2, 0, 1]])
+        frames = (self.axes, self.axes[[1, 2, 0]], self.axes[[2, 0, 1]])
         shares = (np.arange(24) + 0.5) / 24
         return max(doubled_share(self.solid, frame, shares * self._height(frame[2])) for frame in frames)
 
@@ -366,6 +307,21 @@ def _over(centre: np.ndarray, triangles: np.ndarray, normals: np.ndarray) -> np.
     return (sides >= -least).all(axis=1) | (sides <= least).all(axis=1)
 
 
+def _named_box(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return axes a, b and c as rows, and the sides of the box along them, of points around the centre of mass [m]."""
+    axes, sides = smallest_box(points)
+    order = np.argsort(-np.round(sides, 9), kind="stable")
+    axes, sides = axes[order], sides[order]
+    placed = points @ axes.T
+    middle = 0.5 * (placed.min(axis=0) + placed.max(axis=0))
+    # An end of a stone that is the same on both has no name of its own: it takes what makes the axes right-handed.
+    same = np.abs(middle) < 1e-6 * sides
+    axes *= np.sign(np.where(same, axes[range(3), np.abs(axes).argmax(axis=1)], middle))[:, None]
+    if np.linalg.det(axes) < 0.0:
+        axes[1 if same[1] else 0 if same[0] else 2] *= -1.0
+    return axes, sides
+
+
 SCREENED = 4096
 """Rotations that are tried first: from each box to the next, some 5 degrees."""
 FEW = 4096
@@ -381,19 +337,10 @@ LEAST_GAIN = 1e-9
 
 
 def smallest_box(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the box of least volume around the convex hull of some points.
+    """Return the box of least volume around the corners of a convex hull [m], shape (n, 3): axes and sides [m].
 
-    Parameters
-    ----------
-    points
-        Corners of the hull, around the origin [m], shape (n, 3). Their order changes nothing but the last digits.
-
-    Returns
-    -------
-    axes : ndarray, shape (3, 3)
-        Directions of the sides as rows, right-handed, in no particular order.
-    sides : ndarray, shape (3,)
-        Lengths along them [m].
+    The axes are the directions of the sides as rows, right-handed, in no particular order, shape (3, 3). The order of
+    the corners changes nothing but the last digits.
     """
     from scipy.spatial.transform import Rotation
 

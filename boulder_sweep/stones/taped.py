@@ -24,19 +24,10 @@ _NARROW = {
 
 
 def taped_profiles(shape: str, fills: np.ndarray) -> np.ndarray:
-    """Return the profiles of one shape for stones of some fills.
+    """Return the profiles of one of `boulder_sweep.columns.SHAPES` for stones of some fills, shape (n, P, 4).
 
-    Parameters
-    ----------
-    shape
-        One of `boulder_sweep.columns.SHAPES`.
-    fills
-        Volume over the volume of the box of the overall sizes, more than 0 and at most 1, shape (n,).
-
-    Returns
-    -------
-    ndarray, shape (n, P, 4)
-        Height, width, and reach towards the vehicle and away from it, as shares of height, width and length.
+    The fills, shape (n,), are more than 0 and at most 1. A point has its height, width, and reach towards the vehicle
+    and away from it, as shares of height, width and length.
     """
     plan = np.minimum(1.0, fills / LEAST_FILL)
     end = 0.5 * (np.sqrt(np.maximum(12.0 * fills / plan - 3.0, 0.0)) - 1.0)  # t^2 + t + 1 = 3 f/p

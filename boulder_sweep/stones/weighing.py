@@ -29,28 +29,17 @@ NEARER = "subtract a point near the boulder from all coordinates before you expo
 
 @dataclass(frozen=True, eq=False)
 class ScannedStone:
-    """A stone from a scan, with its mass. Made by `scanned`.
-
-    Attributes
-    ----------
-    file, sha256 : str
-        The scan, and the hash of its content.
-    stone : Stone
-        The stone.
-    density_kg_m3 : float
-        Its density.
-    density_from : str
-        Where that comes from: ``mass``, ``density`` or ``assumed``.
-    step_m : float
-        Spacing of the coordinates in the scan [m].
-    """
+    """A stone from a scan, with its mass. Made by `scanned`."""
 
     file: str
     sha256: str
+    """The scan, and the hash of its content."""
     stone: Stone
     density_kg_m3: float
     density_from: str
+    """Where that comes from: ``mass``, ``density`` or ``assumed``."""
     step_m: float
+    """Spacing of the coordinates in the scan [m]."""
 
     @property
     def mass_kg(self) -> float:
@@ -94,13 +83,7 @@ class ScannedStone:
         return cautions
 
     def plot(self, path: str | Path) -> None:
-        """Draw the stone with each of its six ends up, from the side and to scale, with its profile.
-
-        Raises
-        ------
-        PictureError
-            It cannot be drawn.
-        """
+        """Draw the stone with each of its six ends up, from the side and to scale, with its profile."""
         draw("scanned_stone", "draw_stone", self, path)
 
     def to_dict(self, standings: Sequence[Standing] | None = None) -> dict[str, Any]:
@@ -151,23 +134,10 @@ class ScannedStone:
 def scanned(
     path: str | Path, *, metres: float = 1.0, mass_kg: float | None = None, density_kg_m3: float | None = None
 ) -> ScannedStone:
-    """Read and weigh a stone.
+    """Read and weigh a stone; see `read_scan`.
 
-    Parameters
-    ----------
-    path
-        PLY, STL, OBJ or GLB file.
-    metres
-        Length of its unit [m].
-    mass_kg
-        Mass of the whole stone, from which its density follows.
-    density_kg_m3
-        Its density, where no mass is given; `ROCK_KG_M3` where neither is.
-
-    Raises
-    ------
-    ScanError
-        The scan cannot be used.
+    The density follows from the mass of the whole stone; it is the one given where no mass is, and `ROCK_KG_M3` where
+    neither is. Raise `ScanError` where the scan cannot be used.
     """
     scan = read_scan(path, metres)
     try:

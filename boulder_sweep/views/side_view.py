@@ -230,9 +230,8 @@ class SideView:
     def _soil_forces(self, sample: int) -> list[SceneItem]:
         motion = self.trajectory.motion
         c = motion.constants
-        profile = soil_profile(motion, sample, SLICES)
         arrows = []
-        for z, force in zip(profile.depth_m, profile.force_N, strict=True):
+        for z, force in zip(*soil_profile(motion, sample, SLICES), strict=True):
             length = float(force) * self.metres_per_newton
             if abs(length) < SHORTEST_ARROW_M:
                 continue

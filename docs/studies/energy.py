@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from boulder_kernels import Control, Readings, Record, as_printed, constants_of, corrected, simulate_design
+from boulder_kernels.dynamics import BOX
 from boulder_sweep.crash_tests.cases import NAMES, crash_test
 from boulder_sweep.crash_tests.tables import Table
 from boulder_sweep.impact.history import Motion, ledger_of
@@ -106,7 +107,7 @@ def audit(preset: str, steps: Steps, count: int = AUDIT_DESIGNS, seed: int = 0) 
         outcome = simulate_design(design, readings, control, record)
         reached = np.isfinite(record.states).all(axis=1)
         kept = Record(*(field[reached] for field in record))
-        motion = Motion(design, readings, constants_of(design, readings, 0), control, kept, outcome)
+        motion = Motion(design, readings, constants_of(design, readings, 0), control, kept, outcome, BOX)
         residuals[row] = ledger_of(motion).largest_residual
     return residuals
 

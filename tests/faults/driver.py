@@ -11,8 +11,8 @@ import json
 import sys
 import threading
 
+from boulder_kernels import simulate_table
 from boulder_sweep.errors import Interrupted
-from boulder_sweep.judge.evaluation import by_kernels
 from boulder_sweep.runner.run import Progress, run
 from boulder_sweep.store.failures import StoreError
 from tests.faults import faulty
@@ -25,7 +25,7 @@ def main() -> int:
     parser.add_argument("out")
     parser.add_argument("--rows", type=int, default=2000)
     parser.add_argument("--soil", default="closed_form")
-    parser.add_argument("--simulate", default="by_kernels")
+    parser.add_argument("--simulate", default="simulate_table")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--backend", default="threading")
     parser.add_argument("--stuck", action="store_true", help="never return from a report of rows")
@@ -47,7 +47,7 @@ def main() -> int:
             resume=options.resume,
             overwrite=options.overwrite,
             progress=report,
-            simulate=by_kernels if options.simulate == "by_kernels" else getattr(faulty, options.simulate),
+            simulate=simulate_table if options.simulate == "simulate_table" else getattr(faulty, options.simulate),
         )
     except (Interrupted, StoreError) as problem:
         print(json.dumps({"problem": str(problem)}), flush=True)

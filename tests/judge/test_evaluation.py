@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from boulder_kernels import Status
+from boulder_kernels import Status, simulate_table
 from boulder_sweep.columns import OUTCOME_COLUMNS, REASONS, VERDICTS
 from boulder_sweep.judge.accuracy import accuracy_of, control_of, readings_of
-from boulder_sweep.judge.evaluation import by_kernels, evaluation_of
+from boulder_sweep.judge.evaluation import evaluation_of
 from boulder_sweep.judge.inputs import designs_of
 from boulder_sweep.judge.judged import ERROR, PASS, joined, not_computed, worst_of
 from boulder_sweep.store.part import verdict_counts
@@ -113,7 +113,7 @@ def _never(table, readings, control):
 
 def test_an_evaluation_is_sent_by_name_not_as_source():
     evaluation = evaluation_of(grid(), accuracy_of(grid()))
-    assert evaluation.simulate is by_kernels
+    assert evaluation.simulate is simulate_table
     sent = pickle.dumps(evaluation)
     assert len(sent) < 2_000
     assert pickle.loads(sent) == evaluation

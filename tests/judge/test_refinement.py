@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import boulder_sweep
-from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, Status, corrected
+from boulder_kernels import Control, DesignTable, OutcomeTable, Readings, Status, corrected, simulate_table
 from boulder_kernels.rules import AGREEING, FIRST_FACTOR, SLOWER_SPEEDS
 from boulder_sweep.columns import OUTCOME_COLUMNS, REASONS, VERDICTS
 from boulder_sweep.crash_tests.cases import crash_test
@@ -25,7 +25,7 @@ from boulder_sweep.judge.accuracy import (
     finer_controls,
     reported_step_s,
 )
-from boulder_sweep.judge.evaluation import Evaluation, by_kernels, evaluation_of
+from boulder_sweep.judge.evaluation import Evaluation, evaluation_of
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import ERROR, FAIL, NUMERICAL_ERROR, PASS, UNDECIDED
 from boulder_sweep.judge.verdict import Limits
@@ -35,7 +35,7 @@ CONTROL = Control(0.012, 1.0, math.radians(20.0), 0, True, longest_horizon=10.0)
 LIMITS = Limits(CONTROL.theta_limit, "P1")
 
 
-def evaluation(control: Control = CONTROL, limits: Limits = LIMITS, simulate=by_kernels) -> Evaluation:
+def evaluation(control: Control = CONTROL, limits: Limits = LIMITS, simulate=simulate_table) -> Evaluation:
     return Evaluation(corrected(), control, limits, simulate)
 
 
@@ -60,7 +60,7 @@ def test_steps_get_shorter_down_to_the_budget() -> None:
 
 def test_a_design_that_is_too_stiff_for_its_steps_is_decided_by_finer_ones() -> None:
     stiff = plain_designs(beta=1e6)
-    once = by_kernels(stiff.table, corrected(), CONTROL)
+    once = simulate_table(stiff.table, corrected(), CONTROL)
     assert once.status[0] == Status.STIFF_SOIL
     row = evaluation().judged(stiff).row(0)
     assert row["verdict"] in ("pass", "fail")
@@ -77,7 +77,7 @@ def test_a_row_says_by_which_step_it_was_decided() -> None:
 
 def test_a_limit_within_the_error_of_the_peak_is_decided_by_finer_steps() -> None:
     standing = designs_of(crash_test("rwg").block(0, 1))
-    coarse = by_kernels(standing.table, corrected(), CONTROL)
+    coarse = simulate_table(standing.table, corrected(), CONTROL)
     assert coarse.status[0] == Status.SETTLED
     limit = float(coarse.theta_max[0] + 0.3 * coarse.theta_error[0])
     control = CONTROL._replace(theta_limit=limit)
@@ -90,7 +90,7 @@ def test_an_unconfirmed_row_within_its_error_of_a_limit_stays_undecided() -> Non
     """As by `fast` and a given step; the row of a confirmed accuracy is decided, see above."""
     standing = designs_of(crash_test("rwg").block(0, 1))
     once = CONTROL._replace(error_estimate=False)
-    found = by_kernels(standing.table, corrected(), once)
+    found = simulate_table(standing.table, corrected(), once)
     limit = float(found.theta_max[0] + 0.3 * found.theta_error[0])
     row = evaluation(once._replace(theta_limit=limit), Limits(limit, "P1")).judged(standing).row(0)
     assert (row["verdict"], row["reason"]) == ("undecided", "error")
@@ -120,7 +120,7 @@ def test_a_row_is_the_same_whatever_stands_beside_it() -> None:
 def test_a_damper_that_is_too_weak_for_its_spring_is_decided_all_the_same() -> None:
     """Nothing holds the truck up: it drives on over the boulder, far beyond its rating."""
     weak = plain_designs(c_v=0.1)
-    assert by_kernels(weak.table, corrected(), CONTROL).status[0] == Status.WEAK_DAMPER
+    assert simulate_table(weak.table, corrected(), CONTROL).status[0] == Status.WEAK_DAMPER
     row = evaluation().judged(weak).row(0)
     assert (row["verdict"], row["reason"]) == ("fail", "penetration")
     assert row["max_vehicle_displacement_m"] == pytest.approx(weak.table.v_0[0] * row["end_time_s"], rel=1e-3)
@@ -139,7 +139,7 @@ def test_only_open_rows_are_simulated_again() -> None:
 
     def watched(table, readings, control) -> OutcomeTable:
         sizes.append(table.L.size)
-        return by_kernels(table, readings, control)
+        return simulate_table(table, readings, control)
 
     rows = evaluation(simulate=watched).judged(mixed())
     assert sizes[:2] == [8, 3]
@@ -204,7 +204,7 @@ def stand_in(ends: dict[int, tuple[Status, float]], asked: list[float], ways: di
         asked.append(control.h)
         level = len(asked) - 1
         status, theta = ends.get(level, ends[max(ends)])
-        out = by_kernels(table, readings, control._replace(h=0.001, horizon=0.01, longest_horizon=0.0))
+        out = simulate_table(table, readings, control._replace(h=0.001, horizon=0.01, longest_horizon=0.0))
         n = len(table.L)
         at_limit = status == Status.LIMIT
         return out._replace(

@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import boulder_sweep
-from boulder_kernels import SIMULATED, Control, OutcomeTable, Status, as_printed, corrected, rules
+from boulder_kernels import SIMULATED, Control, OutcomeTable, Status, as_printed, corrected, rules, simulate_table
 from boulder_sweep.columns import OUTCOME_COLUMNS, RATINGS, REASONS, VERDICTS
 from boulder_sweep.crash_tests.cases import crash_test
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge import validity
-from boulder_sweep.judge.evaluation import Evaluation, by_kernels
+from boulder_sweep.judge.evaluation import Evaluation
 from boulder_sweep.judge.inputs import Designs, designs_of
 from boulder_sweep.judge.judged import CHANGES_SIDE, HORIZON, PASS, UNDECIDED, Judged, joined
 from boulder_sweep.judge.validity import FLAGS, TESTED_ROTATION_DEG, flag_counts, has_odd_layers, meanings
@@ -400,7 +400,7 @@ def test_as_printed_nothing_passes_and_what_stands_is_undecided() -> None:
 
 def test_a_boulder_that_does_not_turn_states_no_error_of_degrees() -> None:
     """However small it is, so that an error of the truck over its size would be an angle of many degrees."""
-    found = by_kernels(box_designs(1500, 3).table, corrected(), CONTROL)
+    found = simulate_table(box_designs(1500, 3).table, corrected(), CONTROL)
     still = np.isfinite(found.theta_max) & (found.theta_max < 1e-6)
     assert np.count_nonzero(still) > 20
     assert np.degrees(np.max(found.theta_error[still])) < 0.1

@@ -9,14 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import boulder_sweep
-from boulder_kernels import DesignTable
+from boulder_kernels import DesignTable, simulate_table
 from boulder_kernels.design import body_of_outline, design_at
 from boulder_sweep.columns import SHAPES, VERDICTS
 from boulder_sweep.designs import some
 from boulder_sweep.impact.recomputing import recompute
 from boulder_sweep.impact.simulation import simulate
 from boulder_sweep.judge.accuracy import accuracy_of
-from boulder_sweep.judge.evaluation import PLAIN_DESIGN, Evaluation, by_kernels, evaluation_of
+from boulder_sweep.judge.evaluation import PLAIN_DESIGN, Evaluation, evaluation_of
 from boulder_sweep.settings import Sweep, load_text
 from boulder_sweep.settings.model import Ground, ProfilePoint, Shape
 from boulder_sweep.settings.problems import SettingsError
@@ -119,7 +119,7 @@ def test_judging_ends_at_the_first_shape_in_which_a_stone_fails():
 
     def counted(table, readings, control):
         simulated.append(len(table.d))
-        return by_kernels(table, readings, control)
+        return simulate_table(table, readings, control)
 
     rows = replace(evaluation(sweep), simulate=counted, against_slower=False)(sweep.block(0, 2))
     assert [VERDICTS[code] for code in rows.verdict] == ["fail", "pass"]
