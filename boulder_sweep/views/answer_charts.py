@@ -45,6 +45,7 @@ from boulder_sweep.views.wording import (
     sized,
     terms_line,
     value_text,
+    with_unit,
 )
 
 if TYPE_CHECKING:
@@ -85,15 +86,21 @@ def draw_design_chart(need: Need, path: str | Path, *, units: str = "si") -> Non
     with figure(path, 7.2, 4.8) as fig:
         axes = fig.subplots()
         passing = frame if over is None else frame[frame[over].isin(frame[over][frame[need.key.answer].notna()])]
-        for words, rows, style in _styled(passing, over, sets, units):
+        for words, rows, style in _curves(passing, over, sets, units):
             if len(rows):
                 _curve(axes, need, rows.sort_values(across), across, style, words, units)
         _across(axes, frame, across, units)
-        axes.set_ylabel(_answer_label(need, units))
+        axes.set_ylabel(with_unit(_words(need), sized(need.key.field.unit, units)[0]))
         _mark(axes, need, across, held, units)
         axes.legend(loc="best")
         headline(fig, f"{need.sweep.name}: {_title(need)}")
-        caption(fig, "\n".join([*advice(need, units)[:1], _caption(need, held, units)]))
+        parts = [
+            f"{name}: {one}" if isinstance(one, str) else value_text(name, one, units) for name, one in held.items()
+        ]
+        if need.least_margin:
+            parts.append(f"margin {need.least_margin:.0%} or more")
+        parts.append("hollow: passes in the whole range searched; no point: nothing passes")
+        caption(fig, "\n".join([*advice(need, units)[:1], "; ".join(parts)]))
 
 
 def draw_answers(answers: Reserves | Uncertainty, path: str | Path, *, units: str = "si") -> None:
@@ -114,7 +121,7 @@ def draw_answers(answers: Reserves | Uncertainty, path: str | Path, *, units: st
         panels = fig.subplots(1, len(names), squeeze=False)[0]
         for axes, (name, (words, unit)) in zip(panels, names.items(), strict=True):
             printed, size = sized(unit, units)
-            for curve, rows, (colour, dashes) in _styled(frame, over, sets, units):
+            for curve, rows, (colour, dashes) in _curves(frame, over, sets, units):
                 rows = rows.sort_values(across)
                 x = rows[across].to_numpy(dtype=float) / size_of(across, units)
                 line = {"color": colour, "linestyle": "" if listed else dashes, "markersize": 4}
@@ -124,7 +131,7 @@ def draw_answers(answers: Reserves | Uncertainty, path: str | Path, *, units: st
             _across(axes, frame, across, units)
             if listed:
                 axes.set_xlabel("design")
-            axes.set_ylabel(f"{words} [{printed}]" if printed else words)
+            axes.set_ylabel(with_unit(words, printed))
         if over is not None:
             panels[0].legend(loc="best")
         headline(fig, f"{answers.sweep.name}: {what}")
@@ -175,30 +182,22 @@ def _across(axes: Axes, frame: pd.DataFrame, across: str, units: str) -> None:
     axes.set_xlabel(label(across, units))
 
 
-def _styled(
-    frame: pd.DataFrame, over: str | None, sets: Mapping[str, Sequence[str]], units: str
-) -> Iterator[tuple[str, pd.DataFrame, tuple[str, Any]]]:
-    """Yield the words, the rows, and colour and dashes of each curve."""
-    for index, (words, rows) in enumerate(_curves(frame, over, sets, units)):
-        dashes = DASHES[index // len(COLOURS) % len(DASHES)]
-        yield words, rows, (COLOURS[index % len(COLOURS)], dashes)
-
-
 def _curves(
     frame: pd.DataFrame, over: str | None, sets: Mapping[str, Sequence[str]], units: str
-) -> Iterator[tuple[str, pd.DataFrame]]:
-    """Yield the words and the rows of each curve: of every named set, or of some values of an input."""
+) -> Iterator[tuple[str, pd.DataFrame, tuple[str, Any]]]:
+    """Yield words, rows, and colour and dashes of each curve: of every named set, or of some values of an input."""
     if over is None:
-        yield "", frame
+        curves = [("", frame)]
     elif over in sets:
-        for name in sets[over]:
-            yield name, frame[frame[over].astype(str) == name]
+        curves = [(name, frame[frame[over].astype(str) == name]) for name in sets[over]]
     else:
-        values = sorted(frame[over].astype(float).unique())
+        levels = frame[over].astype(float)
+        values = np.unique(levels)
         if len(values) > len(COLOURS):
-            values = [values[index] for index in np.linspace(0, len(values) - 1, len(COLOURS)).round().astype(int)]
-        for value in values:
-            yield value_text(over, value, units), frame[frame[over].astype(float) == value]
+            values = values[np.linspace(0, len(values) - 1, len(COLOURS)).round().astype(int)]
+        curves = [(value_text(over, value, units), frame[levels == value]) for value in values]
+    for index, (words, rows) in enumerate(curves):
+        yield words, rows, (COLOURS[index % len(COLOURS)], DASHES[index // len(COLOURS) % len(DASHES)])
 
 
 def _curve(
@@ -221,7 +220,7 @@ def _mark(axes: Axes, need: Need, across: str, held: Mapping[str, float | str], 
     design = None if found is None else found.design
     if design is None or across not in design.sizes:
         return
-    if any(name in design.sizes and design.sizes[name] != value for name, value in held.items()):
+    if any(design.sizes.get(name, value) != value for name, value in held.items()):
         return
     value = design.rows[0].get(need.key.name, design.sizes.get(need.key.name))
     if value is not None:
@@ -238,22 +237,6 @@ def _title(need: Need) -> str:
 def _words(need: Need) -> str:
     name = need.key.name
     return name_of(name) if name in COLUMNS else name.rpartition("_")[0].replace("_", " ")
-
-
-def _answer_label(need: Need, units: str) -> str:
-    unit = sized(need.key.field.unit, units)[0]
-    return f"{_words(need)} [{unit}]" if unit else _words(need)
-
-
-def _caption(need: Need, held: Mapping[str, float | str], units: str) -> str:
-    """What else holds, and how to read the signs."""
-    parts = [
-        f"{name}: {value}" if isinstance(value, str) else value_text(name, value, units) for name, value in held.items()
-    ]
-    if need.least_margin:
-        parts.append(f"margin {need.least_margin:.0%} or more")
-    parts.append("hollow: passes in the whole range searched; no point: nothing passes")
-    return "; ".join(parts)
 
 
 def draw_uncertainty(result: Uncertainty, path: str | Path, *, design_id: int = 0, units: str = "si") -> None:
