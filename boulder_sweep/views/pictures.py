@@ -58,7 +58,7 @@ STYLE: Any = {
     "savefig.facecolor": "white",
     "svg.hashsalt": "boulder-sweep",
 }
-KINDS = (".png", ".svg", ".pdf")
+KINDS, ANIMATED = (".png", ".svg", ".pdf"), (".gif",)
 MARGIN = 0.01
 """Beside titles and captions, as a share of the width."""
 

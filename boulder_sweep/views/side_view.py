@@ -363,7 +363,6 @@ def draw(axes: Axes, shapes: Iterable[SceneItem], *, behind: bool = False) -> li
     return artists
 
 
-KINDS = (".gif",)
 EVERY_S = 0.005
 """Time between two frames [s]."""
 MOST_FRAMES = 120
@@ -380,7 +379,7 @@ SWATCH = 40
 
 def animate(trajectory: Trajectory, path: str | Path, progress: ProgressCallback | None = None) -> None:
     """Animate the side view (.gif); `progress` is called with how many frames of how many are drawn."""
-    target = pictures.checked_kind(path, KINDS)
+    target = pictures.checked_kind(path, pictures.ANIMATED)
     require_samples(trajectory)
     try:
         with replacing(target) as file:
