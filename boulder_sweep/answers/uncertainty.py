@@ -12,15 +12,7 @@ import numpy as np
 from boulder_sweep.answers.chance import FIRST, SCRAMBLINGS, Chances, Estimates, Event, Points, chance
 from boulder_sweep.answers.draws import Draws
 from boulder_sweep.answers.keys import margin_asked, share
-from boulder_sweep.answers.result import (
-    Result,
-    TableColumn,
-    chance_columns,
-    collected,
-    joined_tables,
-    rows_table,
-    write_parquet,
-)
+from boulder_sweep.answers.result import Result, chance_columns, collected, joined_tables, rows_table, write_parquet
 from boulder_sweep.answers.spread import Spread
 from boulder_sweep.answers.trials import Judges, judges_of, ranges, uncertain_rows, ungraded
 from boulder_sweep.designs import block_of
@@ -157,14 +149,8 @@ def uncertainty(
     parts = (_rows(asked, points, threads, start, stop) for start, stop in pieces)
     tables = collected(parts, sweep.n_designs, progress)
     samples = _sample_table(asked, points, threads, sweep.n_designs if sweep.n_designs <= MOST_SAMPLED else 0)
-    question = {
-        "asked": "p_pass",
-        "half_width": width,
-        "confidence": sure,
-        "margin": least_margin,
-        "seed": seed,
-        "most": most,
-    }
+    question = {"asked": "p_pass", "half_width": width, "confidence": sure, "margin": least_margin}
+    question |= {"seed": seed, "most": most}
     table = joined_tables(tables, sweep, asked.judges, "boulder_sweep.uncertainty", question)
     return Uncertainty(sweep, table, samples, seed)
 
@@ -217,10 +203,10 @@ def _rows(asked: _Arguments, points: Points, parallel: Pool, start: int, stop: i
     driver = drivers(z, first[0])
     block = replace(block_of(draws.rows), labels=asked.sweep.block(start, stop).labels)
     judged = ungraded(asked.judges.final(block))
-    driver_meaning = "most influential of the uncertain inputs; null where they change nothing"
-    columns: list[TableColumn] = [
+    meaning = "most influential of the uncertain inputs; null where they change nothing"
+    columns = [
         *chance_columns(Chances(sampled, graded)),
-        ("p_pass_driver", "", driver_meaning, word_array(driver, tuple(asked.spread.words))),
+        ("p_pass_driver", "", meaning, word_array(driver, tuple(asked.spread.words))),
         ("p_pass_designs", "1", "designs drawn for p_pass", sampled.points),
     ]
     return rows_table(start, block, judged, columns)
@@ -229,21 +215,12 @@ def _rows(asked: _Arguments, points: Points, parallel: Pool, start: int, stop: i
 def drivers(z: np.ndarray, output: np.ndarray) -> np.ndarray:
     """Return the most influential input of each row; -1 where the output does not vary, int64, shape (n,).
 
-    The means of the output are compared over strata of each input.
-
-    Parameters
-    ----------
-    z
-        Standard normal numbers, shape (m, d), the same for all rows.
-    output
-        An output at these points, shape (n, m).
+    The means of the output, shape (n, m), are compared over strata of each input, by standard normals, shape (m, d).
     """
     shares = np.empty((len(output), z.shape[1]))
     for k in range(z.shape[1]):
-        order = np.argsort(z[:, k], kind="stable")
-        strata = np.array_split(order, STRATA)
-        means = np.stack([output[:, stratum].mean(axis=1) for stratum in strata], axis=1)
-        shares[:, k] = means.var(axis=1)
+        strata = np.array_split(np.argsort(z[:, k], kind="stable"), STRATA)
+        shares[:, k] = np.var([output[:, stratum].mean(axis=1) for stratum in strata], axis=0)
     return np.where(output.var(axis=1) > 0.0, shares.argmax(axis=1), -1)
 
 
@@ -256,4 +233,4 @@ def _sample_table(asked: _Arguments, points: Points, parallel: Pool, rows: int) 
     z = np.tile(points.upto(SAMPLES // SCRAMBLINGS).reshape(SAMPLES, -1), (rows, 1))
     given = draws.given(index, z, {})
     inputs = {name: given[name] for name in asked.spread.names}
-    return pa.table({"design_id": index, **inputs, "distance": draws.distance(index, z)})
+    return pa.table({"design_id": index, **inputs, "distance": draws.drawn(index, z)[0]})
