@@ -43,16 +43,7 @@ Examples:
   sweep need configs/site.yaml --most speed --between '5 m/s' '40 m/s'
 """
 REPEATED = (
-    "units",
-    "least",
-    "most",
-    "margin",
-    "probability",
-    "between",
-    "robust",
-    "second_opinion",
-    "prefer",
-    "at",
+    *("units", "least", "most", "margin", "probability", "between", "robust", "second_opinion", "prefer", "at"),
     "overrides",
 )
 """Parameters of `need` that decide the answer, which a further question repeats where they were given."""

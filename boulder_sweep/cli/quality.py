@@ -45,12 +45,7 @@ Examples:
 @grid_argument
 @click.option("-o", "--output", "out", type=OUTPUT, metavar="DIR", help="Folder for table and picture.")
 @click.option(
-    "--designs",
-    type=click.IntRange(min=1),
-    default=4096,
-    show_default=True,
-    metavar="N",
-    help="Size of the sample.",
+    "--designs", type=click.IntRange(min=1), default=4096, show_default=True, metavar="N", help="Size of the sample."
 )
 @click.option(
     "--seconds",

@@ -20,21 +20,8 @@ from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.errors import PictureError
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.text import chance_text
-from boulder_sweep.views.pictures import (
-    AMBER,
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    LIGHT_GREY,
-    ORANGE,
-    PALE_ORANGE,
-    PURPLE,
-    SKY,
-    caption,
-    figure,
-    headline,
-)
+from boulder_sweep.views import pictures
+from boulder_sweep.views.pictures import AMBER, BLACK, BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, PALE_ORANGE, PURPLE, SKY
 from boulder_sweep.views.wording import (
     RATIO,
     USUAL,
@@ -83,7 +70,7 @@ def draw_design_chart(need: Need, path: str | Path, *, units: str = "si") -> Non
     frame, sets, across, over, held = _shown(need.sweep, need.frame, (need.key.name, *need.derived))
     if frame[need.key.answer].isna().all():
         raise PictureError("there is nothing to draw: nothing passes in the range that was searched")
-    with figure(path, 7.2, 4.8) as fig:
+    with pictures.figure(path, 7.2, 4.8) as fig:
         axes = fig.subplots()
         passing = frame if over is None else frame[frame[over].isin(frame[over][frame[need.key.answer].notna()])]
         for words, rows, style in _curves(passing, over, sets, units):
@@ -93,14 +80,14 @@ def draw_design_chart(need: Need, path: str | Path, *, units: str = "si") -> Non
         axes.set_ylabel(with_unit(_words(need), sized(need.key.field.unit, units)[0]))
         _mark(axes, need, across, held, units)
         axes.legend(loc="best")
-        headline(fig, f"{need.sweep.name}: {_title(need)}")
+        pictures.headline(fig, f"{need.sweep.name}: {_title(need)}")
         parts = [
             f"{name}: {one}" if isinstance(one, str) else value_text(name, one, units) for name, one in held.items()
         ]
         if need.least_margin:
             parts.append(f"margin {need.least_margin:.0%} or more")
         parts.append("hollow: passes in the whole range searched; no point: nothing passes")
-        caption(fig, "\n".join([*advice(need, units)[:1], "; ".join(parts)]))
+        pictures.caption(fig, "\n".join([*advice(need, units)[:1], "; ".join(parts)]))
 
 
 def draw_answers(answers: Reserves | Uncertainty, path: str | Path, *, units: str = "si") -> None:
@@ -117,7 +104,7 @@ def draw_answers(answers: Reserves | Uncertainty, path: str | Path, *, units: st
         ChartRows(answers.frame, {}, "design_id", None, {}) if listed else _shown(answers.sweep, answers.frame, derived)
     )
     frame, sets, across, over, held = shown
-    with figure(path, 3.4 * len(names) + 1.6 * (len(names) == 1), 4.0) as fig:
+    with pictures.figure(path, 3.4 * len(names) + 1.6 * (len(names) == 1), 4.0) as fig:
         panels = fig.subplots(1, len(names), squeeze=False)[0]
         for axes, (name, (words, unit)) in zip(panels, names.items(), strict=True):
             printed, size = sized(unit, units)
@@ -134,10 +121,10 @@ def draw_answers(answers: Reserves | Uncertainty, path: str | Path, *, units: st
             axes.set_ylabel(with_unit(words, printed))
         if over is not None:
             panels[0].legend(loc="best")
-        headline(fig, f"{answers.sweep.name}: {what}")
+        pictures.headline(fig, f"{answers.sweep.name}: {what}")
         parts = [one if isinstance(one, str) else value_text(name, one, units) for name, one in held.items()]
         none = "no point: passes at no value tried" if len(names) > 1 else "band: interval of the probability"
-        caption(fig, "; ".join([*parts, none]) + f"\n{terms_line(answers.sweep.resolved())}")
+        pictures.caption(fig, "; ".join([*parts, none]) + f"\n{terms_line(answers.sweep.resolved())}")
 
 
 class ChartRows(NamedTuple):
@@ -249,14 +236,14 @@ def draw_uncertainty(result: Uncertainty, path: str | Path, *, design_id: int = 
     names = [name for name in samples.columns if name not in ("design_id", "distance")]
     changes = {name: _by_fifths(samples, name) for name in names}
     order = sorted(names, key=lambda name: float(np.ptp(changes[name])), reverse=True)
-    with figure(path, 9.6, 4.9) as fig:
+    with pictures.figure(path, 9.6, 4.9) as fig:
         left, right = fig.subplots(1, 2, width_ratios=(1.1, 1.0))
         _scatter(left, samples, order, units)
         _tornado(right, changes, order, row["p_pass"])
         name = result.sweep.name if len(result) == 1 else f"{result.sweep.name} #{design_id}"
         chance, low, high = (chance_text(row[key]) for key in ("p_pass", "p_pass_low", "p_pass_high"))
-        headline(fig, f"{name}: P(pass) = {chance} ({low} to {high})")
-        caption(fig, _design_caption(result, row, names, units))
+        pictures.headline(fig, f"{name}: P(pass) = {chance} ({low} to {high})")
+        pictures.caption(fig, _design_caption(result, row, names, units))
 
 
 def _design_caption(result: Uncertainty, row: Mapping[str, Any], uncertain: Sequence[str], units: str) -> str:
