@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -139,16 +140,15 @@ def uncertainty(
     spread, graded = Spread(sweep), can_be_asked(sweep) and bool(sweep.model.second_opinion)
     sweep.need_depth()
     judges = judges_of(sweep, least_margin, robust=graded)
-    asked = _Arguments(sweep, spread, judges.of_any_pass(), judges if graded else None, width, sure, most)
+    points = Points(len(spread.names), seed)
+    sampled = partial(chance, points=points, half_width=width, confidence=sure, most=most)
+    asked = _Asked(sweep, spread, judges.of_any_pass(), judges if graded else None, points, sampled, Pool(jobs))
     if ready is not None:
         ready()
     judges.final.asked().warm_up()
-    points = Points(len(asked.spread.names), seed)
-    threads = Pool(jobs)
-    pieces = ranges(sweep.n_designs, ROWS_AT_ONCE)
-    parts = (_rows(asked, points, threads, start, stop) for start, stop in pieces)
+    parts = (_rows(asked, start, stop) for start, stop in ranges(sweep.n_designs, ROWS_AT_ONCE))
     tables = collected(parts, sweep.n_designs, progress)
-    samples = _sample_table(asked, points, threads, sweep.n_designs if sweep.n_designs <= MOST_SAMPLED else 0)
+    samples = _sample_table(asked, sweep.n_designs if sweep.n_designs <= MOST_SAMPLED else 0)
     question = {"asked": "p_pass", "half_width": width, "confidence": sure, "margin": least_margin}
     question |= {"seed": seed, "most": most}
     table = joined_tables(tables, sweep, asked.judges, "boulder_sweep.uncertainty", question)
@@ -156,34 +156,30 @@ def uncertainty(
 
 
 @dataclass(frozen=True, eq=False)
-class _Arguments:
-    """The arguments of `uncertainty`."""
+class _Asked:
+    """What is asked of every row of a sweep."""
 
     sweep: Sweep
     spread: Spread
     judges: Judges
     robust: Judges | None
     """Judges that count only robust passes; None where second opinions are not asked."""
-    half_width: float
-    confidence: float
-    most: int
+    points: Points
+    sampled: Callable[[Event, int], Estimates]
+    """Returns the probabilities of an event in so many rows."""
+    parallel: Pool
 
-    def sampled(self, event: Event, rows: int, points: Points) -> Estimates:
-        """Return the probabilities of an event."""
-        return chance(event, rows, points, half_width=self.half_width, confidence=self.confidence, most=self.most)
-
-    def draws(self, start: int, stop: int, parallel: Pool) -> Draws:
+    def draws(self, start: int, stop: int) -> Draws:
         """Return what samples the designs of the rows ``[start, stop)``."""
         rows = uncertain_rows(self.sweep, self.sweep.plan.given_rows(start, stop), start, stop)
-        return Draws(rows, self.spread, self.judges, parallel)
+        return Draws(rows, self.spread, self.judges, self.parallel)
 
 
-def _rows(asked: _Arguments, points: Points, parallel: Pool, start: int, stop: int) -> pa.Table:
+def _rows(asked: _Asked, start: int, stop: int) -> pa.Table:
     """Return the table of the rows ``[start, stop)``: inputs, outcome at the means, probability, main input."""
     from boulder_sweep.store.part import word_array
 
-    draws = asked.draws(start, stop, parallel)
-    n = stop - start
+    draws, n = asked.draws(start, stop), stop - start
     first: list[np.ndarray] = []
 
     def event(index: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -192,15 +188,11 @@ def _rows(asked: _Arguments, points: Points, parallel: Pool, start: int, stop: i
             first.append(distance.reshape(n, -1))
         return known
 
-    def stands(index: np.ndarray, z: np.ndarray) -> np.ndarray:
-        return robust.drawn(index, z)[1]
-
-    sampled, graded = asked.sampled(event, n, points), None
+    sampled, graded = asked.sampled(event, n), None
     if asked.robust is not None:
         robust = replace(draws, judges=asked.robust)
-        graded = asked.sampled(stands, n, points)
-    z = points.upto(FIRST).reshape(FIRST * SCRAMBLINGS, -1)
-    driver = drivers(z, first[0])
+        graded = asked.sampled(lambda index, z: robust.drawn(index, z)[1], n)
+    driver = drivers(asked.points.upto(FIRST).reshape(FIRST * SCRAMBLINGS, -1), first[0])
     block = replace(block_of(draws.rows), labels=asked.sweep.block(start, stop).labels)
     judged = ungraded(asked.judges.final(block))
     meaning = "most influential of the uncertain inputs; null where they change nothing"
@@ -224,13 +216,13 @@ def drivers(z: np.ndarray, output: np.ndarray) -> np.ndarray:
     return np.where(output.var(axis=1) > 0.0, shares.argmax(axis=1), -1)
 
 
-def _sample_table(asked: _Arguments, points: Points, parallel: Pool, rows: int) -> pa.Table:
+def _sample_table(asked: _Asked, rows: int) -> pa.Table:
     """Return samples of the first rows as a table: number of the design, uncertain inputs, distance from failing."""
     import pyarrow as pa
 
-    draws = asked.draws(0, rows, parallel)
+    draws = asked.draws(0, rows)
     index = np.repeat(np.arange(rows), SAMPLES)
-    z = np.tile(points.upto(SAMPLES // SCRAMBLINGS).reshape(SAMPLES, -1), (rows, 1))
+    z = np.tile(asked.points.upto(SAMPLES // SCRAMBLINGS).reshape(SAMPLES, -1), (rows, 1))
     given = draws.given(index, z, {})
     inputs = {name: given[name] for name in asked.spread.names}
     return pa.table({"design_id": index, **inputs, "distance": draws.drawn(index, z)[0]})
