@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import click
@@ -23,7 +24,6 @@ from boulder_sweep.cli.options import (
     refuse_units_of_json,
     refuse_unwritable,
     say_notes,
-    say_percents,
     second_opinion_option,
     set_option,
     units_option,
@@ -130,13 +130,10 @@ def need(
         sweep = at_values(sweep, at)
     refuse_unwritable(out, picture)
 
-    def say_how() -> None:
-        if not quiet:
-            say_notes(sweep, units)
-            say_percents(margin=question["margin"], probability=question["probability"])
-
+    shares = {name: question[name] for name in ("margin", "probability")}
+    say_how = partial(say_notes, sweep, units, **shares)
     with working(quiet, of="designs" if question["probability"] is None else "values") as progress:
-        result = answer(sweep, **question, jobs=jobs, progress=progress, ready=say_how)
+        result = answer(sweep, **question, jobs=jobs, progress=progress, ready=None if quiet else say_how)
     if as_json:
         show(json.dumps(result.to_dict()))
     else:
@@ -222,13 +219,10 @@ def uncertainty(
     refuse_missing(sweep, grid, design)
     refuse_unwritable(out, picture)
 
-    def say_how() -> None:
-        if not quiet:
-            say_notes(sweep, units)
-            say_percents(**{name: question[name] for name in ("margin", "confidence", "half_width")})
-
+    shares = {name: question[name] for name in ("margin", "confidence", "half_width")}
+    say_how = partial(say_notes, sweep, units, **shares)
     with working(quiet) as progress:
-        result = estimate(sweep, **question, progress=progress, ready=say_how)
+        result = estimate(sweep, **question, progress=progress, ready=None if quiet else say_how)
     show(*([json.dumps(result.to_dict())] if as_json else uncertainty_lines(result, units=units)))
     if not quiet:
         drawn = sum(result.arrow["p_pass_designs"].to_pylist())

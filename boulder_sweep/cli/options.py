@@ -119,10 +119,11 @@ def load_given(path: str, overrides: Sequence[str], at: str | None = None) -> Sw
     return at_values(sweep, at)
 
 
-def say_notes(sweep: Sweep, units: str | None = None) -> None:
+def say_notes(sweep: Sweep, units: str | None = None, **shares: str | None) -> None:
     """Print the notes on settings, how inputs follow from the data of a site, and which values uncertain inputs have.
 
-    They are in the units of the file where none are asked for.
+    They are in the units of the file where none are asked for. Of options that are shares, it is said where a bare
+    number above 1 is read as per cent; those that are no numbers are refused later.
     """
     from boulder_sweep.judge.quantiles import words_of
     from boulder_sweep.settings.sweep import derived_words
@@ -133,10 +134,6 @@ def say_notes(sweep: Sweep, units: str | None = None) -> None:
         say(f"note: {note}")
     if sweep.taken_at:
         say("\n".join(wrap(f"note: {words_of(sweep, units or sweep.units)}")))
-
-
-def say_percents(**shares: str | None) -> None:
-    """Say of which options a bare number above 1 is read as per cent; those that are no numbers are refused later."""
     for name, text in shares.items():
         with suppress(ValueError):
             if text is not None and float(text) > 1.0:
