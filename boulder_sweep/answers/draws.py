@@ -41,18 +41,9 @@ class Draws:
     def drawn(self, index: np.ndarray, z: np.ndarray, **inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the distances of designs from failing and what is known of each, int64, shape (m,).
 
-        If a design stands, the distance is its margin beyond the requested one; if it overturns, it is negative, the
-        earlier, the more. Known is 1 where it passes, 0 where it does not, and minus the code of its reason where it
-        is undecided.
-
-        Parameters
-        ----------
-        index
-            Row of each design, shape (m,).
-        z
-            Standard normal numbers, shape (m, d).
-        **inputs
-            Inputs to set, shape (m,) each.
+        Each is of a row, shape (m,), by standard normals, shape (m, d), with some inputs set, shape (m,) each. If it
+        stands, its distance is its margin beyond the requested one; if it overturns, the earlier, the more negative.
+        Known is 1 where it passes, 0 where it does not, and minus the code of its reason where it is undecided.
         """
         parts = [slice(at, at + AT_ONCE) for at in range(0, len(index), AT_ONCE)]
         calls = (call(self._piece, index[part], z[part], rows_at(inputs, part)) for part in parts)

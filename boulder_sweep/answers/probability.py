@@ -82,10 +82,7 @@ class Sampling:
 class ProbabilityQuestion(Question):
     """The smallest, or the largest, value of one input that passes with a given probability, when others are uncertain.
 
-    Raises
-    ------
-    QuestionError
-        `Question` refuses, no input has a distribution, or the one that is asked for has.
+    A `QuestionError` refuses what `Question` does, no input with a distribution, or one that is asked for.
     """
 
     rows_at_once = 4

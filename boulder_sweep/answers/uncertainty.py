@@ -142,7 +142,7 @@ def uncertainty(
     judges = judges_of(sweep, least_margin, robust=graded)
     points = Points(len(spread.names), seed)
     sampled = partial(chance, points=points, half_width=width, confidence=sure, most=most)
-    asked = _Asked(sweep, spread, judges.of_any_pass(), judges if graded else None, points, sampled, Pool(jobs))
+    asked = _Arguments(sweep, spread, judges.of_any_pass(), judges if graded else None, points, sampled, Pool(jobs))
     if ready is not None:
         ready()
     judges.final.asked().warm_up()
@@ -156,7 +156,7 @@ def uncertainty(
 
 
 @dataclass(frozen=True, eq=False)
-class _Asked:
+class _Arguments:
     """What is asked of every row of a sweep."""
 
     sweep: Sweep
@@ -175,7 +175,7 @@ class _Asked:
         return Draws(rows, self.spread, self.judges, self.parallel)
 
 
-def _rows(asked: _Asked, start: int, stop: int) -> pa.Table:
+def _rows(asked: _Arguments, start: int, stop: int) -> pa.Table:
     """Return the table of the rows ``[start, stop)``: inputs, outcome at the means, probability, main input."""
     from boulder_sweep.store.part import word_array
 
@@ -216,7 +216,7 @@ def drivers(z: np.ndarray, output: np.ndarray) -> np.ndarray:
     return np.where(output.var(axis=1) > 0.0, shares.argmax(axis=1), -1)
 
 
-def _sample_table(asked: _Asked, rows: int) -> pa.Table:
+def _sample_table(asked: _Arguments, rows: int) -> pa.Table:
     """Return samples of the first rows as a table: number of the design, uncertain inputs, distance from failing."""
     import pyarrow as pa
 

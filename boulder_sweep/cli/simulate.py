@@ -187,7 +187,7 @@ def _cautions(row: dict[str, Any], sweep: Sweep) -> list[str]:
     cautions = [f"caution: {words}" for words in meanings(row["validity"] or "")]
     cautions += ["docs/confidence.md has the bounds of all flags"] if cautions else []
     if row["verdict"] == "pass":
-        is_asked = sweep.model.second_opinion or not can_be_asked(sweep)  # as far as they can be
+        is_asked = sweep.model.second_opinion or not can_be_asked(sweep)
         grades = grade_lines([row]) if is_asked else ["open: not asked (--second-opinion asks)"]
         cautions = [*grades, *cautions, f"pass: {NOT_A_RATING}"]
     return [*cautions, *foot_lines(sweep.model, [row["reason"]])]

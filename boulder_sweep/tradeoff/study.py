@@ -128,10 +128,10 @@ class Tradeoff:
 
 
 def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS) -> Tradeoff:
-    """Measure speed against accuracy on a sample of so many designs of a sweep, which alone decides it and the errors.
+    """Measure speed against accuracy on a sample of a sweep's designs, on which alone sample and errors depend.
 
     Readings, criterion and horizon of the sweep count; both presets are measured anyway. No new measurement is started
-    after so many seconds. Refused by a `NothingToMeasureError` where no design of the sample can be computed.
+    after so many seconds. A `NothingToMeasureError` says that no design of the sample can be computed.
     """
     begun = time.monotonic()
     sweep = at_values(sweep)

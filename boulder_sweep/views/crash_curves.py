@@ -57,7 +57,7 @@ def write_validation(result: Validation, folder: Path) -> list[Path]:
 def draw_crash_test(
     test: str, trajectories: Mapping[str, Trajectory], path: Path, measured: TimeHistory | None = None
 ) -> None:
-    """Draw one test, ``abg``, ``rwg`` or another, by preset: the boulder's own centre, rotation, vehicle; and data."""
+    """Draw the boulder's own centre, rotation and vehicle of one test by preset, or what was measured and simulated."""
     names = [*SIGNALS][:3] if measured is None else [*measured.signals]
     with pictures.figure(path, 3.6 * len(names), 3.6) as fig:
         row = fig.subplots(1, len(names), squeeze=False)[0]

@@ -142,8 +142,9 @@ def plane(
     """Choose a plane of a table of designs: inputs on the axes, and `columns` and `rows` over small multiples.
 
     Inputs in `at` are held at the value nearest to the one given, others that vary at their middle one. `sets` has the
-    names of soils or vehicles by the column that holds them; each is drawn for itself, up to `MOST_SETS`. Refused by a
-    `PictureError` where an input is unknown, used twice or cannot be held, or fewer than two vary.
+    names of soils or vehicles by the column that holds them; each is drawn for itself, up to `MOST_SETS`. A
+    `PictureError` refuses an input that is unknown, used twice or cannot be held, and a table in which fewer than two
+    vary.
     """
     import pandas as pd  # heavy; most commands draw no map
 
