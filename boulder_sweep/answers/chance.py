@@ -74,7 +74,7 @@ class Estimates:
     low: np.ndarray
     high: np.ndarray
     points: np.ndarray
-    """Points used, int64."""
+    """How many points were used, int64."""
     unknown: np.ndarray
     """Share of the points at which it is not known whether the event occurs. The interval reaches from the lower end
     without them to the upper end with all of them."""
