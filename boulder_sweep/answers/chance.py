@@ -68,27 +68,18 @@ def _normal(engine: qmc.Sobol, count: int) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Estimates:
-    """Probabilities of n rows from sampled points.
-
-    Attributes
-    ----------
-    estimate, low, high : ndarray, shape (n,)
-        The probability and its confidence interval.
-    points : ndarray of int64, shape (n,)
-        Points used.
-    unknown : ndarray, shape (n,)
-        Share of the points at which it is not known whether the event occurs. The interval reaches from the lower end
-        without them to the upper end with all of them.
-    cause : ndarray of int64, shape (n,)
-        Number of the commonest cause of that; 0 where there is none.
-    """
+    """Probabilities of n rows from sampled points, with their confidence intervals; arrays of shape (n,)."""
 
     estimate: np.ndarray
     low: np.ndarray
     high: np.ndarray
     points: np.ndarray
+    """How many points were used, int64."""
     unknown: np.ndarray
+    """Share of the points at which it is not known whether the event occurs. The interval reaches from the lower end
+    without them to the upper end with all of them."""
     cause: np.ndarray
+    """Number of the commonest cause of that, int64; 0 where there is none."""
 
 
 class Chances(NamedTuple):
@@ -121,18 +112,10 @@ def chance(
 ) -> Estimates:
     """Estimate the probability of an event in n rows, which all use the same points so that they can be compared.
 
-    Parameters
-    ----------
-    event
-        Returns whether it occurs.
-    half_width
-        Largest half-width of the interval that is accepted; wider only where `most` points are not enough.
-    confidence
-        Confidence level of the interval.
-    most, first
-        Most points used for a row, and initial points of each scrambling.
+    The interval is wider than twice the half-width only where `most` points of a row are not enough; `first` are the
+    initial points of each scrambling.
     """
-    happened, possible = np.zeros((rows, SCRAMBLINGS)), np.zeros((rows, SCRAMBLINGS))
+    happened, possible = np.zeros((2, rows, SCRAMBLINGS))
     causes = np.zeros((rows, MOST_CAUSES), dtype=np.int64)
     count = np.zeros(rows, dtype=np.int64)
     open_ = np.arange(rows)
@@ -149,11 +132,9 @@ def chance(
             causes[open_, -code] += (occurred == code).sum(axis=(1, 2))
         count[open_] = target
         done = target
-        width = np.zeros(len(open_))
-        for counted in (happened, possible):
-            low, high = interval(counted[open_], target, sure)
-            width = np.maximum(width, high - low)
-        open_ = open_[width > 2.0 * half_width]
+        ends = (interval(counted[open_], target, sure) for counted in (happened, possible))
+        widths = [high - low for low, high in ends]
+        open_ = open_[np.maximum(*widths) > 2.0 * half_width]
         target = min(2 * target, max(most // SCRAMBLINGS, first))
     low, high = interval(happened, count, sure)[0], interval(possible, count, sure)[1]
     drawn = SCRAMBLINGS * count
@@ -161,19 +142,10 @@ def chance(
 
 
 def interval(happened: np.ndarray, count: np.ndarray | int, confidence: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the confidence interval (low, high) of a probability from several scramblings, shape (n,).
+    """Return the confidence interval (low, high) of a probability, shape (n,), as the module explains.
 
-    Parameters
-    ----------
-    happened
-        Number of occurrences, shape (n, SCRAMBLINGS).
-    count
-        Points of each scrambling, shape (n,) or one number.
-
-    Notes
-    -----
-    Student's t, Clopper and Pearson, and the share of a point as the module explains; with 16 scramblings and a
-    confidence of 95 % it is 0.17.
+    `happened` has the occurrences, shape (n, SCRAMBLINGS), `count` the points of each scrambling, shape (n,) or one
+    number. The share of a point is 0.17 with 16 scramblings and a confidence of 95 %.
     """
     count = np.broadcast_to(np.asarray(count), happened.shape[:1])
     shares = happened / count[:, None]

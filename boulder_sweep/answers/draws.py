@@ -30,44 +30,20 @@ FAST_OVERTURN_S = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Draws:
-    """Samples designs of some rows.
-
-    Parameters
-    ----------
-    rows
-        Inputs of n rows, with means for the uncertain ones.
-    """
+    """Samples designs of some rows."""
 
     rows: InputRows
+    """Inputs of n rows, with means for the uncertain ones."""
     spread: Spread
     judges: Judges
     parallel: Pool
 
-    def distance(self, index: np.ndarray, z: np.ndarray, **inputs: np.ndarray) -> np.ndarray:
-        """Return the distance of designs from failing, positive where they pass, shape (m,).
-
-        If a design stands, it is its margin beyond the requested one; if it overturns, the earlier, the more negative.
-
-        Parameters
-        ----------
-        index
-            Row of each design, shape (m,).
-        z
-            Standard normal numbers, shape (m, d).
-        **inputs
-            Inputs to set, shape (m,) each.
-        """
-        return self.drawn(index, z, **inputs)[0]
-
     def drawn(self, index: np.ndarray, z: np.ndarray, **inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the distances of designs and what is known of each; arguments: see `distance`.
+        """Return the distances of designs from failing and what is known of each, int64, shape (m,).
 
-        Returns
-        -------
-        distance : ndarray, shape (m,)
-            See `distance`.
-        known : ndarray of int64, shape (m,)
-            1 where the design passes, 0 where it does not, and minus the code of its reason where it is undecided.
+        Each is of a row, shape (m,), by standard normals, shape (m, d), with some inputs set, shape (m,) each. If it
+        stands, its distance is its margin beyond the requested one; if it overturns, the earlier, the more negative.
+        Known is 1 where it passes, 0 where it does not, and minus the code of its reason where it is undecided.
         """
         parts = [slice(at, at + AT_ONCE) for at in range(0, len(index), AT_ONCE)]
         calls = (call(self._piece, index[part], z[part], rows_at(inputs, part)) for part in parts)
@@ -97,7 +73,7 @@ class Draws:
 
 
 def _distance_of(judged: Judged, holds: np.ndarray, least_margin: float) -> np.ndarray:
-    """Return the distance of designs from failing; see `Draws.distance`."""
+    """Return the distance of designs from failing; see `Draws.drawn`."""
     margin, time = judged["margin"] - least_margin, judged["time_to_limit_s"]
     distance = np.where(np.isnan(margin), np.where(np.isnan(time), WORST, -FAST_OVERTURN_S / time), margin)
     # On a limit or undecided: neither counts as passing. An undecided row may have no margin.

@@ -10,22 +10,10 @@ import numpy as np
 from boulder_sweep.answers.chance import SCRAMBLINGS, Chances, Estimates, Points, chance
 from boulder_sweep.answers.draws import WORST, Draws
 from boulder_sweep.answers.keys import Ends, Key, range_of
-from boulder_sweep.answers.questions import (
-    CHECKED_AT_ONCE,
-    Question,
-    Trial,
-)
+from boulder_sweep.answers.questions import CHECKED_AT_ONCE, Question, Trial
 from boulder_sweep.answers.search import BEYOND, FAILS, HOLDS, Search
 from boulder_sweep.answers.spread import Spread
-from boulder_sweep.answers.trials import (
-    DEPTH,
-    InputRows,
-    Judges,
-    beyond_reach,
-    ranges,
-    rows_at,
-    ungraded,
-)
+from boulder_sweep.answers.trials import DEPTH, InputRows, Judges, beyond_reach, ranges, rows_at, ungraded
 from boulder_sweep.errors import QuestionError
 from boulder_sweep.judge.judged import OVERRIDE
 from boulder_sweep.runner.pool import Pool
@@ -94,10 +82,7 @@ class Sampling:
 class ProbabilityQuestion(Question):
     """The smallest, or the largest, value of one input that passes with a given probability, when others are uncertain.
 
-    Raises
-    ------
-    QuestionError
-        `Question` refuses, no input has a distribution, or the one that is asked for has.
+    A `QuestionError` refuses what `Question` does, no input with a distribution, or one that is asked for.
     """
 
     rows_at_once = 4

@@ -21,15 +21,10 @@ PAIR = ("friction_angle_deg", "subgrade_reaction_MN_m3")
 
 
 class Spread:
-    """The uncertain inputs of a sweep.
+    """The uncertain inputs of a sweep; a `QuestionError` where no input has a distribution.
 
     Friction angle and subgrade reaction are correlated by a Gaussian copula: the normal of the second is ``rho z_1 +
     sqrt(1 - rho^2) z_2``.
-
-    Raises
-    ------
-    QuestionError
-        No input has a distribution.
     """
 
     def __init__(self, sweep: Sweep) -> None:
@@ -52,15 +47,7 @@ class Spread:
         return [BY_NAME[name].path for name in self.names]
 
     def filled(self, given: InputRows, z: np.ndarray) -> InputRows:
-        """Return designs with sampled inputs.
-
-        Parameters
-        ----------
-        given
-            Inputs of n designs, with means for the uncertain ones.
-        z
-            Independent standard normal numbers, shape (n, number of uncertain inputs).
-        """
+        """Return designs with sampled inputs, from their means and standard normals, shape (n, uncertain inputs)."""
         inputs = dict(given)
         for column, (name, spread) in enumerate(self.distributions.items()):
             normal = z[:, column]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,15 +13,7 @@ import numpy as np
 from boulder_sweep.answers.chance import FIRST, SCRAMBLINGS, Chances, Estimates, Event, Points, chance
 from boulder_sweep.answers.draws import Draws
 from boulder_sweep.answers.keys import margin_asked, share
-from boulder_sweep.answers.result import (
-    Result,
-    TableColumn,
-    chance_columns,
-    collected,
-    joined_tables,
-    rows_table,
-    write_parquet,
-)
+from boulder_sweep.answers.result import Result, chance_columns, collected, joined_tables, rows_table, write_parquet
 from boulder_sweep.answers.spread import Spread
 from boulder_sweep.answers.trials import Judges, judges_of, ranges, uncertain_rows, ungraded
 from boulder_sweep.designs import block_of
@@ -147,57 +140,46 @@ def uncertainty(
     spread, graded = Spread(sweep), can_be_asked(sweep) and bool(sweep.model.second_opinion)
     sweep.need_depth()
     judges = judges_of(sweep, least_margin, robust=graded)
-    asked = _Arguments(sweep, spread, judges.of_any_pass(), judges if graded else None, width, sure, most)
+    points = Points(len(spread.names), seed)
+    sampled = partial(chance, points=points, half_width=width, confidence=sure, most=most)
+    asked = _Arguments(sweep, spread, judges.of_any_pass(), judges if graded else None, points, sampled, Pool(jobs))
     if ready is not None:
         ready()
     judges.final.asked().warm_up()
-    points = Points(len(asked.spread.names), seed)
-    threads = Pool(jobs)
-    pieces = ranges(sweep.n_designs, ROWS_AT_ONCE)
-    parts = (_rows(asked, points, threads, start, stop) for start, stop in pieces)
+    parts = (_rows(asked, start, stop) for start, stop in ranges(sweep.n_designs, ROWS_AT_ONCE))
     tables = collected(parts, sweep.n_designs, progress)
-    samples = _sample_table(asked, points, threads, sweep.n_designs if sweep.n_designs <= MOST_SAMPLED else 0)
-    question = {
-        "asked": "p_pass",
-        "half_width": width,
-        "confidence": sure,
-        "margin": least_margin,
-        "seed": seed,
-        "most": most,
-    }
+    samples = _sample_table(asked, sweep.n_designs if sweep.n_designs <= MOST_SAMPLED else 0)
+    question = {"asked": "p_pass", "half_width": width, "confidence": sure, "margin": least_margin}
+    question |= {"seed": seed, "most": most}
     table = joined_tables(tables, sweep, asked.judges, "boulder_sweep.uncertainty", question)
     return Uncertainty(sweep, table, samples, seed)
 
 
 @dataclass(frozen=True, eq=False)
 class _Arguments:
-    """The arguments of `uncertainty`."""
+    """What is asked of every row of a sweep."""
 
     sweep: Sweep
     spread: Spread
     judges: Judges
     robust: Judges | None
     """Judges that count only robust passes; None where second opinions are not asked."""
-    half_width: float
-    confidence: float
-    most: int
+    points: Points
+    sampled: Callable[[Event, int], Estimates]
+    """Returns the probabilities of an event in so many rows."""
+    parallel: Pool
 
-    def sampled(self, event: Event, rows: int, points: Points) -> Estimates:
-        """Return the probabilities of an event."""
-        return chance(event, rows, points, half_width=self.half_width, confidence=self.confidence, most=self.most)
-
-    def draws(self, start: int, stop: int, parallel: Pool) -> Draws:
+    def draws(self, start: int, stop: int) -> Draws:
         """Return what samples the designs of the rows ``[start, stop)``."""
         rows = uncertain_rows(self.sweep, self.sweep.plan.given_rows(start, stop), start, stop)
-        return Draws(rows, self.spread, self.judges, parallel)
+        return Draws(rows, self.spread, self.judges, self.parallel)
 
 
-def _rows(asked: _Arguments, points: Points, parallel: Pool, start: int, stop: int) -> pa.Table:
+def _rows(asked: _Arguments, start: int, stop: int) -> pa.Table:
     """Return the table of the rows ``[start, stop)``: inputs, outcome at the means, probability, main input."""
     from boulder_sweep.store.part import word_array
 
-    draws = asked.draws(start, stop, parallel)
-    n = stop - start
+    draws, n = asked.draws(start, stop), stop - start
     first: list[np.ndarray] = []
 
     def event(index: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -206,21 +188,17 @@ def _rows(asked: _Arguments, points: Points, parallel: Pool, start: int, stop: i
             first.append(distance.reshape(n, -1))
         return known
 
-    def stands(index: np.ndarray, z: np.ndarray) -> np.ndarray:
-        return robust.drawn(index, z)[1]
-
-    sampled, graded = asked.sampled(event, n, points), None
+    sampled, graded = asked.sampled(event, n), None
     if asked.robust is not None:
         robust = replace(draws, judges=asked.robust)
-        graded = asked.sampled(stands, n, points)
-    z = points.upto(FIRST).reshape(FIRST * SCRAMBLINGS, -1)
-    driver = drivers(z, first[0])
+        graded = asked.sampled(lambda index, z: robust.drawn(index, z)[1], n)
+    driver = drivers(asked.points.upto(FIRST).reshape(FIRST * SCRAMBLINGS, -1), first[0])
     block = replace(block_of(draws.rows), labels=asked.sweep.block(start, stop).labels)
     judged = ungraded(asked.judges.final(block))
-    driver_meaning = "most influential of the uncertain inputs; null where they change nothing"
-    columns: list[TableColumn] = [
+    meaning = "most influential of the uncertain inputs; null where they change nothing"
+    columns = [
         *chance_columns(Chances(sampled, graded)),
-        ("p_pass_driver", "", driver_meaning, word_array(driver, tuple(asked.spread.words))),
+        ("p_pass_driver", "", meaning, word_array(driver, tuple(asked.spread.words))),
         ("p_pass_designs", "1", "designs drawn for p_pass", sampled.points),
     ]
     return rows_table(start, block, judged, columns)
@@ -229,31 +207,22 @@ def _rows(asked: _Arguments, points: Points, parallel: Pool, start: int, stop: i
 def drivers(z: np.ndarray, output: np.ndarray) -> np.ndarray:
     """Return the most influential input of each row; -1 where the output does not vary, int64, shape (n,).
 
-    The means of the output are compared over strata of each input.
-
-    Parameters
-    ----------
-    z
-        Standard normal numbers, shape (m, d), the same for all rows.
-    output
-        An output at these points, shape (n, m).
+    The means of the output, shape (n, m), are compared over strata of each input, by standard normals, shape (m, d).
     """
     shares = np.empty((len(output), z.shape[1]))
     for k in range(z.shape[1]):
-        order = np.argsort(z[:, k], kind="stable")
-        strata = np.array_split(order, STRATA)
-        means = np.stack([output[:, stratum].mean(axis=1) for stratum in strata], axis=1)
-        shares[:, k] = means.var(axis=1)
+        strata = np.array_split(np.argsort(z[:, k], kind="stable"), STRATA)
+        shares[:, k] = np.var([output[:, stratum].mean(axis=1) for stratum in strata], axis=0)
     return np.where(output.var(axis=1) > 0.0, shares.argmax(axis=1), -1)
 
 
-def _sample_table(asked: _Arguments, points: Points, parallel: Pool, rows: int) -> pa.Table:
+def _sample_table(asked: _Arguments, rows: int) -> pa.Table:
     """Return samples of the first rows as a table: number of the design, uncertain inputs, distance from failing."""
     import pyarrow as pa
 
-    draws = asked.draws(0, rows, parallel)
+    draws = asked.draws(0, rows)
     index = np.repeat(np.arange(rows), SAMPLES)
-    z = np.tile(points.upto(SAMPLES // SCRAMBLINGS).reshape(SAMPLES, -1), (rows, 1))
+    z = np.tile(asked.points.upto(SAMPLES // SCRAMBLINGS).reshape(SAMPLES, -1), (rows, 1))
     given = draws.given(index, z, {})
     inputs = {name: given[name] for name in asked.spread.names}
-    return pa.table({"design_id": index, **inputs, "distance": draws.distance(index, z)})
+    return pa.table({"design_id": index, **inputs, "distance": draws.drawn(index, z)[0]})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -24,7 +25,6 @@ from boulder_sweep.cli.options import (
     refuse_units_of_json,
     refuse_unwritable,
     say_notes,
-    say_percents,
     second_opinion_option,
     set_option,
     units_option,
@@ -49,16 +49,7 @@ Examples:
   sweep need configs/site.yaml --most speed --between '5 m/s' '40 m/s'
 """
 REPEATED = (
-    "units",
-    "least",
-    "most",
-    "margin",
-    "probability",
-    "between",
-    "robust",
-    "second_opinion",
-    "prefer",
-    "at",
+    *("units", "least", "most", "margin", "probability", "between", "robust", "second_opinion", "prefer", "at"),
     "overrides",
 )
 """Parameters of `need` that decide the answer, which a further question repeats where they were given."""
@@ -145,16 +136,13 @@ def need(
         sweep = at_values(sweep, at)
     refuse_unwritable(out, picture)
 
-    def say_how() -> None:
-        if not quiet:
-            unused = _unused(sweep, question["most"] or question["least"] or EMBEDMENT[1])
-            notes = [note for note in sweep.notes if not (unused and note.key.startswith("site.embedment"))]
-            notes += [Problem(Position(grid), "not used: the depth is searched", BY_NAME[name].path) for name in unused]
-            say_notes(replace(sweep, notes=tuple(notes)), units)
-            say_percents(margin=question["margin"], probability=question["probability"])
-
+    unused = _unused(sweep, question["most"] or question["least"] or EMBEDMENT[1])
+    notes = [note for note in sweep.notes if not (unused and note.key.startswith("site.embedment"))]
+    notes += [Problem(Position(grid), "not used: the depth is searched", BY_NAME[name].path) for name in unused]
+    shares = {name: question[name] for name in ("margin", "probability")}
+    say_how = partial(say_notes, replace(sweep, notes=tuple(notes)), units, **shares)
     with working(quiet, of="designs" if question["probability"] is None else "values") as progress:
-        result = answer(sweep, **question, jobs=jobs, progress=progress, ready=say_how)
+        result = answer(sweep, **question, jobs=jobs, progress=progress, ready=None if quiet else say_how)
     if as_json:
         show(json.dumps(result.to_dict()))
     else:
@@ -249,13 +237,10 @@ def uncertainty(
     refuse_missing(sweep, grid, design)
     refuse_unwritable(out, picture)
 
-    def say_how() -> None:
-        if not quiet:
-            say_notes(sweep, units)
-            say_percents(**{name: question[name] for name in ("margin", "confidence", "half_width")})
-
+    shares = {name: question[name] for name in ("margin", "confidence", "half_width")}
+    say_how = partial(say_notes, sweep, units, **shares)
     with working(quiet) as progress:
-        result = estimate(sweep, **question, progress=progress, ready=say_how)
+        result = estimate(sweep, **question, progress=progress, ready=None if quiet else say_how)
     show(*([json.dumps(result.to_dict())] if as_json else uncertainty_lines(result, units=units)))
     if not quiet:
         drawn = sum(result.arrow["p_pass_designs"].to_pylist())

@@ -32,16 +32,17 @@ def grid_lines(sweep: Sweep) -> list[str]:
         return [f"{sweep.name}: {count} from {sweep.table.file}{carried}", *_uncertain_lines(sweep), *ground]
     lines = [f"{sweep.name}: {count}"]
     for axis in sweep.axes:
-        shown = shown_column(axis.name, sweep.units) if axis.name in BY_NAME else ShownColumn(axis.name, "", 1.0, "")
         if axis.labels:
-            noun = "set" if len(axis) == 1 else "sets"
-            lines.append(f"  {axis.name:<26}{len(axis):>9,} {noun:<8}{', '.join(axis.labels)}")
-            continue
-        least, largest = (end / shown.size for end in (min(axis.values), max(axis.values)))
-        ends = f"{least:g} to {largest:g}" if len(axis) > 1 else f"{least:g}"
-        noun = "value" if len(axis) == 1 else "values"
-        unit = "" if shown.unit in ("", "1") else f" {shown.unit}"
-        lines.append(f"  {shown.name:<26}{len(axis):>9,} {noun:<8}{ends}{unit}")
+            name, noun, words = axis.name, "set", ", ".join(axis.labels)
+        else:
+            plain = ShownColumn(axis.name, "", 1.0, "")
+            shown = shown_column(axis.name, sweep.units) if axis.name in BY_NAME else plain
+            least, largest = (f"{end / shown.size:g}" for end in (min(axis.values), max(axis.values)))
+            unit = "" if shown.unit in ("", "1") else f" {shown.unit}"
+            name, noun = shown.name, "value"
+            words = (f"{least} to {largest}" if len(axis) > 1 else least) + unit
+        plural = "" if len(axis) == 1 else "s"
+        lines.append(f"  {name:<26}{len(axis):>9,} {noun + plural:<8}{words}")
     return [*lines, *_uncertain_lines(sweep), *ground]
 
 
@@ -57,14 +58,12 @@ def _uncertain_lines(sweep: Sweep) -> list[str]:
 
 def summary_lines(name: str, summary: Summary) -> list[str]:
     """Return the result of a finished run, where it is and how to open it."""
-    lines = [
+    return [
         f"{name}: {counted(summary.rows, 'design')}",
         f"  {summary.rows_computed:,} simulated now in {duration_text(summary.seconds)}: "
         f"{summary.rows_per_second:,.0f} per second, {counted(summary.jobs, 'worker')}, {summary.backend}",
         "",
-    ]
-    lines += verdict_lines(summary.reasons, summary.rows)
-    lines += [
+        *verdict_lines(summary.reasons, summary.rows),
         "",
         *robustness_lines(summary.reasons),
         *foot_lines(summary.boulder, summary.reasons),
@@ -75,7 +74,6 @@ def summary_lines(name: str, summary: Summary) -> list[str]:
         f"       duckdb: FROM read_parquet('{summary.out}/*.parquet')",
         f"share  {shlex.join(['sweep', 'report', str(summary.out)])}",
     ]
-    return lines
 
 
 def robustness_lines(reasons: Mapping[str, int]) -> list[str]:
@@ -85,10 +83,9 @@ def robustness_lines(reasons: Mapping[str, int]) -> list[str]:
 
     if not any(key.startswith("pass/") for key in reasons):
         return []
-    lines = [f"pass   is {NOT_A_RATING}", *_indent(f"robust: {IN_WORDS}", "       ")]
+    lines = [f"pass   is {NOT_A_RATING}", *_indented(f"robust: {IN_WORDS}")]
     if "pass/open" in reasons:
-        words = "open: not asked, or outside the ranges of their study (docs/confidence.md)"
-        lines += _indent(words, "       ")
+        lines += _indented("open: not asked, or outside the ranges of their study (docs/confidence.md)")
     return lines
 
 
@@ -99,12 +96,12 @@ def foot_lines(boulder: Mapping[str, Any], reasons: Mapping[str, int]) -> list[s
         lines.append(f"rock   {ROCK_KG_M3:g} kg/m^3 assumed (boulder.density); no pass is robust")
     for reason, advice in WAY_OUT.items():
         if f"undecided/{reason}" in reasons or f"fail/{reason}" in reasons:
-            lines += _indent(f"{reason}: {advice}", "       ")
+            lines += _indented(f"{reason}: {advice}")
     return lines
 
 
-def _indent(text: str, indent: str) -> list[str]:
-    return textwrap.wrap(text, 80, initial_indent=indent, subsequent_indent=indent)
+def _indented(text: str) -> list[str]:
+    return textwrap.wrap(text, 80, initial_indent=7 * " ", subsequent_indent=7 * " ")
 
 
 def accuracy_line(accuracy: Mapping[str, Any]) -> str:

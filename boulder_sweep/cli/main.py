@@ -99,27 +99,24 @@ Exit codes:
 
 
 class GroupedCommands(click.Group):
-    """Group that lists its commands under headings, in the order in which they were added."""
-
-    def __init__(self, *args: Any, **options: Any) -> None:
-        super().__init__(*args, **options)
-        self.headings: dict[str, str] = {}
-        """Heading of every command."""
+    """Group that lists its commands under the headings of `GROUPS`, in that order."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the commands that are listed."""
-        return list(self.headings)
+        """Return the commands in their order."""
+        return list(self.commands)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write a section for each heading."""
-        width = formatter.width - 6 - max(map(len, self.headings))
-        for heading in dict.fromkeys(self.headings.values()):
+        width = formatter.width - 6 - max(map(len, self.commands))
+        for heading, commands in GROUPS.items():
             with formatter.section(heading):
-                names = [name for name, under in self.headings.items() if under == heading]
-                formatter.write_dl([(name, self.commands[name].get_short_help_str(width)) for name in names])
+                formatter.write_dl([(str(each.name), each.get_short_help_str(width)) for each in commands])
 
 
-@click.group(cls=GroupedCommands, epilog=EPILOG, context_settings={"help_option_names": ["-h", "--help"]})
+CONTEXT = {"help_option_names": ["-h", "--help"]}
+
+
+@click.group(cls=GroupedCommands, commands=COMMANDS, epilog=EPILOG, context_settings=CONTEXT)
 @click.version_option(package_name="boulder-sweep", message="sweep %(version)s", help="Show the version.")
 def cli() -> None:
     """Find out which boulder, buried how deep in which soil, stops a truck.
@@ -127,12 +124,6 @@ def cli() -> None:
     A file describes boulders, soils and a vehicle as ranges of values. `sweep run` simulates every
     design and writes one table with a verdict for each.
     """
-
-
-for heading, commands in GROUPS.items():
-    for command in commands:
-        cli.add_command(command)
-        cli.headings[str(command.name)] = heading
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:

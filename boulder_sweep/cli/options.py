@@ -37,10 +37,7 @@ class OutputPath(click.Path):
 class Quantity(click.ParamType):
     """A number of some dimension: it needs its unit, whatever `--units` says, and stays the text that it is.
 
-    Parameters
-    ----------
-    unit
-        Unit of the table; None where an input that is named beside it decides, and the command refuses bare numbers.
+    Without a unit of the table an input that is named with it decides, and the command refuses bare numbers.
     """
 
     name = "quantity"
@@ -122,10 +119,11 @@ def load_given(path: str, overrides: Sequence[str], at: str | None = None) -> Sw
     return at_values(sweep, at)
 
 
-def say_notes(sweep: Sweep, units: str | None = None) -> None:
+def say_notes(sweep: Sweep, units: str | None = None, **shares: str | None) -> None:
     """Print the notes on settings, how inputs follow from the data of a site, and which values uncertain inputs have.
 
-    They are in the units of the file where none are asked for.
+    They are in the units of the file where none are asked for. Of options that are shares, it is said where a bare
+    number above 1 is read as per cent; those that are no numbers are refused later.
     """
     from boulder_sweep.judge.quantiles import words_of
     from boulder_sweep.settings.sweep import derived_words
@@ -136,10 +134,6 @@ def say_notes(sweep: Sweep, units: str | None = None) -> None:
         say(f"note: {note}")
     if sweep.taken_at:
         say("\n".join(wrap(f"note: {words_of(sweep, units or sweep.units)}")))
-
-
-def say_percents(**shares: str | None) -> None:
-    """Say of which options a bare number above 1 is read as per cent; those that are no numbers are refused later."""
     for name, text in shares.items():
         with suppress(ValueError):
             if text is not None and float(text) > 1.0:
@@ -165,33 +159,33 @@ def refuse_unwritable(table: str | None, picture: str | None = None) -> None:
         from boulder_sweep.answers.result import checked_parquet
 
         checked_parquet(table)
-    if picture is not None:
-        from boulder_sweep.views.pictures import checked_kind, require_matplotlib
+    _refuse_picture(picture)
 
-        require_matplotlib()
-        checked_kind(picture)
+
+def _refuse_picture(path: str | None, *, animated: bool = False) -> None:
+    """Refuse a picture that cannot be written; None where none is wanted."""
+    if path is not None:
+        from boulder_sweep.views import pictures
+
+        pictures.require_matplotlib()
+        pictures.checked_kind(path, pictures.ANIMATED if animated else pictures.KINDS)
 
 
 def refuse_unwritable_history(
-    plot: str | None, trajectory: str | None, energy: str | None = None, animation: str | None = None
+    plot: str | None, trajectory: str | None, energy: str | None, animation: str | None
 ) -> None:
     """Refuse outputs of a time history that cannot be written, before anything is computed; None: not wanted."""
     names = [name for name in (plot, trajectory, energy, animation) if name is not None]
     for index, name in enumerate(names):
         if any(Path(name).resolve() == Path(other).resolve() for other in names[:index]):
             raise click.UsageError(f"{name} is named twice; give each output a name of its own")
-    refuse_unwritable(None, plot)
+    _refuse_picture(plot)
     if trajectory is not None:
         from boulder_sweep.impact.trajectory import checked_history
 
         checked_history(trajectory)
-    refuse_unwritable(None, energy)
-    if animation is not None:
-        from boulder_sweep.views.pictures import checked_kind, require_matplotlib
-        from boulder_sweep.views.side_view import KINDS
-
-        require_matplotlib()
-        checked_kind(animation, KINDS)
+    _refuse_picture(energy)
+    _refuse_picture(animation, animated=True)
 
 
 def quantity_of(option: str, text: str, unit: str) -> float:

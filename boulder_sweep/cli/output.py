@@ -155,23 +155,21 @@ def progress(
             yield show
     else:
         with announced(say, lambda: None):
-            yield _PlainLines(of)
+            yield _plain_lines(of)
 
 
-class _PlainLines:
-    """Writes a plain line every `PLAIN_EVERY_S`: for logs of batch jobs."""
+def _plain_lines(of: str) -> Callable[[Progress], None]:
+    """Return what writes a plain line every `PLAIN_EVERY_S`: for logs of batch jobs."""
+    last = time.monotonic()
 
-    def __init__(self, of: str) -> None:
-        self.last, self._of = time.monotonic(), of
+    def show(now: Progress) -> None:
+        nonlocal last
+        if time.monotonic() - last >= PLAIN_EVERY_S:
+            last = time.monotonic()
+            share, speed = now.rows_done / max(now.rows, 1), now.rows_per_second
+            say(f"{share:6.1%}  {now.rows_done:,} of {now.rows:,} {of}, {speed:,.0f} per second")
 
-    def __call__(self, now: Progress) -> None:
-        if time.monotonic() - self.last < PLAIN_EVERY_S:
-            return
-        self.last = time.monotonic()
-        say(
-            f"{now.rows_done / max(now.rows, 1):6.1%}  {now.rows_done:,} of {now.rows:,} {self._of}, "
-            f"{now.rows_per_second:,.0f} per second"
-        )
+    return show
 
 
 @contextmanager

@@ -45,12 +45,7 @@ Examples:
 @grid_argument
 @click.option("-o", "--output", "out", type=OUTPUT, metavar="DIR", help="Folder for table and picture.")
 @click.option(
-    "--designs",
-    type=click.IntRange(min=1),
-    default=4096,
-    show_default=True,
-    metavar="N",
-    help="Size of the sample.",
+    "--designs", type=click.IntRange(min=1), default=4096, show_default=True, metavar="N", help="Size of the sample."
 )
 @click.option(
     "--seconds",
@@ -100,10 +95,9 @@ def tradeoff(
         record = {"name": sweep.name, "designs": sweep.n_designs, "reference_error_deg": result.reference_deg}
         show(json.dumps({**record, "points": rows, "left_out": result.left_out, "files": [*map(str, files)]}))
         return 0
-    lines = [*_rows(result), *(f"written  {file}" for file in files)]
-    if result.left_out:
-        lines.append(f"left out for time: {result.left_out} of {len(result.points) + result.left_out} methods")
-    show(*lines)
+    ways = len(result.points) + result.left_out
+    left_out = [f"left out for time: {result.left_out} of {ways} methods"] if result.left_out else []
+    show(*_rows(result), *(f"written  {file}" for file in files), *left_out)
     return 0
 
 
@@ -114,14 +108,14 @@ def _rows(result: Tradeoff) -> Iterator[str]:
     if result.points:
         yield "steps [ms]     us per  rotation [deg]    movement  flips  un-"
         yield "               design  99 %     max      99 % [m]         decided"
-    before = None
+    before = ""
     for point in result.points:
         method = point.method
-        group = (method.readings, method.soil_elements, method.error_estimate)
-        if group != before:
-            soil = f"sums over {method.soil_elements} elements" if method.soil_elements else "closed form"
-            yield f"{method.readings}, {soil}{', error of every design' if method.error_estimate else ''}"
-        before = group
+        soil = f"sums over {method.soil_elements} elements" if method.soil_elements else "closed form"
+        heading = f"{method.readings}, {soil}{', error of every design' if method.error_estimate else ''}"
+        if heading != before:
+            yield heading
+        before = heading
         cost = f"{point.cpu_us:.3g}" if point.cpu_us < 1000 else f"{point.cpu_us:,.0f}"
         errors = (point.rotation_p99_deg, point.rotation_max_deg, point.displacement_p99_m)
         numbers = "  ".join(f"{error:.1e}" for error in errors)
@@ -265,8 +259,9 @@ def fit_lines(fit: VehicleFit) -> list[str]:
         rows.append(("zero offset", words))
     for name, misfit in fit.misfits.items():
         rows.append((f"misfit of {name}", f"{misfit.share:.1%} of its range (root mean square)"))
-    settings = (
+    return [
+        *(f"{name:<24}{text}" for name, text in rows),
+        "",
         f"vehicle: {{mass: {wall.mass_kg:.6g} kg, speed: ...,",
         f"          spring: {wall.spring_N_m / 1e3:.6g} kN/m, damper: {wall.damper_N_s_m / 1e3:.6g} kN*s/m}}",
-    )
-    return [*(f"{name:<24}{text}" for name, text in rows), "", *settings]
+    ]

@@ -114,13 +114,9 @@ def _plot_answers(file: AnswerFile, target: Path, units: str, asked: Sequence[st
     if asked:
         options = "--across, --up, --columns, --rows and --at"
         raise click.UsageError(f"{options} choose a part of the result of a run; a chart of answers takes none")
-    answers = file.answers()
-    if file.kind == NEED:
-        draw("answer_charts", "draw_design_chart", answers, target, units=units)
-    elif file.kind == UNCERTAINTY and file.rows == 1:
-        draw("answer_charts", "draw_uncertainty", answers, target, units=units)
-    else:
-        draw("answer_charts", "draw_answers", answers, target, units=units)
+    of_one = "draw_uncertainty" if file.kind == UNCERTAINTY and file.rows == 1 else "draw_answers"
+    chart = "draw_design_chart" if file.kind == NEED else of_one
+    draw("answer_charts", chart, file.answers(), target, units=units)
     show(f"{target}: {counted(file.rows, 'answer')}")
     return 0
 
@@ -226,18 +222,10 @@ def report(
     for key, text in given.items():
         if wrong := wrong_with(text):
             raise click.UsageError(f"--{key.replace('_', '-')} {wrong}")
-    folder = location_of(out)
     target = checked_page(page) if page else beside(location_of(out.removesuffix(".parquet")), ".html")
-    written = write_report(
-        folder,
-        target,
-        designs=designs,
-        units=units,
-        command=_command(),
-        heading=Heading(**given),
-        second_opinion=second_opinion is not False,
-    )
-    _show_page(written)
+    asked = second_opinion is not False
+    words: Any = {"units": units, "command": _command(), "heading": Heading(**given)}
+    _show_page(write_report(location_of(out), target, designs=designs, second_opinion=asked, **words))
     return 0
 
 

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from boulder_sweep.impact.recomputing import Recomputation
     from boulder_sweep.impact.trajectory import Trajectory
     from boulder_sweep.settings import Sweep
-    from boulder_sweep.settings.model import Model
 
 SIMULATE_EXAMPLES = """\b
 Examples:
@@ -110,10 +109,8 @@ def simulate(
     if reason:
         say(f"design {number} cannot be computed: {reason}")
         if again is not None:
-            lone = (
-                {"design_id": number} | shown_settings(again.inputs | again.stored, in_json) | again.compared(in_json)
-            )
-            show(*[json.dumps(lone)] if as_json else _compared_lines(again))
+            stored = {"design_id": number} | shown_settings(again.inputs | again.stored, in_json)
+            show(*[json.dumps(stored | again.compared(in_json))] if as_json else _compared_lines(again))
         return EXIT_SOME_ROWS_FAILED
     if (words := sweep.model.ground.words_in(shown_unit("m", units), shown_unit("kPa", units))) and not quiet:
         say(f"note: {words}")
@@ -139,7 +136,7 @@ def simulate(
         lines = [] if row["max_rotation_deg"] is None else impact_lines(row, result, units)
         compared = [] if again is None else _compared_lines(again)
         columns = ["", *console.value_lines(whole)] if every else []
-        cautions = _cautions(row | result.inputs, sweep.model, is_asked=_is_asked(sweep))
+        cautions = _cautions(row | result.inputs, sweep)
         show(*wrap(verdict_line(result)), *lines, *cautions, *compared, *columns)
     if plot is not None:
         result.plot(plot, units=units)
@@ -152,13 +149,6 @@ def simulate(
             result.animate(animate, progress)
     say_written(quiet, plot, trajectory, energy, animate)
     return EXIT_SOME_ROWS_FAILED if row["verdict"] == "error" else 0
-
-
-def _is_asked(sweep: Sweep) -> bool:
-    """Whether second opinions were asked, as far as they can be."""
-    from boulder_sweep.judge.robustness import can_be_asked
-
-    return bool(sweep.model.second_opinion) or not can_be_asked(sweep)
 
 
 def _is_result(case: Location) -> bool:
@@ -188,30 +178,25 @@ def _compared_lines(again: Recomputation) -> list[str]:
     return lines if again.unequal else [*lines, "computed again: the same to the last bit"]
 
 
-def _cautions(row: dict[str, Any], model: Model, *, is_asked: bool) -> list[str]:
+def _cautions(row: dict[str, Any], sweep: Sweep) -> list[str]:
     """Return the remarks that go with the result."""
     from boulder_sweep.answers.printing import foot_lines, grade_lines
+    from boulder_sweep.judge.robustness import can_be_asked
     from boulder_sweep.judge.validity import NOT_A_RATING, meanings
 
     cautions = [f"caution: {words}" for words in meanings(row["validity"] or "")]
     cautions += ["docs/confidence.md has the bounds of all flags"] if cautions else []
     if row["verdict"] == "pass":
+        is_asked = sweep.model.second_opinion or not can_be_asked(sweep)
         grades = grade_lines([row]) if is_asked else ["open: not asked (--second-opinion asks)"]
         cautions = [*grades, *cautions, f"pass: {NOT_A_RATING}"]
-    return [*cautions, *foot_lines(model, [row["reason"]])]
+    return [*cautions, *foot_lines(sweep.model, [row["reason"]])]
 
 
-def impact_lines(row: Mapping[str, Any], history: Trajectory, units: str = "si") -> list[str]:
-    """Return how near one design came to every limit, when, and to within what.
+def impact_lines(row: Mapping[str, Any], history: Trajectory, units: str) -> list[str]:
+    """Return how near one design, which touched the truck, came to every limit, when, and to within what.
 
-    Parameters
-    ----------
-    row
-        Its outcome columns, in the units of the table; it has touched the truck.
-    history
-        The impact over time.
-    units
-        ``si`` or ``us``.
+    `row` has its outcome columns, in the units of the table.
     """
     from boulder_sweep.judge.verdict import PENETRATION_LIMITS_M
     from boulder_sweep.settings.units import quantity_text
@@ -233,7 +218,10 @@ def impact_lines(row: Mapping[str, Any], history: Trajectory, units: str = "si")
             f"truck {metres(row['max_vehicle_displacement_m'], digits='.3g')}; "
             f"peak force {quantity_text('kN', units, row['peak_force_kN'], digits=',.0f')}",
         ]
-    lines.append(build_line(history, units))
+    mass, above, *volumes = _to_build(history).values()
+    weight = f"{mass / 1e3:.1f} t" if units == "si" else quantity_text("kg", units, mass, digits=",.0f")
+    dig, fill = (quantity_text("m^3", units, volume, digits=".1f").replace("^3", "³") for volume in volumes)
+    lines.append(f"  to build: {weight}, {metres(above, digits='.3g')} above ground; dig {dig}, fill {fill}")
     if row["time_to_limit_s"] is None:
         error = row["rotation_error_deg"]
         lines.append(f"  numerical error of the rotation: {'unknown' if error is None else f'{error:.1g} deg'}")
@@ -245,14 +233,3 @@ def _to_build(history: Trajectory) -> dict[str, float]:
     from boulder_sweep.judge.quantities import quantities_by
 
     return {name: float(value) for name, value in quantities_by(history.inputs, history.settings).items()}
-
-
-def build_line(history: Trajectory, units: str = "si") -> str:
-    """Return in words what a design takes to build."""
-    from boulder_sweep.settings.units import quantity_text
-
-    mass, above, *volumes = _to_build(history).values()
-    weight = f"{mass / 1e3:.1f} t" if units == "si" else quantity_text("kg", units, mass, digits=",.0f")
-    dig, fill = (quantity_text("m^3", units, volume, digits=".1f").replace("^3", "³") for volume in volumes)
-    height = quantity_text("m", units, above, digits=".3g")
-    return f"  to build: {weight}, {height} above ground; dig {dig}, fill {fill}"

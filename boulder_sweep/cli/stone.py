@@ -95,8 +95,7 @@ def stone(
         raise click.UsageError("at a site the boulder must be weighed: give --mass")
     mass_kg = None if mass is None else quantity_of("--mass", mass, "kg")
     metres = quantity_of("--unit", f"1 {unit}", "m")
-    if plot is not None:
-        refuse_unwritable(None, plot)
+    refuse_unwritable(None, plot)
     from boulder_sweep.stones.weighing import scanned
 
     scan = scanned(rock, metres=metres, mass_kg=mass_kg)
@@ -244,7 +243,16 @@ def standing_lines(scan: ScannedStone) -> list[str]:
         (("rests", "uncut"), lambda standing: f"{standing.rests:.0%}"),
         (("fit", "m"), lambda standing: f"{standing.profile.error:.3f}"),
     ]
-    return [*_table(columns, [one for one in scan.standings if not one.facing.startswith("-")]), *_legend(scan)]
+    lines = [
+        *_table(columns, [one for one in scan.standings if not one.facing.startswith("-")]),
+        "up, facing: the end that is up, and the one that faces the vehicle",
+        "cut: cut off below, for a flat foot under the centre of mass",
+        "rests: section of the uncut boulder just above the ground over its largest one",
+        "fit: error of the profile, root mean square over the volume",
+    ]
+    if any(not standing.has_foot for standing in scan.standings):
+        lines.append("rounded: no cut of a quarter of the height makes a foot; bed it in concrete")
+    return lines
 
 
 def _table(columns: Iterable[tuple[tuple[str, str], Callable[[T], str]]], ways: Iterable[T]) -> list[str]:
@@ -276,16 +284,3 @@ def settings_lines(scan: ScannedStone, standing: Standing) -> list[str]:
 def foot_text(standing: Standing) -> str:
     """Return length and width of a foot, or that there is none."""
     return f"{standing.profile.length[0]:.2f} × {standing.profile.width[0]:.2f}" if standing.has_foot else "rounded"
-
-
-def _legend(scan: ScannedStone) -> list[str]:
-    """Return what the columns mean, as far as they say something."""
-    lines = [
-        "up, facing: the end that is up, and the one that faces the vehicle",
-        "cut: cut off below, for a flat foot under the centre of mass",
-        "rests: section of the uncut boulder just above the ground over its largest one",
-        "fit: error of the profile, root mean square over the volume",
-    ]
-    if any(not standing.has_foot for standing in scan.standings):
-        lines.append("rounded: no cut of a quarter of the height makes a foot; bed it in concrete")
-    return lines

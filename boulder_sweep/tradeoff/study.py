@@ -128,21 +128,10 @@ class Tradeoff:
 
 
 def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS) -> Tradeoff:
-    """Measure speed against accuracy on a sample of a sweep's designs.
+    """Measure speed against accuracy on a sample of a sweep's designs, on which alone sample and errors depend.
 
-    Parameters
-    ----------
-    sweep
-        Its readings, criterion and horizon count; both presets are measured anyway.
-    designs
-        Size of the sample. The sample depends on the sweep alone, and so do the errors; the times do not.
-    seconds
-        No new measurement is started after this much time [s].
-
-    Raises
-    ------
-    NothingToMeasureError
-        No design of the sample can be computed.
+    Readings, criterion and horizon of the sweep count; both presets are measured anyway. No new measurement is started
+    after so many seconds. A `NothingToMeasureError` says that no design of the sample can be computed.
     """
     begun = time.monotonic()
     sweep = at_values(sweep)
@@ -157,11 +146,8 @@ def measure(sweep: Sweep, *, designs: int = DESIGNS, seconds: float = SECONDS) -
     evaluation.warm_up()
     points: list[Point] = []
     left_out, references = 0, {}
-    for name, readings in {
-        sweep.model.preset: readings_of(sweep),
-        "corrected": corrected(),
-        "as_printed": as_printed(),
-    }.items():
+    presets = {"corrected": corrected(), "as_printed": as_printed()}
+    for name, readings in ({sweep.model.preset: readings_of(sweep)} | presets).items():
 
         def solve(some: Designs, method: Method, readings: Readings = readings) -> OutcomeTable:
             how = evaluation.control._replace(

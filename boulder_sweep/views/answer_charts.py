@@ -20,21 +20,8 @@ from boulder_sweep.columns import INPUT_COLUMNS, OPTIONAL_COLUMNS
 from boulder_sweep.errors import PictureError
 from boulder_sweep.settings.fields import BY_NAME
 from boulder_sweep.text import chance_text
-from boulder_sweep.views.pictures import (
-    AMBER,
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    LIGHT_GREY,
-    ORANGE,
-    PALE_ORANGE,
-    PURPLE,
-    SKY,
-    caption,
-    figure,
-    headline,
-)
+from boulder_sweep.views import pictures
+from boulder_sweep.views.pictures import AMBER, BLACK, BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, PALE_ORANGE, PURPLE, SKY
 from boulder_sweep.views.wording import (
     RATIO,
     USUAL,
@@ -45,6 +32,7 @@ from boulder_sweep.views.wording import (
     sized,
     terms_line,
     value_text,
+    with_unit,
 )
 
 if TYPE_CHECKING:
@@ -82,18 +70,24 @@ def draw_design_chart(need: Need, path: str | Path, *, units: str = "si") -> Non
     frame, sets, across, over, held = _shown(need.sweep, need.frame, (need.key.name, *need.derived))
     if frame[need.key.answer].isna().all():
         raise PictureError("there is nothing to draw: nothing passes in the range that was searched")
-    with figure(path, 7.2, 4.8) as fig:
+    with pictures.figure(path, 7.2, 4.8) as fig:
         axes = fig.subplots()
         passing = frame if over is None else frame[frame[over].isin(frame[over][frame[need.key.answer].notna()])]
-        for words, rows, style in _styled(passing, over, sets, units):
+        for words, rows, style in _curves(passing, over, sets, units):
             if len(rows):
                 _curve(axes, need, rows.sort_values(across), across, style, words, units)
         _across(axes, frame, across, units)
-        axes.set_ylabel(_answer_label(need, units))
+        axes.set_ylabel(with_unit(_words(need), sized(need.key.field.unit, units)[0]))
         _mark(axes, need, across, held, units)
         axes.legend(loc="best")
-        headline(fig, f"{need.sweep.name}: {_title(need)}")
-        caption(fig, "\n".join([*advice(need, units)[:1], _caption(need, held, units)]))
+        pictures.headline(fig, f"{need.sweep.name}: {_title(need)}")
+        parts = [
+            f"{name}: {one}" if isinstance(one, str) else value_text(name, one, units) for name, one in held.items()
+        ]
+        if need.least_margin:
+            parts.append(f"margin {need.least_margin:.0%} or more")
+        parts.append("hollow: passes in the whole range searched; no point: nothing passes")
+        pictures.caption(fig, "\n".join([*advice(need, units)[:1], "; ".join(parts)]))
 
 
 def draw_answers(answers: Reserves | Uncertainty, path: str | Path, *, units: str = "si") -> None:
@@ -110,11 +104,11 @@ def draw_answers(answers: Reserves | Uncertainty, path: str | Path, *, units: st
         ChartRows(answers.frame, {}, "design_id", None, {}) if listed else _shown(answers.sweep, answers.frame, derived)
     )
     frame, sets, across, over, held = shown
-    with figure(path, 3.4 * len(names) + 1.6 * (len(names) == 1), 4.0) as fig:
+    with pictures.figure(path, 3.4 * len(names) + 1.6 * (len(names) == 1), 4.0) as fig:
         panels = fig.subplots(1, len(names), squeeze=False)[0]
         for axes, (name, (words, unit)) in zip(panels, names.items(), strict=True):
             printed, size = sized(unit, units)
-            for curve, rows, (colour, dashes) in _styled(frame, over, sets, units):
+            for curve, rows, (colour, dashes) in _curves(frame, over, sets, units):
                 rows = rows.sort_values(across)
                 x = rows[across].to_numpy(dtype=float) / size_of(across, units)
                 line = {"color": colour, "linestyle": "" if listed else dashes, "markersize": 4}
@@ -124,13 +118,13 @@ def draw_answers(answers: Reserves | Uncertainty, path: str | Path, *, units: st
             _across(axes, frame, across, units)
             if listed:
                 axes.set_xlabel("design")
-            axes.set_ylabel(f"{words} [{printed}]" if printed else words)
+            axes.set_ylabel(with_unit(words, printed))
         if over is not None:
             panels[0].legend(loc="best")
-        headline(fig, f"{answers.sweep.name}: {what}")
+        pictures.headline(fig, f"{answers.sweep.name}: {what}")
         parts = [one if isinstance(one, str) else value_text(name, one, units) for name, one in held.items()]
         none = "no point: passes at no value tried" if len(names) > 1 else "band: interval of the probability"
-        caption(fig, "; ".join([*parts, none]) + f"\n{terms_line(answers.sweep.resolved())}")
+        pictures.caption(fig, "; ".join([*parts, none]) + f"\n{terms_line(answers.sweep.resolved())}")
 
 
 class ChartRows(NamedTuple):
@@ -175,30 +169,22 @@ def _across(axes: Axes, frame: pd.DataFrame, across: str, units: str) -> None:
     axes.set_xlabel(label(across, units))
 
 
-def _styled(
-    frame: pd.DataFrame, over: str | None, sets: Mapping[str, Sequence[str]], units: str
-) -> Iterator[tuple[str, pd.DataFrame, tuple[str, Any]]]:
-    """Yield the words, the rows, and colour and dashes of each curve."""
-    for index, (words, rows) in enumerate(_curves(frame, over, sets, units)):
-        dashes = DASHES[index // len(COLOURS) % len(DASHES)]
-        yield words, rows, (COLOURS[index % len(COLOURS)], dashes)
-
-
 def _curves(
     frame: pd.DataFrame, over: str | None, sets: Mapping[str, Sequence[str]], units: str
-) -> Iterator[tuple[str, pd.DataFrame]]:
-    """Yield the words and the rows of each curve: of every named set, or of some values of an input."""
+) -> Iterator[tuple[str, pd.DataFrame, tuple[str, Any]]]:
+    """Yield words, rows, and colour and dashes of each curve: of every named set, or of some values of an input."""
     if over is None:
-        yield "", frame
+        curves = [("", frame)]
     elif over in sets:
-        for name in sets[over]:
-            yield name, frame[frame[over].astype(str) == name]
+        curves = [(name, frame[frame[over].astype(str) == name]) for name in sets[over]]
     else:
-        values = sorted(frame[over].astype(float).unique())
+        levels = frame[over].astype(float)
+        values = np.unique(levels)
         if len(values) > len(COLOURS):
-            values = [values[index] for index in np.linspace(0, len(values) - 1, len(COLOURS)).round().astype(int)]
-        for value in values:
-            yield value_text(over, value, units), frame[frame[over].astype(float) == value]
+            values = values[np.linspace(0, len(values) - 1, len(COLOURS)).round().astype(int)]
+        curves = [(value_text(over, value, units), frame[levels == value]) for value in values]
+    for index, (words, rows) in enumerate(curves):
+        yield words, rows, (COLOURS[index % len(COLOURS)], DASHES[index // len(COLOURS) % len(DASHES)])
 
 
 def _curve(
@@ -221,7 +207,7 @@ def _mark(axes: Axes, need: Need, across: str, held: Mapping[str, float | str], 
     design = None if found is None else found.design
     if design is None or across not in design.sizes:
         return
-    if any(name in design.sizes and design.sizes[name] != value for name, value in held.items()):
+    if any(design.sizes.get(name, value) != value for name, value in held.items()):
         return
     value = design.rows[0].get(need.key.name, design.sizes.get(need.key.name))
     if value is not None:
@@ -240,22 +226,6 @@ def _words(need: Need) -> str:
     return name_of(name) if name in COLUMNS else name.rpartition("_")[0].replace("_", " ")
 
 
-def _answer_label(need: Need, units: str) -> str:
-    unit = sized(need.key.field.unit, units)[0]
-    return f"{_words(need)} [{unit}]" if unit else _words(need)
-
-
-def _caption(need: Need, held: Mapping[str, float | str], units: str) -> str:
-    """What else holds, and how to read the signs."""
-    parts = [
-        f"{name}: {value}" if isinstance(value, str) else value_text(name, value, units) for name, value in held.items()
-    ]
-    if need.least_margin:
-        parts.append(f"margin {need.least_margin:.0%} or more")
-    parts.append("hollow: passes in the whole range searched; no point: nothing passes")
-    return "; ".join(parts)
-
-
 def draw_uncertainty(result: Uncertainty, path: str | Path, *, design_id: int = 0, units: str = "si") -> None:
     """Draw one design of a result; refused where no samples are kept of it."""
     samples = result.samples.to_pandas()
@@ -266,14 +236,14 @@ def draw_uncertainty(result: Uncertainty, path: str | Path, *, design_id: int = 
     names = [name for name in samples.columns if name not in ("design_id", "distance")]
     changes = {name: _by_fifths(samples, name) for name in names}
     order = sorted(names, key=lambda name: float(np.ptp(changes[name])), reverse=True)
-    with figure(path, 9.6, 4.9) as fig:
+    with pictures.figure(path, 9.6, 4.9) as fig:
         left, right = fig.subplots(1, 2, width_ratios=(1.1, 1.0))
         _scatter(left, samples, order, units)
         _tornado(right, changes, order, row["p_pass"])
         name = result.sweep.name if len(result) == 1 else f"{result.sweep.name} #{design_id}"
         chance, low, high = (chance_text(row[key]) for key in ("p_pass", "p_pass_low", "p_pass_high"))
-        headline(fig, f"{name}: P(pass) = {chance} ({low} to {high})")
-        caption(fig, _design_caption(result, row, names, units))
+        pictures.headline(fig, f"{name}: P(pass) = {chance} ({low} to {high})")
+        pictures.caption(fig, _design_caption(result, row, names, units))
 
 
 def _design_caption(result: Uncertainty, row: Mapping[str, Any], uncertain: Sequence[str], units: str) -> str:

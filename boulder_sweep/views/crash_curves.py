@@ -31,13 +31,13 @@ STYLES: dict[str, dict[str, Any]] = {
     "corrected": {"color": BLUE},
     "as_printed": {"color": ORANGE, "linestyle": "--"},
 }
-SIGNALS = (
-    ("boulder_displacement", "Displacement of the boulder's centre", "displacement [m]"),
-    ("rotation", "Rotation of the boulder", "rotation [deg]"),
-    ("vehicle_displacement", "Displacement of the vehicle", "displacement [m]"),
-)
-MEASURED = (*SIGNALS, ("vehicle_acceleration", "Acceleration of the vehicle", "acceleration [m/s²]"))
-"""Signals that a test may hold."""
+SIGNALS = {
+    "boulder_displacement": ("Displacement of the boulder's centre", "displacement [m]"),
+    "rotation": ("Rotation of the boulder", "rotation [deg]"),
+    "vehicle_displacement": ("Displacement of the vehicle", "displacement [m]"),
+    "vehicle_acceleration": ("Acceleration of the vehicle", "acceleration [m/s²]"),
+}
+"""Title and axis of the signals that a test may hold; the first three are simulated for the paper's."""
 FIGURES = {"abg": ("12 to 14", "figures_12_to_14_abg.png"), "rwg": ("16 to 18", "figures_16_to_18_rwg.png")}
 
 
@@ -45,34 +45,20 @@ def write_validation(result: Validation, folder: Path) -> list[Path]:
     """Write the pictures and the time histories of `validate` into a folder, which is made, and return the files."""
     pictures.require_matplotlib()
     pictures.make_folder(folder)
-    written = [folder / "figure_10_rigid_wall.png"]
-    draw_rigid_wall(result.wall, written[0])
+    wall, table = folder / "figure_10_rigid_wall.png", folder / "trajectories.parquet"
+    draw_rigid_wall(result.wall, wall)
     for test, (_, name) in FIGURES.items():
         by_preset = {preset: t for (t_name, preset), t in result.trajectories.items() if t_name == test}
         draw_crash_test(test, by_preset, folder / name)
-        written.append(folder / name)
-    written.append(folder / "trajectories.parquet")
-    _write_histories(result, written[-1])
-    return written
+    _write_histories(result, table)
+    return [wall, *(folder / name for _, name in FIGURES.values()), table]
 
 
 def draw_crash_test(
     test: str, trajectories: Mapping[str, Trajectory], path: Path, measured: TimeHistory | None = None
 ) -> None:
-    """Draw one test under its presets: displacement of the boulder's own centre, rotation, vehicle.
-
-    Parameters
-    ----------
-    test
-        ``abg``, ``rwg``, or the name of another test.
-    trajectories
-        By preset.
-    path
-        Picture to write.
-    measured
-        Test data to lay over it.
-    """
-    names = [name for name, _, _ in SIGNALS] if measured is None else list(measured.signals)
+    """Draw the boulder's own centre, rotation and vehicle of one test by preset, or what was measured and simulated."""
+    names = [*SIGNALS][:3] if measured is None else [*measured.signals]
     with pictures.figure(path, 3.6 * len(names), 3.6) as fig:
         row = fig.subplots(1, len(names), squeeze=False)[0]
         for axes, name in zip(row, names, strict=True):
@@ -88,26 +74,23 @@ def draw_crash_test(
 
 def _signal(axes: Axes, name: str, trajectories: Mapping[str, Trajectory], measured: TimeHistory | None) -> None:
     """Draw one signal under all presets."""
-    title, label = next((title, label) for signal, title, label in MEASURED if signal == name)
     for preset, trajectory in trajectories.items():
-        style = STYLES[preset]
-        words = f"simulated, {preset.replace('_', ' ')}"
-        axes.plot(trajectory.time_s, simulated_signal(trajectory, name), label=words, **style)
+        signal, style = simulated_signal(trajectory, name), STYLES[preset]
+        axes.plot(trajectory.time_s, signal, label=f"simulated, {preset.replace('_', ' ')}", **style)
         when = trajectory.motion.outcome.t_limit
         if math.isfinite(when):
-            value = float(np.interp(when, trajectory.time_s, simulated_signal(trajectory, name)))
+            value = float(np.interp(when, trajectory.time_s, signal))
             axes.plot([when], [value], "o", color=style["color"], markersize=5.0)
     if measured is not None:
         axes.plot(measured.time_s, measured.signals[name], ".", color=GREY, markersize=3.5, label="measured")
     end = max(float(trajectory.time_s[-1]) for trajectory in trajectories.values())
     pictures.time_axis(axes, end)
-    axes.set_title(title)
-    axes.set_ylabel(label)
-    overturned = any(math.isfinite(t.motion.outcome.t_limit) for t in trajectories.values())
-    if overturned:
+    axes.set_title(SIGNALS[name][0])
+    axes.set_ylabel(SIGNALS[name][1])
+    if any(math.isfinite(t.motion.outcome.t_limit) for t in trajectories.values()):
         axes.axvspan(CLOSE_UNTIL_S, end, color="#F4F0EC", zorder=-2, linewidth=0)
         words = "dots: 20° passed\nshaded: after 0.1 s, where the\npaper sees test and model part"
-        if name == SIGNALS[0][0]:
+        if name == "boulder_displacement":
             axes.annotate(words, (0.97, 0.05), xycoords="axes fraction", ha="right", fontsize=7.5, color=GREY)
     if name == "rotation":
         limit = math.degrees(next(iter(trajectories.values())).motion.control.theta_limit)
@@ -119,21 +102,14 @@ def draw_rigid_wall(wall: RigidWall, path: Path) -> None:
     """Draw the paper's truck against a rigid wall, the response of the Maxwell element in Figure 10."""
     time = np.linspace(0.0, 0.2, 401)
     x, v, acceleration = wall.response(time)
+    force, peak_kN = -wall.mass_kg * acceleration / 1e3, wall.peak_force / 1e3
+    curves = (
+        (x, "Displacement", "displacement [m]", wall.max_displacement_time_s, wall.max_displacement_m, "{:.3f} m"),
+        (v, "Velocity", "velocity [m/s]", wall.separation_time_s, wall.rebound_speed_m_s, "{:.2f} m/s"),
+        (force, "Force on the wall", "force [kN]", wall.peak_force_time_s, peak_kN, "{:.0f} kN"),
+    )
     with pictures.figure(path, 9.6, 3.3) as fig:
-        row = fig.subplots(1, 3)
-        curves = (
-            (x, "Displacement", "displacement [m]", wall.max_displacement_time_s, wall.max_displacement_m, "{:.3f} m"),
-            (v, "Velocity", "velocity [m/s]", wall.separation_time_s, wall.rebound_speed_m_s, "{:.2f} m/s"),
-            (
-                -wall.mass_kg * acceleration / 1e3,
-                "Force on the wall",
-                "force [kN]",
-                wall.peak_force_time_s,
-                wall.peak_force / 1e3,
-                "{:.0f} kN",
-            ),
-        )
-        for axes, (values, title, label, when, peak, words) in zip(row, curves, strict=True):
+        for axes, (values, title, label, when, peak, words) in zip(fig.subplots(1, 3), curves, strict=True):
             axes.plot(time, values, color=BLUE)
             pictures.time_axis(axes, float(time[-1]))
             axes.set_title(title)
@@ -189,14 +165,9 @@ def draw_fit(fit: VehicleFit, path: str | Path) -> None:
             below.set_xlim(left=float(fine[0]))
             below.locator_params(axis="x", nbins=5)  # more numbers run into one another
         grid[0, 0].legend(loc="best")
-        pictures.headline(fig, fit_line(fit), size=10.5)
+        spring = f"spring {fit.wall.spring_N_m / 1e3:.1f} ± {fit.spring_error_N_m / 1e3:.1f} kN/m"
+        damper = f"damper {fit.wall.damper_N_s_m / 1e3:.2f} ± {fit.damper_error_N_s_m / 1e3:.2f} kN·s/m"
+        pictures.headline(fig, f"{spring}, {damper}", size=10.5)
         if fit.warnings:
             first = "Caution: " + fit.warnings[0].split(":")[0]
             pictures.caption(fig, first, size=8.5, colour=ORANGE)
-
-
-def fit_line(fit: VehicleFit) -> str:
-    """Spring and damper with their errors of 95 % on one line."""
-    spring = f"spring {fit.wall.spring_N_m / 1e3:.1f} ± {fit.spring_error_N_m / 1e3:.1f} kN/m"
-    damper = f"damper {fit.wall.damper_N_s_m / 1e3:.2f} ± {fit.damper_error_N_s_m / 1e3:.2f} kN·s/m"
-    return f"{spring}, {damper}"

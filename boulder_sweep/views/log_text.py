@@ -14,15 +14,10 @@ _BAR = 24
 
 
 def log_lines(data: dict[str, Any], units: str = SYSTEMS[0]) -> list[str]:
-    """Return a log as lines of plain characters, none longer than 80.
+    """Return a log, one of ``derived["soil"]`` of a sweep, as lines of plain characters, none longer than 80.
 
-    Parameters
-    ----------
-    data
-        One of ``derived["soil"]`` of `boulder_sweep.settings.Sweep.derived`, made of a log. Readings below the first
-        one under the deepest foot are counted only, and of many the weaker ones stand for their neighbours.
-    units
-        In which depths are shown, ``si`` or ``us``.
+    Readings below the first one under the deepest foot are counted only, and of many the weaker ones stand for their
+    neighbours. Depths are in ``si`` or ``us`` units.
     """
     length, metres = shown_unit("m", units)
     shown = shown_readings(data)

@@ -58,7 +58,7 @@ STYLE: Any = {
     "savefig.facecolor": "white",
     "svg.hashsalt": "boulder-sweep",
 }
-KINDS = (".png", ".svg", ".pdf")
+KINDS, ANIMATED = (".png", ".svg", ".pdf"), (".gif",)
 MARGIN = 0.01
 """Beside titles and captions, as a share of the width."""
 
@@ -72,13 +72,7 @@ def require_matplotlib() -> None:
 
 
 def checked_kind(path: str | Path, kinds: tuple[str, ...] = KINDS) -> Path:
-    """Return the path of a picture if it can be written there.
-
-    Raises
-    ------
-    PictureError
-        Its extension is not one of `kinds`, or its folder does not exist or holds the result of a run.
-    """
+    """Return the path of a picture, refused if its kind is unknown or its folder is missing or holds a run's result."""
     target = Path(path)
     if target.suffix.lower() not in kinds:
         raise PictureError(f"{path}: the name of a picture must end in {', '.join(kinds)}")
@@ -96,20 +90,7 @@ def make_folder(folder: Path) -> None:
 
 @contextmanager
 def figure(path: str | Path, width: float, height: float) -> Iterator[Figure]:
-    """Yield an empty figure, and save it at the end.
-
-    Parameters
-    ----------
-    path
-        Picture to write.
-    width, height
-        Size in inches.
-
-    Raises
-    ------
-    PictureError
-        The kind is unknown, the folder is missing or cannot be written, or matplotlib is not installed.
-    """
+    """Yield an empty figure of a size in inches, and save it at the end."""
     target = checked_kind(path)
     require_matplotlib()
     import matplotlib
@@ -197,6 +178,12 @@ def time_axis(axes: Axes, end_s: float) -> None:
 def limit_y(axes: Axes, low: float, high: float) -> None:
     """Set the range of the vertical axis, never an empty one."""
     axes.set_ylim(low, high if high > low else low + 1.0)
+
+
+def note_line(axes: Axes, words: str, at: float, value: float, **style: Any) -> None:
+    """Write words on a horizontal line at a value, at a share of the width of the axes."""
+    place: Any = {"xycoords": ("axes fraction", "data"), "xytext": (0, 3), "textcoords": "offset points"}
+    axes.annotate(words, (at, value), fontsize=8.5, **place, **style)
 
 
 def mark_peak(axes: Axes, time: float, value: float, text: str, colour: str, *, below: bool = False) -> None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from boulder_sweep.errors import PictureError
 from boulder_sweep.views.pictures import BLACK, BLUE, GREY, caption, figure, headline
-from boulder_sweep.views.side_view import STYLES
+from boulder_sweep.views.side_view import STYLES, Window
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,7 +49,7 @@ def draw_placing(placing: Placing, path: str | Path) -> None:
     if not best:
         raise PictureError("no way to stand passes at any depth, so there is nothing to draw")
     view = _view_of([way.standing for way in best], [way.depth_m or 0.0 for way in best])
-    with figure(path, len(best) * PANEL_IN, view.height_in + 1.3) as fig:
+    with figure(path, len(best) * PANEL_IN, view.height_in(PANEL_IN) + 1.3) as fig:
         panels = list(np.atleast_1d(fig.subplots(1, len(best))))
         _same_scale(panels, view)
         for axes, way in zip(panels, best, strict=True):
@@ -82,32 +82,16 @@ def draw_standing(axes: Axes, standing: Standing, ground_m: float = 0.0) -> None
     axes.plot(standing.centre[0], standing.centre[1] - ground_m, "o", color=BLACK, markersize=4.0)
 
 
-class View(NamedTuple):
-    """What the panels of a picture show [m]; heights count from the ground."""
-
-    left: float
-    right: float
-    low: float
-    high: float
-
-    @property
-    def height_in(self) -> float:
-        """Height of a panel."""
-        return PANEL_IN * (self.high - self.low) / (self.right - self.left)
-
-
-def _view_of(shown: Sequence[Standing], grounds_m: Sequence[float]) -> View:
+def _view_of(shown: Sequence[Standing], grounds_m: Sequence[float]) -> Window:
     """Return a view with room for the largest stone; the ground is at these heights over the feet."""
     outlines = [standing.outline - (ground_m, 0.0, 0.0) for standing, ground_m in zip(shown, grounds_m, strict=True)]
     height, *sides = np.concatenate(outlines).T
     low, high, (near, far) = height.min(), height.max(), (side.max() for side in sides)
-    return View(-near - ROOM_M, far + ROOM_M, low - ROOM_M, high + ROOM_M)
+    return Window(-near - ROOM_M, far + ROOM_M, low - ROOM_M, high + ROOM_M)
 
 
-def _same_scale(panels: Sequence[Axes], view: View) -> None:
+def _same_scale(panels: Sequence[Axes], view: Window) -> None:
     """Give all panels one view."""
     for axes in panels:
-        axes.set_xlim(view.left, view.right)
-        axes.set_ylim(view.low, view.high)
-        axes.set_aspect("equal")
+        view.show(axes)
         axes.tick_params(colors=GREY, labelsize=7.5)

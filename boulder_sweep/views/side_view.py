@@ -82,14 +82,23 @@ LONGEST_ARROW_M = 1.5
 SHORTEST_ARROW_M = 0.03
 
 
-@dataclass(frozen=True)
-class Window:
-    """What the view shows [m]."""
+class Window(NamedTuple):
+    """What a view shows [m]."""
 
     left: float
     right: float
     bottom: float
     top: float
+
+    def height_in(self, width_in: float) -> float:
+        """Height of a picture of this width that shows it to scale."""
+        return width_in * (self.top - self.bottom) / (self.right - self.left)
+
+    def show(self, axes: Axes) -> None:
+        """Show it to scale."""
+        axes.set_xlim(self.left, self.right)
+        axes.set_ylim(self.bottom, self.top)
+        axes.set_aspect("equal")
 
 
 @dataclass(frozen=True)
@@ -103,19 +112,14 @@ class SideView:
         """The whole impact with some space around it."""
         design, inputs = self.trajectory.motion.design, self.trajectory.inputs
         wedge = design.L + design.d * wedge_slope(design.phi)
-        reach = max(wedge, self.rating_line + 0.3) + 0.6
-        return Window(
-            left=-(inputs["bed_offset_m"] + 1.6),
-            right=reach,
-            bottom=-design.d - 0.55,
-            top=max(design.H - design.d, 2.55) + 0.95,
-        )
+        right, top = max(wedge, self.rating_line + 0.3) + 0.6, max(design.H - design.d, 2.55) + 0.95
+        return Window(-(inputs["bed_offset_m"] + 1.6), right, -design.d - 0.55, top)
 
     @property
     def rating_line(self) -> float:
         """How far the cargo bed may come: the far face of the boulder and the limit of the rating [m]."""
         rating = self.trajectory.settings["criterion"]["rating"]
-        return max(x for x, _ in self._outline()) + PENETRATION_LIMITS_M[rating]
+        return max(x for x, _ in self._corners(self.trajectory.motion.outline)) + PENETRATION_LIMITS_M[rating]
 
     @property
     def metres_per_newton(self) -> float:
@@ -125,9 +129,7 @@ class SideView:
 
     def ground(self) -> list[SceneItem]:
         """Return what does not move: soil, initial position of the boulder, line of the rating, scale of force."""
-        w, design = self.window, self.trajectory.motion.design
-        rating = self.trajectory.settings["criterion"]["rating"]
-        outline = self._outline()
+        w, rating = self.window, self.trajectory.settings["criterion"]["rating"]
         unit = 1000e3 if LONGEST_ARROW_M / self.metres_per_newton > 1600e3 else 500e3
         length, x, y = unit * self.metres_per_newton, w.left + 0.25, w.bottom + 0.25
         line = self.rating_line
@@ -135,7 +137,7 @@ class SideView:
             SceneItem("polygon", "soil", ((w.left, w.bottom), (w.right, w.bottom), (w.right, 0.0), (w.left, 0.0))),
             SceneItem("line", "limit", ((line, 0.0), (line, w.top - 0.75))),
             SceneItem("text", "limit", ((line + 0.06, w.top - 0.8),), f"{rating}: cargo bed\nmust stop here"),
-            SceneItem("line", "initial", (*((x, z - design.d) for x, z in outline), (outline[0][0], -design.d))),
+            SceneItem("line", "initial", self._initial(self.trajectory.motion.outline)),
             *self._other_shapes(),
             SceneItem("line", "scale", ((x, y), (x + length, y))),
             SceneItem("text", "scale", ((x, y + 0.08),), f"{unit / 1e3:.0f} kN"),
@@ -147,18 +149,10 @@ class SideView:
     def _other_shapes(self) -> list[SceneItem]:
         """Return the other shapes that a boulder as taped and weighed may have, where they stand at first."""
         row, design = self.trajectory.row, self.trajectory.motion.design
-        sizes, items = (design.H, design.W, design.L, design.L), []
-        for shape in SHAPES if row["shape"] is not None else ():
-            if shape != row["shape"]:
-                outline = taped_profiles(shape, np.array([row["solidity"]]))[0] * sizes
-                heights = outline[:, HEIGHT] - design.d
-                struck = np.interp(design.e, heights, outline[:, NEAR])
-                near, far = (
-                    [*zip(x.tolist(), heights.tolist(), strict=True)]
-                    for x in (struck - outline[:, NEAR], struck + outline[:, FAR])
-                )
-                items.append(SceneItem("line", "initial", (*near, *far[::-1], near[0])))
-        return items
+        others = [shape for shape in SHAPES if shape != row["shape"]] if row["shape"] is not None else []
+        profiles = (taped_profiles(shape, np.array([row["solidity"]]))[0] for shape in others)
+        sizes = (design.H, design.W, design.L, design.L)
+        return [SceneItem("line", "initial", self._initial(profile * sizes)[::-1]) for profile in profiles]
 
     def moving(self, sample: int) -> list[SceneItem]:
         """Return what moves, at one sample: soil wedge, boulder, truck, forces."""
@@ -187,8 +181,9 @@ class SideView:
         return centre + x * cos + y * sin, -c.z_0 - x * sin + y * cos
 
     def _boulder(self, sample: int) -> list[SceneItem]:
-        c, body = self.trajectory.motion.constants, self.trajectory.motion.body
-        corners = [(x - c.c_x, z - c.c_y) for x, z in self._outline()]
+        motion = self.trajectory.motion
+        c, body = motion.constants, motion.body
+        corners = [(x - c.c_x, z - c.c_y) for x, z in self._corners(motion.outline)]
         centre = self._position(sample, body.x - c.c_x, body.y - c.c_y)
         weight = body.m_b * G
         tip = (centre[0], centre[1] - weight * self.metres_per_newton)
@@ -198,30 +193,32 @@ class SideView:
             SceneItem("arrow", "weight", (centre, tip)),
         ]
 
-    def _faces(self, heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _faces(self, outline: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Near and far face at heights over the foot, in x from where the boulder is struck [m]."""
-        motion = self.trajectory.motion
-        outline, design = motion.outline, motion.design
+        design = self.trajectory.motion.design
         struck, near = (np.interp(z, outline[:, HEIGHT], outline[:, NEAR]) for z in (design.d + design.e, heights))
         return struck - near, struck + np.interp(heights, outline[:, HEIGHT], outline[:, FAR])
 
-    def _outline(self) -> list[tuple[float, float]]:
-        """Corners of the boulder from the near one of its foot around, x from where it is struck, z over the foot."""
-        heights = self.trajectory.motion.outline[:, HEIGHT]
-        near, far = ([*zip(side.tolist(), heights.tolist(), strict=True)] for side in self._faces(heights))
+    def _corners(self, outline: np.ndarray) -> list[tuple[float, float]]:
+        """Corners of a boulder from the near one of its foot around, x from where it is struck, z over the foot."""
+        heights = outline[:, HEIGHT]
+        near, far = ([*zip(side.tolist(), heights.tolist(), strict=True)] for side in self._faces(outline, heights))
         return [near[0], *far, *near[:0:-1]]
+
+    def _initial(self, outline: np.ndarray) -> tuple[tuple[float, float], ...]:
+        """Corners of a boulder where it stands at first, from the near one of its foot around and back to it."""
+        corners = [(x, z - self.trajectory.motion.design.d) for x, z in self._corners(outline)]
+        return (*corners, corners[0])
 
     def _face(self, depth: float, *, is_near: bool) -> float:
         """Where a face of the boulder is at a depth, in x from the common centre of mass [m]."""
         motion = self.trajectory.motion
-        near, far = self._faces(np.array([motion.design.d - depth]))
+        near, far = self._faces(motion.outline, np.array([motion.design.d - depth]))
         return float((near if is_near else far)[0] - motion.constants.c_x)
 
     def _wedge(self, sample: int) -> list[SceneItem]:
         """The soil that moves with the boulder: a wedge cut into slices, each moving with its element."""
-        motion = self.trajectory.motion
-        c, design = motion.constants, motion.design
-        slope = wedge_slope(design.phi)
+        c, slope = self.trajectory.motion.constants, wedge_slope(self.trajectory.motion.design.phi)
         levels = [k / 24 * c.d for k in range(25)]
         near = [self._position(sample, self._face(level, is_near=False), c.z_0 - level) for level in levels]
         far = [(x + (c.d - level) * slope, y) for (x, y), level in zip(near, levels, strict=True)]
@@ -283,41 +280,21 @@ def truck_shapes(trajectory: Trajectory, sample: int) -> list[SceneItem]:
         left = min(behind / zone, 1.0)
         return x_v - behind - min(crush, (1.0 - LEAST_LEFT) * zone) * (1.0 - left), height
 
-    roof = max(hood + 0.85, 2.2)
-    cab_back = max(offset - 0.25, zone)
-    cab = (
-        at(0.0, bumper),
-        at(0.0, hood - 0.25),
-        at(0.15, hood),
-        at(0.38 * cab_back, hood + 0.05),
-        at(0.55 * cab_back, roof),
-        at(cab_back, roof),
-        at(cab_back, bumper),
+    roof, cab, end = max(hood + 0.85, 2.2), max(offset - 0.25, zone), offset + BED_LENGTH_M
+    nose = ((0.0, bumper), (0.0, hood - 0.25), (0.15, hood), (0.38 * cab, hood + 0.05), (0.55 * cab, roof))
+    pane = ((0.44 * cab, hood + 0.1), (0.57 * cab, roof - 0.15), (0.85 * cab, roof - 0.15), (0.85 * cab, hood + 0.1))
+    shapes = (
+        ("polygon", "truck", ((cab, 0.7), (cab, 1.05), (end, 1.05), (end, 0.7))),
+        ("polygon", "bed", ((offset, 1.05), (offset, 2.3), (end, 2.3), (end, 1.05))),
+        ("polygon", "truck", (*nose, (cab, roof), (cab, bumper))),
+        ("polygon", "window", pane),
+        ("line", "bed_edge", ((offset, 0.75), (offset, 2.45))),
+        ("circle", "wheel", ((0.36 * cab, WHEEL_RADIUS_M),)),
+        ("circle", "wheel", ((offset + 3.2, WHEEL_RADIUS_M),)),
     )
-    window = (
-        at(0.44 * cab_back, hood + 0.1),
-        at(0.57 * cab_back, roof - 0.15),
-        at(0.85 * cab_back, roof - 0.15),
-        at(0.85 * cab_back, hood + 0.1),
-    )
-    bed = (
-        at(offset, 1.05),
-        at(offset, 2.3),
-        at(offset + BED_LENGTH_M, 2.3),
-        at(offset + BED_LENGTH_M, 1.05),
-    )
-    frame = (at(cab_back, 0.7), at(cab_back, 1.05), at(offset + BED_LENGTH_M, 1.05), at(offset + BED_LENGTH_M, 0.7))
-    wheels = [
-        SceneItem("circle", "wheel", (at(behind, WHEEL_RADIUS_M),), radius=WHEEL_RADIUS_M)
-        for behind in (0.36 * cab_back, offset + 3.2)
-    ]
     return [
-        SceneItem("polygon", "truck", frame),
-        SceneItem("polygon", "bed", bed),
-        SceneItem("polygon", "truck", cab),
-        SceneItem("polygon", "window", window),
-        SceneItem("line", "bed_edge", (at(offset, 0.75), at(offset, 2.45))),
-        *wheels,
+        SceneItem(kind, style, tuple(at(*corner) for corner in corners), radius=WHEEL_RADIUS_M)
+        for kind, style, corners in shapes
     ]
 
 
@@ -340,17 +317,13 @@ def draw_still(trajectory: Trajectory, path: str | Path, *, time_s: float | None
 
 def height_of(view: SideView) -> float:
     """Height of a figure [in] that shows the whole window to scale under two lines of title."""
-    w = view.window
-    return WIDTH_IN * (w.top - w.bottom) / (w.right - w.left) + 0.55
+    return view.window.height_in(WIDTH_IN) + 0.55
 
 
 def stage(fig: Figure, view: SideView) -> Axes:
     """Draw everything that does not move."""
     axes = fig.subplots()
-    w = view.window
-    axes.set_xlim(w.left, w.right)
-    axes.set_ylim(w.bottom, w.top)
-    axes.set_aspect("equal")
+    view.window.show(axes)
     axes.set_axis_off()
     draw(axes, view.ground(), behind=True)
     pictures.headline(fig, verdict_line(view.trajectory), size=11.0)
@@ -364,8 +337,7 @@ def draw(axes: Axes, shapes: Iterable[SceneItem], *, behind: bool = False) -> li
     from matplotlib.patches import Circle, FancyArrowPatch, Polygon
 
     artists: list[Any] = []
-    order = 1.0 if behind else 2.0
-    for shape in shapes:
+    for place, shape in enumerate(shapes):
         style = STYLES[shape.style]
         dash: Any = (0, style.dash) if style.dash else "-"
         if shape.kind == "text":
@@ -377,22 +349,19 @@ def draw(axes: Axes, shapes: Iterable[SceneItem], *, behind: bool = False) -> li
             (x0, y0), (x1, y1) = shape.points
             head = min(HEAD_PT, HEAD_PT_PER_M * float(np.hypot(x1 - x0, y1 - y0)))
             look: Any = {"arrowstyle": "-|>", "mutation_scale": head, "shrinkA": 0.0, "shrinkB": 0.0}
-            arrow = FancyArrowPatch(*shape.points, **look, color=style.line, linewidth=style.width)
-            drawn = axes.add_patch(arrow)
+            drawn = axes.add_patch(FancyArrowPatch(*shape.points, **look, color=style.line, linewidth=style.width))
         elif shape.kind == "circle":
             circle = Circle(shape.points[0], shape.radius, facecolor=style.fill, edgecolor=style.line)
             drawn = axes.add_patch(circle)
         else:
             polygon = Polygon(shape.points, facecolor=style.fill, edgecolor=style.line, linewidth=style.width)
             drawn = axes.add_patch(polygon)
-        drawn.set_zorder(order)
+        drawn.set_zorder((1.0 if behind else 2.0) + 0.001 * place)
         drawn.set_clip_on(True)
         artists.append(drawn)
-        order += 0.001
     return artists
 
 
-KINDS = (".gif",)
 EVERY_S = 0.005
 """Time between two frames [s]."""
 MOST_FRAMES = 120
@@ -409,7 +378,7 @@ SWATCH = 40
 
 def animate(trajectory: Trajectory, path: str | Path, progress: ProgressCallback | None = None) -> None:
     """Animate the side view (.gif); `progress` is called with how many frames of how many are drawn."""
-    target = pictures.checked_kind(path, KINDS)
+    target = pictures.checked_kind(path, pictures.ANIMATED)
     require_samples(trajectory)
     try:
         with replacing(target) as file:

@@ -10,18 +10,7 @@ import numpy as np
 
 from boulder_sweep.errors import PictureError
 from boulder_sweep.views import pictures
-from boulder_sweep.views.pictures import (
-    AMBER,
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    LIGHT_GREY,
-    ORANGE,
-    PURPLE,
-    SKY,
-    YELLOW,
-)
+from boulder_sweep.views.pictures import AMBER, BLACK, BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, PURPLE, SKY, YELLOW
 from boulder_sweep.views.wording import design_line, sized, verdict_line
 
 if TYPE_CHECKING:
@@ -43,10 +32,13 @@ def draw_trajectory(trajectory: Trajectory, path: str | Path, *, units: str = "s
         _force(force, trajectory, units)
         _boulder(boulder, trajectory, units)
         _vehicle(vehicle, trajectory, units)
-        for axes in (rotation, force, boulder, vehicle):
-            shade_unreliable(axes, trajectory)
+        start, end = unreliable_from(trajectory)[0], float(trajectory.time_s[-1])
+        if start < end:
+            colour = AFTER_PEAK if trajectory.row["time_to_limit_s"] is None else BEYOND_LIMIT
+            for axes in (rotation, force, boulder, vehicle):
+                axes.axvspan(start, end, color=colour, zorder=-2, linewidth=0)
         for axes in (boulder, vehicle):  # those above share their axis
-            pictures.time_axis(axes, float(trajectory.time_s[-1]))
+            pictures.time_axis(axes, end)
         _peaks(rotation, force, boulder, vehicle, trajectory, units)
         pictures.headline(fig, verdict_line(trajectory))
         pictures.caption(fig, design_line(trajectory, units), size=8.5)
@@ -74,32 +66,14 @@ def unreliable_from(trajectory: Trajectory) -> tuple[float, str]:
     return peak, "shaded: rebound (the soil of the model has no memory)"
 
 
-def shade_unreliable(axes: Axes, trajectory: Trajectory) -> None:
-    """Shade the time from the rotation limit, or from the peak, to the end."""
-    start, end = unreliable_from(trajectory)[0], float(trajectory.time_s[-1])
-    if start < end:
-        colour = AFTER_PEAK if trajectory.row["time_to_limit_s"] is None else BEYOND_LIMIT
-        axes.axvspan(start, end, color=colour, zorder=-2, linewidth=0)
-
-
 def _rotation(axes: Axes, trajectory: Trajectory) -> None:
     limit = math.degrees(trajectory.motion.control.theta_limit)
     degrees = np.degrees(trajectory.rotation_rad)
     axes.plot(trajectory.time_s, degrees, color=BLUE)
-    axes.axhline(limit, color=ORANGE, linestyle="--", linewidth=1.3)
-    if degrees.min() < -0.5 * limit:
-        axes.axhline(-limit, color=ORANGE, linestyle="--", linewidth=1.3)
+    for line in (limit, -limit) if degrees.min() < -0.5 * limit else (limit,):
+        axes.axhline(line, color=ORANGE, linestyle="--", linewidth=1.3)
     axes.set_ylim(min(1.1 * degrees.min(), -0.04 * limit), 1.18 * max(limit, degrees.max()))
-    axes.annotate(
-        f"limit {limit:g}°",
-        (0.99, limit),
-        xycoords=("axes fraction", "data"),
-        xytext=(0, 3),
-        textcoords="offset points",
-        ha="right",
-        fontsize=8.5,
-        color=ORANGE,
-    )
+    pictures.note_line(axes, f"limit {limit:g}°", 0.99, limit, ha="right", color=ORANGE)
     axes.set_title("Rotation of the boulder")
     axes.set_ylabel("rotation [deg]")
 
@@ -177,13 +151,10 @@ LAYERS = (
 
 
 def draw_energy(trajectory: Trajectory, path: str | Path, *, units: str = "si") -> None:
-    """Draw the energy ledger of one impact, stacked over time.
+    """Draw the energy ledger of one impact, stacked over time, negative parts below zero.
 
-    Notes
-    -----
-    Under printed readings the work against the restoring moment can be negative, and the pull on the vehicle
-    without a partner takes energy out of nothing. Negative parts are stacked below zero, so that the bands above
-    zero rise over the line of the energy at first touch by as much.
+    Under printed readings the work against the restoring moment can be negative, and the pull on the vehicle without
+    a partner takes energy out of nothing: the bands above zero rise over the energy at first touch by as much.
     """
     require_samples(trajectory)
     ledger = trajectory.energy()
@@ -204,18 +175,15 @@ def draw_energy(trajectory: Trajectory, path: str | Path, *, units: str = "si") 
             axes.fill_between(time, below, below + down, **style)
             above, below = above + up, below + down
         axes.axhline(initial, color=BLACK, linestyle="--", linewidth=1.0)
-        axes.annotate(
-            f"at first touch {initial:.0f} {unit}",
-            (0.01, initial),
-            xycoords=("axes fraction", "data"),
-            xytext=(0, 3),
-            textcoords="offset points",
-            fontsize=8.5,
-        )
+        pictures.note_line(axes, f"at first touch {initial:.0f} {unit}", 0.01, initial)
         pictures.time_axis(axes, float(time[-1]))
         pictures.limit_y(axes, 1.05 * float(below.min()), 1.09 * max(float(above.max()), initial))
         axes.grid(visible=False)
-        _mark_limit(axes, trajectory)
+        if (when := trajectory.row["time_to_limit_s"]) is not None:
+            axes.axvline(when, color=BLACK, linestyle=":", linewidth=1.2)
+            limit = math.degrees(trajectory.motion.control.theta_limit)
+            words = f" {limit:g}°: beyond, the model no longer holds"
+            axes.annotate(words, (when, 0.02), xycoords=("data", "axes fraction"), fontsize=8.5)
         axes.set_ylabel(f"energy [{unit}]")
         axes.set_title(
             f"The parts add up to the energy at first touch to within {ledger.largest_residual:.0e} of it.",
@@ -225,13 +193,3 @@ def draw_energy(trajectory: Trajectory, path: str | Path, *, units: str = "si") 
         axes.legend(handles=handles[::-1], loc="center left", bbox_to_anchor=(1.0, 0.5))
         pictures.headline(fig, verdict_line(trajectory))
         pictures.caption(fig, design_line(trajectory, units))
-
-
-def _mark_limit(axes: Axes, trajectory: Trajectory) -> None:
-    """Mark the time of the rotation limit."""
-    when = trajectory.row["time_to_limit_s"]
-    if when is not None:
-        axes.axvline(when, color=BLACK, linestyle=":", linewidth=1.2)
-        limit = math.degrees(trajectory.motion.control.theta_limit)
-        words = f" {limit:g}°: beyond, the model no longer holds"
-        axes.annotate(words, (when, 0.02), xycoords=("data", "axes fraction"), fontsize=8.5)

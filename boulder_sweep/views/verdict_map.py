@@ -6,10 +6,11 @@ the rows of the plane are kept.
 
 from __future__ import annotations
 
+import itertools
 import textwrap
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -49,16 +50,12 @@ def with_positions(pieces: Pieces, sets: Mapping[str, Sequence[str]]) -> Pieces:
     """Return a table whose columns of names hold the position of each name in its list instead."""
     if not sets:
         return pieces
-    positions = {
-        column: {name: float(position) for position, name in enumerate(names)} for column, names in sets.items()
-    }
+    positions = {column: {name: float(at) for at, name in enumerate(names)} for column, names in sets.items()}
 
     def numbered(columns: Sequence[str]) -> Iterator[pd.DataFrame]:
         for piece in pieces(columns):
-            numbers = {
-                name: piece[name].astype(str).map(positions[name]).astype(float) for name in positions if name in piece
-            }
-            yield piece.assign(**numbers)
+            there = {name: numbers for name, numbers in positions.items() if name in piece}
+            yield piece.assign(**{name: piece[name].astype(str).map(at).astype(float) for name, at in there.items()})
 
     return numbered
 
@@ -69,13 +66,11 @@ def finished_pieces(finished: FinishedRows) -> Pieces:
 
     def pieces(columns: Sequence[str]) -> Iterator[pd.DataFrame]:
         nonlocal verified
-        there = [name for name in columns if name in finished.columns or name not in OPTIONAL_COLUMNS]
-        stored = list(
-            dict.fromkeys(column for name in there for column in ((DEPTH, HEIGHT) if name == RATIO else (name,)))
-        )
+        missing = {RATIO, *OPTIONAL_COLUMNS} - {*finished.columns}
+        stored = [name for name in dict.fromkeys((DEPTH, HEIGHT, *columns)) if name not in missing]
         for table in finished.tables(stored, verify=not verified):
-            frame = table.to_pandas()
-            yield frame.assign(**{RATIO: frame[DEPTH] / frame[HEIGHT]}) if RATIO in columns else frame
+            (frame,) = pieces_of(table.to_pandas())(columns)
+            yield frame
         verified = True
 
     return pieces
@@ -91,39 +86,15 @@ TRIPLET = {RATIO, DEPTH, HEIGHT}
 """Two of them give the third."""
 DIGITS = 9
 """Inputs that agree to so many digits are the same value; products of axes differ in their last bits."""
+MOST = {"columns": 4, "rows": 3}
+"""Most columns and rows of small multiples; of more values, evenly spaced ones are shown."""
 MOST_SETS = 8
 """Most named soils or vehicles side by side."""
 
 
 @dataclass(frozen=True, eq=False)
 class Slice:
-    """Rows of one plane.
-
-    Attributes
-    ----------
-    rows : DataFrame
-        The rows shown, with the columns of the table and ``embedment_ratio``.
-    across, up : str
-        Inputs on the axes of each picture.
-    columns, rows_over : str or None
-        Inputs over the small multiples.
-    column_values, row_values : list of float
-        Their values shown; [nan] where there is none.
-    fixed : dict of str to float
-        Inputs that vary in the table and are held, with their values here.
-    constants : dict of str to float
-        Inputs that have one value in the whole table.
-    total : int
-        Number of rows of the table.
-    flags : dict of str to int
-        Number of passing rows with each flag of the column ``validity``; under ``""`` those without any.
-    grades : dict of str to int
-        Number of passing rows with each grade of the column ``robustness``; empty for a table without it.
-    left_out : dict of str to int
-        Inputs of which only some values are shown, each with the number of its values.
-    sets : dict of str to sequence of str
-        Named soils or vehicles; their values here are positions in these lists.
-    """
+    """Rows of one plane, `total` of the whole table, and the inputs across, up and over small multiples."""
 
     rows: pd.DataFrame
     across: str
@@ -132,13 +103,20 @@ class Slice:
     rows_over: str | None
     column_values: list[float]
     row_values: list[float]
+    """Values over the small multiples; [nan] where there is no such input."""
     fixed: dict[str, float]
+    """Inputs that vary in the table and are held, with their values here."""
     constants: dict[str, float]
+    """Inputs that have one value in the whole table."""
     total: int
-    flags: Mapping[str, int] = field(default_factory=dict)
-    grades: Mapping[str, int] = field(default_factory=dict)
-    left_out: dict[str, int] = field(default_factory=dict)
-    sets: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    flags: Mapping[str, int]
+    """Number of passing rows with each flag of the column ``validity``; under ``""`` those without any."""
+    grades: Mapping[str, int]
+    """Number of passing rows with each grade of the column ``robustness``; empty for a table without it."""
+    left_out: dict[str, int]
+    """Inputs of which only some values are shown, each with the number of its values."""
+    sets: Mapping[str, Sequence[str]]
+    """Named soils or vehicles; their values here are positions in these lists."""
 
     @property
     def count(self) -> int:
@@ -148,7 +126,7 @@ class Slice:
     @property
     def passing(self) -> int:
         """Number of rows in the plane that pass."""
-        return int((self.rows[VERDICT] == "pass").sum()) if VERDICT in self.rows else 0
+        return int((self.rows[VERDICT] == "pass").sum())
 
 
 def plane(
@@ -159,33 +137,14 @@ def plane(
     columns: str | None = None,
     rows: str | None = None,
     at: Mapping[str, float] | None = None,
-    most: tuple[int, int] = (4, 3),
     sets: Mapping[str, Sequence[str]] | None = None,
 ) -> Slice:
-    """Choose a plane of a table of designs.
+    """Choose a plane of a table of designs: inputs on the axes, and `columns` and `rows` over small multiples.
 
-    Parameters
-    ----------
-    table
-        A result table, or its input columns and whatever is to be shown; or a function that yields the columns asked
-        for piece by piece, as often as it is called: only the rows of the plane are kept.
-    across, up
-        Inputs on the axes; by default embedment and height where they vary.
-    columns, rows
-        Inputs over small multiples; by default subgrade reaction and friction angle where they vary.
-    at
-        Values at which other inputs are held, by default the middle one of those in the table. The nearest value
-        in the table is taken.
-    most
-        Most columns and rows of small multiples; of more values, evenly spaced ones are shown.
-    sets
-        Named soils or vehicles: the names by the column that holds them. Each is drawn for itself, up to `MOST_SETS`.
-
-    Raises
-    ------
-    PictureError
-        An input is unknown, is used twice, or cannot be held at a value because it has another one in every design;
-        or fewer than two inputs vary.
+    Inputs in `at` are held at the value nearest to the one given, others that vary at their middle one. `sets` has the
+    names of soils or vehicles by the column that holds them; each is drawn for itself, up to `MOST_SETS`. A
+    `PictureError` refuses an input that is unknown, used twice or cannot be held, and a table in which fewer than two
+    vary.
     """
     import pandas as pd  # heavy; most commands draw no map
 
@@ -213,50 +172,44 @@ def plane(
     for name in varying:
         if name in chosen.values():
             continue
-        if name in held or not _follows(name, {*filter(None, chosen.values()), *fixed}):
+        follows = name in TRIPLET and len(TRIPLET & {*chosen.values(), *fixed}) > 1
+        if name in held or not follows:
             values = levels[name]
             wanted_value = held.get(name, values[(len(values) - 1) // 2])
             fixed[name] = float(values[np.argmin(np.abs(values - wanted_value))])
-    shown_columns, shown_rows = (
-        _some(levels, chosen[role], MOST_SETS if chosen[role] in named else n)
-        for role, n in (("columns", most[0]), ("rows", most[1]))
-    )
-    admitted = [(name, [value]) for name, value in fixed.items()]
-    multiples = ((chosen["columns"], shown_columns), (chosen["rows"], shown_rows))
-    admitted += [(name, values) for name, values in multiples if name is not None]
+    multiples = {
+        role: _some(levels, chosen[role], MOST_SETS if chosen[role] in named else most) for role, most in MOST.items()
+    }
+    over = {column: values for role, values in multiples.items() if (column := chosen[role]) is not None}
+    admitted = {name: [value] for name, value in fixed.items()} | over
     asked = [*filter(None, chosen.values()), *fixed, VERDICT, REASON, VALIDITY, ROBUSTNESS]
     kept = []
     for piece in pieces(list(dict.fromkeys(asked))):
         keep = np.ones(len(piece), dtype=bool)
-        for name, shown in admitted:
+        for name, shown in admitted.items():
             column = piece[name].to_numpy(dtype=float)
             keep &= np.logical_or.reduce([_equal(column, value) for value in shown])
         kept.append(piece[keep])
     found = pd.concat(kept, ignore_index=True)
-    passes = found[found[VERDICT] == "pass"] if VERDICT in found else found[:0]
+    passes = found[found[VERDICT] == "pass"]
     flags: Counter[str] = Counter()
     for words, count in passes[VALIDITY].astype(str).value_counts().items() if VALIDITY in passes else ():
         flags.update(dict.fromkeys(str(words).split(";"), int(count)))
     grades = Counter(passes[ROBUSTNESS].dropna().astype(str)) if ROBUSTNESS in passes else Counter[str]()
-    left_out = {
-        str(chosen[role]): len(levels[str(chosen[role])])
-        for role, shown in (("columns", shown_columns), ("rows", shown_rows))
-        if chosen[role] and len(shown) < len(levels[str(chosen[role])])
-    }
     return Slice(
         rows=found,
         across=str(chosen["across"]),
         up=str(chosen["up"]),
         columns=chosen["columns"],
         rows_over=chosen["rows"],
-        column_values=shown_columns,
-        row_values=shown_rows,
+        column_values=multiples["columns"],
+        row_values=multiples["rows"],
         fixed=fixed,
         constants={name: float(values[0]) for name, values in levels.items() if len(values) == 1},
         total=total,
-        flags=dict(flags),
-        grades=dict(grades),
-        left_out=left_out,
+        flags=flags,
+        grades=grades,
+        left_out={name: len(levels[name]) for name, values in over.items() if len(values) < len(levels[name])},
         sets=named,
     )
 
@@ -290,11 +243,6 @@ def _independent(levels: Mapping[str, np.ndarray], asked: set[str]) -> list[str]
     return varying
 
 
-def _follows(name: str, given: set[str]) -> bool:
-    """Whether an input is determined by others that are shown or held."""
-    return name in TRIPLET and len(TRIPLET & given) > 1
-
-
 def select(rows: pd.DataFrame, name: str | None, value: float) -> pd.DataFrame:
     """Return the rows at one value of an input; all of them where there is no such input."""
     return rows if name is None else rows[_equal(rows[name].to_numpy(dtype=float), value)]
@@ -317,11 +265,7 @@ def _levels_of(pieces: Pieces, sets: Collection[str]) -> tuple[dict[str, np.ndar
 def _levels(values: np.ndarray) -> np.ndarray:
     """Different values of an input, ascending; nearly equal ones count once."""
     distinct = np.unique(values[np.isfinite(values)])
-    if len(distinct) < 2:
-        return distinct
-    new = np.ones(len(distinct), dtype=bool)
-    new[1:] = np.diff(distinct) > 10.0**-DIGITS * np.abs(distinct[1:])
-    return distinct[new]
+    return distinct[np.diff(distinct, prepend=-np.inf) > 10.0**-DIGITS * np.abs(distinct)]
 
 
 def _equal(values: np.ndarray, value: float) -> np.ndarray:
@@ -333,9 +277,7 @@ def _some(levels: Mapping[str, np.ndarray], name: str | None, most: int) -> list
     if name is None:
         return [float("nan")]
     values = levels[name]
-    if len(values) > most:
-        values = values[np.round(np.linspace(0, len(values) - 1, most)).astype(int)]
-    return [float(value) for value in values]
+    return values[np.round(np.linspace(0, len(values) - 1, min(most, len(values)))).astype(int)].tolist()
 
 
 CLASSES = (
@@ -385,19 +327,9 @@ def draw_verdict_map(
 ) -> Slice:
     """Draw which designs of a table pass, over two of their inputs; return what was drawn.
 
-    Parameters
-    ----------
-    table
-        A result table, as `boulder_sweep.read` returns it; input columns, ``verdict`` and ``reason`` are used. Or what
-        yields it piece by piece, see `plane`.
-    title
-        Name of the study.
-    terms
-        What a pass means, for the caption.
-    found
-        Which design is recommended, in sentences: the beginning of the caption.
-    across, up, columns, rows, at, sets
-        What is shown, see `plane`.
+    The table is as `boulder_sweep.read` returns it; input columns, ``verdict`` and ``reason`` are used. `title` names
+    the study; the caption begins with `found`, the design that is recommended, and ends with `terms`, what a pass
+    means. The other arguments say what is shown, see `plane`.
     """
     shown = plane(table, across=across, up=up, columns=columns, rows=rows, at=at, sets=sets)
     if shown.count == 0:
@@ -406,21 +338,19 @@ def draw_verdict_map(
             f"none of the {shown.total:,} designs lies at {held}: this is a list of designs rather than a grid; "
             "hold values that occur together (--at), or draw the table in a notebook"
         )
-    n_columns, n_rows = len(shown.column_values), len(shown.row_values)
+    n_rows, n_columns = len(shown.row_values), len(shown.column_values)
     width = max(2.2 * n_columns + 1.9, 5.2) + LEGEND_IN * (n_columns <= NARROW)
     characters = int(CHARACTERS_PER_INCH * width)
-    caption = _caption(shown, terms, characters, units)
-    caption = "\n".join([*textwrap.wrap(found, characters), caption])
+    caption = "\n".join([*textwrap.wrap(found, characters), _caption(shown, terms, characters, units)])
     height = max(1.9 * n_rows + 1.45, 3.45) + CAPTION_LINE_IN * (caption.count("\n") + 1)
     with pictures.figure(path, width, height) as fig:
         grid = fig.subplots(n_rows, n_columns, sharex=True, sharey=True, squeeze=False)
         present: set[int] = set()
-        for row, row_value in enumerate(shown.row_values):
-            for column, column_value in enumerate(shown.column_values):
-                axes = grid[row, column]
-                cell_rows = select(select(shown.rows, shown.columns, column_value), shown.rows_over, row_value)
-                present |= _panel(axes, cell_rows, shown, units)
-                axes.grid(visible=False)
+        values = itertools.product(shown.row_values, shown.column_values)
+        for axes, (row_value, column_value) in zip(grid.flat, values, strict=True):
+            rows_here = select(select(shown.rows, shown.columns, column_value), shown.rows_over, row_value)
+            present |= _panel(axes, rows_here, shown, units)
+            axes.grid(visible=False)
         for axes in grid[-1]:
             axes.set_xlabel(label(shown.across, units))
         for axes in grid[:, 0]:
@@ -432,13 +362,11 @@ def draw_verdict_map(
 
 def classes_of(rows: pd.DataFrame) -> np.ndarray:
     """Index into `CLASSES` of every row of a table, int8, shape (n,)."""
-    verdict = rows["verdict"].astype(str).to_numpy(dtype=object)
-    reason = rows["reason"].astype(str).to_numpy(dtype=object)
+    verdict, reason = (rows[name].astype(str).to_numpy(dtype=object) for name in (VERDICT, REASON))
     codes = np.full(len(rows), -1, dtype=np.int8)
     for code, (key, _, _) in enumerate(CLASSES):
         wanted, _, why = key.partition("/")
-        match = (verdict == wanted) & ((reason == why) if why else True)
-        codes[match] = code
+        codes[(verdict == wanted) & ((reason == why) if why else True)] = code
     return codes
 
 
@@ -504,7 +432,8 @@ def _titles(fig: Figure, grid: np.ndarray, present: set[int], shown: Slice, whic
     for row, row_value in enumerate(shown.row_values):
         lines = []
         for column, column_value in enumerate(shown.column_values):
-            parts = _panel_title(shown, row_value, column_value, units)
+            pairs = ((shown.rows_over, row_value), (shown.columns, column_value))
+            parts = [_held(shown, name, value, units) for name, value in pairs if name is not None]
             name = pictures.break_lines(fig, ", ".join(parts), map_in, **style)
             if "\n" in name:
                 name = pictures.break_lines(fig, "\n".join(parts), map_in, **style)
@@ -514,16 +443,16 @@ def _titles(fig: Figure, grid: np.ndarray, present: set[int], shown: Slice, whic
     fig.set_figheight(fig.get_figheight() + further)
 
 
-def _panel_title(shown: Slice, row_value: float, column_value: float, units: str) -> list[str]:
-    pairs = ((shown.rows_over, row_value), (shown.columns, column_value))
-    return [_held(shown, name, value, units) for name, value in pairs if name is not None]
-
-
 def _held(shown: Slice, name: str, value: float, units: str) -> str:
     """Return the value of an input in words; of a named soil or vehicle its name."""
     if name in shown.sets:
         return f"{name}: {shown.sets[name][int(value)]}"
     return value_text(name, value, units)
+
+
+def _all_held(shown: Slice, values: Mapping[str, float], units: str) -> str:
+    """Return the values of several inputs in words, each on one line."""
+    return ", ".join(keep_together(_held(shown, name, value, units)) for name, value in values.items())
 
 
 def _legend(fig: Any, present: set[int], shown: Slice, *, beside: bool) -> float:
@@ -545,19 +474,16 @@ def _legend(fig: Any, present: set[int], shown: Slice, *, beside: bool) -> float
 
 def _caption(shown: Slice, terms: str, width: int, units: str) -> str:
     """Say what is shown, what all designs have in common, and what a pass means, each on a new line."""
-    fixed = ", ".join(keep_together(_held(shown, name, value, units)) for name, value in shown.fixed.items())
-    words = [f"{shown.count:,} of {shown.total:,} designs" + (f", at {fixed}" if fixed else "")]
+    fixed = f", at {_all_held(shown, shown.fixed, units)}" if shown.fixed else ""
+    words = [f"{shown.count:,} of {shown.total:,} designs{fixed}"]
     words.append(f"{shown.passing / max(shown.count, 1):.1%} of them pass")
     if shown.grades:
         words.append(", ".join(f"{shown.grades[grade]:,} {grade}" for grade in GRADES if shown.grades.get(grade)))
     for name, count in shown.left_out.items():
         words.append(f"{name_of(name)}: {count} values, not all shown")
-    same = [
-        keep_together(_held(shown, name, value, units))
-        for name, value in shown.constants.items()
-        if (name, value) not in USUAL
-    ]
-    lines = (" · ".join(words), _flagged(shown), f"All designs: {', '.join(same)}" if same else "", terms)
+    same = {name: value for name, value in shown.constants.items() if (name, value) not in USUAL}
+    all_designs = f"All designs: {_all_held(shown, same, units)}" if same else ""
+    lines = (" · ".join(words), _flagged(shown), all_designs, terms)
     return "\n".join(textwrap.fill(line, width) for line in lines if line)
 
 
@@ -568,7 +494,7 @@ def _flagged(shown: Slice) -> str:
     shares = {name: count / shown.passing for name, count in shown.flags.items()}
     inside = shares.pop("", 0.0)
     most = sorted(shares.items(), key=lambda item: (-item[1], item[0]))
-    named = ", ".join(keep_together(f"{name.replace('_', ' ')} {share:.0%}") for name, share in most)
-    if not named:
+    if not most:
         return "No pass lies outside what the model was tested on"
+    named = ", ".join(keep_together(f"{name.replace('_', ' ')} {share:.0%}") for name, share in most)
     return f"Of the passes {1.0 - inside:.0%} lie outside what the model was tested on: {named}"

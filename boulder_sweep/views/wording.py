@@ -43,15 +43,7 @@ PRINTED = {"1": "", "MN/m^3": "MN/m³", "kg/m^3": "kg/m³", "kN*s/m": "kN·s/m",
 
 
 def sized(unit: str, units: str) -> tuple[str, float]:
-    """Return the unit in which values of a unit of the table are printed, and its size in that one.
-
-    Parameters
-    ----------
-    unit
-        Unit of a column; ``J`` and ``N`` beside.
-    units
-        ``si`` or ``us``.
-    """
+    """Return the unit in which values of a unit of the table, or in J or N, are printed, and its size in that one."""
     shown = shown_unit(unit, units)
     return PRINTED.get(shown.unit, shown.unit), shown.size
 
@@ -75,8 +67,12 @@ def name_of(name: str) -> str:
 
 def label(name: str, units: str = "si") -> str:
     """Return an input with its unit, for an axis: ``boulder height [m]``."""
-    unit = unit_of(name, units)
-    return f"{name_of(name)} [{unit}]" if unit else name_of(name)
+    return with_unit(name_of(name), unit_of(name, units))
+
+
+def with_unit(words: str, unit: str) -> str:
+    """Return words with a unit in brackets, if there is one."""
+    return f"{words} [{unit}]" if unit else words
 
 
 def value_text(name: str, value: float, units: str = "si") -> str:
@@ -127,7 +123,7 @@ def verdict_line(trajectory: Trajectory) -> str:
     if row["shape"] is not None:
         details.append(f"{row['shape'].replace('_', ' ')} is the worst of the shapes of its mass and sizes")
     words = (trajectory.verdict.upper(), REASON_WORDS.get(trajectory.reason, trajectory.reason), *details)
-    return f"{name}: {', '.join(word for word in words if word)}"
+    return f"{name}: {', '.join(filter(None, words))}"
 
 
 def terms_line(settings: Mapping[str, Any], units: str = "si") -> str:
@@ -141,13 +137,9 @@ def model_words(settings: Mapping[str, Any], units: str = "si") -> str:
     """Return the readings of the paper, and soil model and ground where they are not the paper's."""
     model = settings["model"]
     law = LAW_WORDS.get(model.get("resistance", ""), "")
-    words = (
-        f"readings {model['preset'].replace('_', ' ')}",
-        f"resistance {law}" if law else "",
-        ground_words(settings, units),
-        Shape.of_model(settings["model"]).words,
-    )
-    return ", ".join(word for word in words if word)
+    readings = f"readings {model['preset'].replace('_', ' ')}"
+    words = (readings, f"resistance {law}" if law else "", ground_words(settings, units), Shape.of_model(model).words)
+    return ", ".join(filter(None, words))
 
 
 def ground_words(settings: Mapping[str, Any], units: str = "si") -> str:
@@ -162,19 +154,8 @@ def design_line(trajectory: Trajectory, units: str = "si") -> str:
     size = " × ".join(f"{value[f'boulder_{side}_m'] / metre:.4g}" for side in ("length", "width", "height"))
     soil = (value_text(name, value[name], units) for name in ("friction_angle_deg", "subgrade_reaction_MN_m3"))
     truck, speed = (value_text(name, value[name], units) for name in ("vehicle_mass_kg", "impact_speed_m_s"))
-    words = " · ".join(
-        (
-            f"boulder {size} {unit} (L × W × H), {value['embedment_depth_m'] / metre:.4g} {unit} deep",
-            f"soil {', '.join(soil)}",
-            f"{truck}, {speed}",
-            model_words(trajectory.settings, units),
-        )
-    )
-    flags = str(trajectory.row["validity"] or "")
-    outside = f" · Outside what the model was tested on: {flags_text(flags)}" if flags else ""
-    return f"{words}\n{NOT_A_TEST}{outside}"
-
-
-def flags_text(flags: str) -> str:
-    """Return the flags of one row as words, without the underscores of their names."""
-    return ", ".join(flags.split(";")).replace("_", " ")
+    boulder = f"boulder {size} {unit} (L × W × H), {value['embedment_depth_m'] / metre:.4g} {unit} deep"
+    words = (boulder, f"soil {', '.join(soil)}", f"{truck}, {speed}", model_words(trajectory.settings, units))
+    flags = str(trajectory.row["validity"] or "").replace(";", ", ").replace("_", " ")
+    outside = f" · Outside what the model was tested on: {flags}" if flags else ""
+    return f"{' · '.join(words)}\n{NOT_A_TEST}{outside}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from boulder_sweep.views.pictures import AMBER, BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, PURPLE, SKY, figure
 
@@ -42,15 +42,9 @@ def _panel(axes: Axes, points: list[Point]) -> None:
     if all(p.rotation_max_deg <= LEAST_DEG for p in points):
         axes.set_ylim(0.1 * LEAST_DEG, 10.0 * LEAST_DEG)  # no error at all, as where nothing moves
     front = sorted((p for p in points if p.pareto), key=lambda p: p.cpu_us)
-    axes.plot(
-        [p.cpu_us for p in front],
-        [max(p.rotation_p99_deg, LEAST_DEG) for p in front],
-        color=LIGHT_GREY,
-        linewidth=7.0,
-        solid_capstyle="round",
-        zorder=1,
-        label="Pareto front",
-    )
+    broad: Any = {"color": LIGHT_GREY, "linewidth": 7.0, "solid_capstyle": "round", "zorder": 1}
+    usual = [max(p.rotation_p99_deg, LEAST_DEG) for p in front]
+    axes.plot([p.cpu_us for p in front], usual, label="Pareto front", **broad)
     groups: dict[tuple[int, bool, bool], list[Point]] = {}
     for p in points:
         groups.setdefault((p.method.soil_elements, p.method.error_estimate, p.method.locate_yield), []).append(p)
@@ -71,24 +65,12 @@ def _method(axes: Axes, points: list[Point], colour: str, marker: str, words: st
     cost = [p.cpu_us for p in points]
     usual = [max(p.rotation_p99_deg, LEAST_DEG) for p in points]
     largest = [max(p.rotation_max_deg, LEAST_DEG) for p in points]
-    located = points[0].method.locate_yield
-    axes.plot(
-        cost,
-        usual,
-        marker=marker,
-        color=colour,
-        markersize=4.5,
-        markerfacecolor="white" if located else colour,
-        linewidth=1.2,
-        linestyle="--" if located else "-",
-        label=words,
-        zorder=3,
-    )
+    face, dashes = ("white", "--") if points[0].method.locate_yield else (colour, "-")
+    style: Any = {"markersize": 4.5, "markerfacecolor": face, "linewidth": 1.2, "linestyle": dashes}
+    axes.plot(cost, usual, marker=marker, color=colour, label=words, zorder=3, **style)
     axes.vlines(cost, usual, largest, color=colour, linewidth=0.8, alpha=0.6, zorder=2)
     for point, x, y in zip(points, cost, usual, strict=True):
         if point.accuracy or point in (points[0], points[-1]):
             text = point.accuracy or f"{point.method.step_ms:g} ms"
-            weight = "bold" if point.accuracy else "normal"
-            axes.annotate(
-                text, (x, y), xytext=(6, 2), textcoords="offset points", fontsize=7.5, fontweight=weight, color=colour
-            )
+            style = {"fontsize": 7.5, "fontweight": "bold" if point.accuracy else "normal", "color": colour}
+            axes.annotate(text, (x, y), xytext=(6, 2), textcoords="offset points", **style)

@@ -6,6 +6,7 @@ import itertools
 
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
 from boulder_sweep.columns import INPUT_COLUMNS
 from boulder_sweep.crash_tests.cases import crash_test
@@ -23,6 +24,14 @@ def held() -> Trajectory:
 def overturned() -> Trajectory:
     """The boulder that overturned."""
     return simulate(crash_test("abg"))
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
+    """Figures in the order in which they are finished."""
+    figures: list[Figure] = []
+    monkeypatch.setattr("boulder_sweep.views.pictures.save", lambda fig, target: figures.append(fig))
+    return figures
 
 
 @pytest.fixture(scope="session")

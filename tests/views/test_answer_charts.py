@@ -35,18 +35,15 @@ def changed(found: Uncertainty, p_pass: float, passing: int) -> Uncertainty:
     return replace(found, arrow=arrow, samples=samples)
 
 
-def figure_of(found: Uncertainty, path: Path, monkeypatch: pytest.MonkeyPatch, design_id: int = 1) -> Figure:
-    figures: list[Figure] = []
-    with monkeypatch.context() as patch:
-        patch.setattr("boulder_sweep.views.pictures.save", lambda fig, target: figures.append(fig))
-        found.plot(path / "chance.png", design_id)
-    FigureCanvasAgg(figures[0]).draw()
-    return figures[0]
+def figure_of(found: Uncertainty, path: Path, drawn: list[Figure], design_id: int = 1) -> Figure:
+    found.plot(path / "chance.png", design_id)
+    FigureCanvasAgg(drawn[-1]).draw()
+    return drawn[-1]
 
 
 @pytest.mark.parametrize(("p_pass", "passing"), [(0.0, 0), (1.0, 4096), (0.0004, 2), (0.9996, 4094), (0.5, 2048)])
-def test_probabilities_are_within_their_limits_and_readable(found, tmp_path, monkeypatch, p_pass, passing):
-    fig = figure_of(changed(found, p_pass, passing), tmp_path, monkeypatch)
+def test_probabilities_are_within_their_limits_and_readable(found, tmp_path, drawn, p_pass, passing):
+    fig = figure_of(changed(found, p_pass, passing), tmp_path, drawn)
     tornado = fig.axes[1]
     low, high = tornado.get_xlim()
     assert 0.0 <= low < high <= 1.0
@@ -62,10 +59,10 @@ def test_probabilities_are_within_their_limits_and_readable(found, tmp_path, mon
         assert "P(pass) = 0.00040" in fig.texts[0].get_text()
 
 
-def test_the_picture_says_of_which_design_it_is(found, tmp_path, monkeypatch):
+def test_the_picture_says_of_which_design_it_is(found, tmp_path, drawn):
     titles, captions = [], []
     for design_id in (0, 1):
-        title, caption = figure_of(found, tmp_path, monkeypatch, design_id).texts
+        title, caption = figure_of(found, tmp_path, drawn, design_id).texts
         titles.append(title.get_text())
         captions.append(" ".join(caption.get_text().split()))
         assert caption.get_window_extent().x1 <= caption.figure.bbox.x1
@@ -98,10 +95,8 @@ def test_digits_of_a_probability(chance: float, text: str) -> None:
 
 
 def test_every_curve_with_an_answer_is_in_the_legend_and_whole_numbers_have_whole_ticks(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, drawn: list[Figure]
 ) -> None:
-    drawn: list[Figure] = []
-    monkeypatch.setattr("boulder_sweep.views.pictures.save", lambda fig, target: drawn.append(fig))
     sweep = site(height="[10, 11, 12] ft", friction="[20, 36, 37, 38, 39, 40] deg")
     found = need(sweep, margin=0, robust=False, prefer=None)
     found.plot(tmp_path / "chart.png", units="us")
@@ -116,10 +111,8 @@ def test_every_curve_with_an_answer_is_in_the_legend_and_whole_numbers_have_whol
     ("probability", "words"), [("95 %", "passes with a probability of at least 95 %"), (None, "depth that passes")]
 )
 def test_the_title_says_for_which_probability(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, probability: str | None, words: str
+    tmp_path: Path, drawn: list[Figure], probability: str | None, words: str
 ) -> None:
-    drawn: list[Figure] = []
-    monkeypatch.setattr("boulder_sweep.views.pictures.save", lambda fig, target: drawn.append(fig))
     friction = "{mean: 40 deg, sd: 1 deg}" if probability else "40 deg"
     sweep = site(height="[3.2, 3.4] m", site="embedment_depth: [1.9, 2.3] m", friction=friction)
     need(sweep, probability=probability).plot(tmp_path / "chart.png")

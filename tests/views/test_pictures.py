@@ -74,14 +74,6 @@ def test_the_rebound_is_shaded(held: Trajectory, overturned: Trajectory, tmp_pat
     assert "20°" in unreliable_from(overturned)[1]
 
 
-@pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
-    """Figures in the order in which they are finished."""
-    figures: list[Figure] = []
-    monkeypatch.setattr("boulder_sweep.views.pictures.save", lambda fig, target: figures.append(fig))
-    return figures
-
-
 def test_pictures_state_the_row_of_the_table(overturned: Trajectory, tmp_path: Path, drawn: list[Figure]) -> None:
     """The peaks are those up to the limit, though the curves go on to a turn of 158 deg."""
     overturned.plot(tmp_path / "overturned.png")
