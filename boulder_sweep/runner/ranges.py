@@ -71,50 +71,27 @@ class StoppedError(Exception):
 
 @dataclass
 class Work:
-    """How the rows of one sweep are computed and written; the same for every worker, and picklable.
-
-    Parameters
-    ----------
-    evaluate
-        Simulates and judges a block.
-    make_block
-        Gives the inputs of some rows.
-    metadata
-        What the files of all parts have in common.
-    out
-        The folder, by path or URL.
-    rows_per_block
-        Rows that are computed at once.
-    made_by
-        What a worker elsewhere must have, see `pool.fingerprint`.
-    """
+    """How the rows of one sweep are computed and written; the same for every worker, and picklable."""
 
     evaluate: Callable[[DesignBlock], Judged]
+    """Simulates and judges a block."""
     make_block: Callable[[int, int], DesignBlock]
+    """Gives the inputs of some rows."""
     metadata: Mapping[bytes, bytes]
+    """What the files of all parts have in common."""
     out: str
+    """The folder, by path or URL."""
     rows_per_block: int
+    """Rows that are computed at once."""
     made_by: Fingerprint | None = None
+    """What a worker elsewhere must have."""
     _failures: int = field(default=0, init=False)
 
     def write(self, first: int, stop: int, tick: Callable[[int], None] = lambda rows: None) -> PartReport:
-        """Compute a range and write its part.
+        """Compute a range and write its part; `tick` is called with the rows of each block, and may raise to stop.
 
-        Parameters
-        ----------
-        first, stop
-            The range.
-        tick
-            Called with the rows of each block that is done; it may raise to stop.
-
-        Raises
-        ------
-        ComputationError
-            As for `judged`.
-        WriteError
-            The part cannot be written.
-        BackendError
-            This worker has other versions.
+        ComputationError as `judged`; WriteError where the part cannot be written; BackendError where this worker has
+        other versions.
         """
         if self.made_by is not None:
             refuse_other_versions(self.made_by)
@@ -138,10 +115,7 @@ class Work:
     def judged(self, start: int, stop: int) -> Judged:
         """Compute the rows [start, stop); those that raise alone are rows of verdict ``error``.
 
-        Raises
-        ------
-        ComputationError
-            So many calls have failed, of these rows or others, that something must be wrong with all of them.
+        ComputationError where so many calls have failed that something must be wrong with all rows.
         """
         try:
             return self.evaluate(self.make_block(start, stop))
