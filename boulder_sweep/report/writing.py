@@ -124,7 +124,12 @@ def write_report(
     given = {k: value for k, value in answer.row.items() if k != BOULDER_MASS or k in rows.settings["inputs"]}
     chosen = chosen or [_shown(answer.named, given)]
     identity = rows.finished.identity
-    notes = _notes_on_rules(rows.finished.judged_by)
+    notes = []
+    if rows.finished.judged_by:
+        notes.append(
+            f"The verdicts of the table were {rows.finished.judged_by}. Simulations in this page follow the rules of "
+            f"version {versions()['boulder-sweep']} and may differ from it."
+        )
     settings, control = identity["settings"], Control(**identity["control"])
     units = units or units_in(settings)
     readings = Readings(**identity["readings"])
@@ -223,16 +228,6 @@ def _page_maker() -> Callable[..., str]:
 def _shown(one: NamedDesign, row: Mapping[str, Any]) -> dict[str, Any]:
     """Return a row as the page shows it."""
     return {"title": one.title, "number": one.number, "inputs": inputs_of(row), "shape": row.get("shape")}
-
-
-def _notes_on_rules(judged_by: str) -> list[str]:
-    """Return a note on the rules by which a table was judged, if the simulator in the page has others."""
-    if not judged_by:
-        return []
-    return [
-        f"The verdicts of the table were {judged_by}. Simulations in this page follow the rules of version "
-        f"{versions()['boulder-sweep']} and may differ from it."
-    ]
 
 
 def _general_notes(settings: Mapping[str, Any], control: Control, units: str) -> list[str]:

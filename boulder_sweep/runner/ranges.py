@@ -7,7 +7,7 @@ nothing more is computed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -98,19 +98,12 @@ class Work:
         from boulder_sweep.store.part import encoded_part  # imports pyarrow
 
         pieces = []
-        for start, end in self._blocks(first, stop):
-            pieces.append(self.judged(start, end))
+        for start, end in Ranges(stop - first, -(-(stop - first) // self.rows_per_block)):
+            pieces.append(self.judged(first + start, first + end))
             tick(end - start)
         content, verdicts = encoded_part(self.make_block(first, stop), joined(pieces), self.metadata)
         part = put_part(location_of(self.out), first, stop, content)
         return PartReport(part.name, stop - first, len(content), verdicts)
-
-    def _blocks(self, first: int, stop: int) -> Iterator[tuple[int, int]]:
-        count = -(-(stop - first) // self.rows_per_block)
-        return (
-            (first + number * (stop - first) // count, first + (number + 1) * (stop - first) // count)
-            for number in range(count)
-        )
 
     def judged(self, start: int, stop: int) -> Judged:
         """Compute the rows [start, stop); those that raise alone are rows of verdict ``error``.
