@@ -113,24 +113,16 @@ def screens(rows: ResultRows, answer: Answer) -> dict[str, Screen]:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What the page says of a result.
-
-    Attributes
-    ----------
-    need : Need
-        The question with its recommendation; of a run, as if it had been asked which of its designs to build.
-    row : dict
-        The design that is recommended under the conditions that are worst for it; the nearest one where none is.
-    sentences
-        What else there is to say, the most important first.
-    named
-        What the row is.
-    """
+    """What the page says of a result."""
 
     need: Need
+    """The question with its recommendation; of a run, as if it had been asked which of its designs to build."""
     row: dict[str, Any]
+    """The design that is recommended under the conditions that are worst for it; the nearest one where none is."""
     sentences: tuple[Sentence, ...]
+    """What else there is to say, the most important first."""
     named: NamedDesign
+    """What the row is."""
 
 
 def answer_of(rows: ResultRows) -> Answer:
@@ -182,14 +174,7 @@ def _as_need(rows: ResultRows, passing: np.ndarray) -> Need:
 class _Designs:
     """Boulders at their depths in a run, each with a row for every soil, vehicle and speed.
 
-    Parameters
-    ----------
-    rows
-        The run.
-    passing
-        Whether a row passes, in the shape of the grid.
-    asked
-        What is asked of a design.
+    `passing` says whether a row passes, in the shape of the grid; `asked`, what is asked of a design.
     """
 
     def __init__(self, rows: ResultRows, passing: np.ndarray, asked: Need) -> None:

@@ -62,13 +62,7 @@ _LINE = 0.07
 
 
 def curves(panel: str) -> list[figure]:
-    """Return the figures of one simulated design.
-
-    Parameters
-    ----------
-    panel
-        Name of the part of the page; the names of figures and sources begin with it.
-    """
+    """Return the figures of one simulated design; their names and the names of their sources begin with the panel's."""
     motion = ColumnDataSource(
         {name: [0.0, 1.0] for name in ("time", "rotation", "limit", "boulder", "vehicle", "force")},
         name=f"{panel}-motion",
@@ -229,18 +223,10 @@ class Sketch(NamedTuple):
 def sketch_of(
     inputs: Mapping[str, float], settings: Mapping[str, Any], units: str = "si", profile: Sequence[ProfilePoint] = ()
 ) -> Sketch:
-    """Return elevation and plan of a design.
+    """Return elevation and plan of a design, whose inputs go by the columns of the table.
 
-    Parameters
-    ----------
-    inputs
-        Its inputs by the columns of the table.
-    settings
-        Resolved settings of its sweep, which say how the soil lies.
-    units
-        ``si`` or ``us``, of the scale bar.
-    profile
-        Shape of this boulder, where the settings name none.
+    The settings say how the soil lies; the scale bar is in the units; the profile is the shape of this boulder
+    where the settings name none.
     """
     length, width, height = (inputs[f"boulder_{side}_m"] for side in ("length", "width", "height"))
     depth = inputs["embedment_depth_m"]
@@ -365,15 +351,7 @@ class LogChart(NamedTuple):
 
 
 def log_charts(settings: Mapping[str, Any], units: str = "si") -> list[LogChart]:
-    """Return a figure of each log from which the soil of a sweep was taken.
-
-    Parameters
-    ----------
-    settings
-        Resolved settings of the sweep.
-    units
-        ``si`` or ``us``: depths are marked at round numbers in these.
-    """
+    """Return a figure of each log from which the soil was taken; depths are marked at round numbers in the units."""
     return [
         _chart(data, shown_unit("m", units)[1]) for data in settings.get("derived", {}).get("soil", ()) if "log" in data
     ]

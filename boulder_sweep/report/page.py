@@ -123,39 +123,22 @@ def assembled(
     heading: Mapping[str, str] = NOTHING,
     units: str = "si",
 ) -> str:
-    """Put the page together.
+    """Return the page as HTML; its title is the name in the settings.
 
     Parameters
     ----------
-    settings
-        Resolved settings of the sweep, whose name is the title of the page.
-    control, readings
-        How its designs are simulated.
     start
         The design with which the simulator starts, by the input columns of the table.
-    sheet
-        The first page, of a result.
-    sentences
-        What else there is to say of it.
+    sheet, sentences
+        The first page, of a result, and what else there is to say of it.
     answers
         The answers by system of units, of a file of them.
     rows
         Rows of a result; None for a single design.
     chosen
         Designs that are shown in full: ``title``, ``number`` and ``inputs`` of each.
-    facts
-        Names and values that describe the origin of the results.
-    notes
-        Notes on these particular results.
-    heading
-        Project, client and so on, as far as given.
-    units
-        Units shown first, ``si`` or ``us``.
-
-    Returns
-    -------
-    str
-        HTML.
+    facts, notes
+        Names and values that describe the origin of the results, and notes on these particular ones.
     """
     kept, table = None, None
     if rows is not None:
@@ -306,18 +289,12 @@ def page_data(
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """The part of a grid or list that goes into the page.
-
-    Attributes
-    ----------
-    indices : tuple of ndarray
-        Indices kept along each axis; for a list, the rows.
-    words : str
-        What is left out; empty if nothing is.
-    """
+    """The part of a grid or list that goes into the page."""
 
     indices: tuple[np.ndarray, ...]
+    """Indices kept along each axis; for a list, the rows."""
     words: str
+    """What is left out; empty if nothing is."""
 
 
 def thinned(rows: ResultRows, most_cells: int = MOST_CELLS, most_points: int = MOST_POINTS) -> Selection:

@@ -72,45 +72,29 @@ class NamedSets(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ResultRows:
-    """The rows of a result.
+    """The rows of a result."""
 
-    Attributes
-    ----------
-    folder : Location
-        Where they are.
-    finished : FinishedRows or AnswerFile
-        Those that were there when they were read.
-    names : tuple of str
-        What a code stands for: verdict and reason, ``fail: overturns``, or the grade of a pass of which second opinions
-        were asked, ``pass: robust``; the last is for rows not computed yet.
-    codes : ndarray of uint8, shape (rows,)
-        Index of the name of every row.
-    grades : dict of str to int
-        Designs that pass, by their robustness. Empty for a table that does not have it.
-    axes : dict of str to ndarray
-        Values along each axis of the grid, the last fastest; for named sets of soils or vehicles their numbers. Empty
-        for a list of designs.
-    sets : dict of str to NamedSets
-        The axes that are named sets.
-    inputs : dict of str to ndarray
-        Given inputs: single values, axes in their dimension, or one value for each row. They broadcast against each
-        other, and for a grid against its shape.
-    robustness : tuple of str
-        Grade of the designs of each code, asked for or not; empty words where there is none.
-    asks : bool
-        Whether second opinions are asked now, where the result asked for none.
-    """
-
-    folder: Location
     finished: FinishedRows | AnswerFile
+    """Those that were there when they were read."""
     names: tuple[str, ...]
+    """What a code stands for: verdict and reason, ``fail: overturns``, or the grade of a pass of which second opinions
+    were asked, ``pass: robust``; the last is for rows not computed yet."""
     codes: np.ndarray
+    """Index of the name of every row, uint8, shape (rows,)."""
     grades: dict[str, int]
+    """Designs that pass, by their robustness. Empty for a table that does not have it."""
     axes: dict[str, np.ndarray]
+    """Values along each axis of the grid, the last fastest; for named sets of soils or vehicles their numbers. Empty
+    for a list of designs."""
     sets: dict[str, NamedSets]
+    """The axes that are named sets."""
     inputs: dict[str, np.ndarray]
+    """Given inputs: single values, axes in their dimension, or one value for each row. They broadcast against each
+    other, and for a grid against its shape."""
     robustness: tuple[str, ...] = ()
+    """Grade of the designs of each code, asked for or not; empty words where there is none."""
     asks: bool = True
+    """Whether second opinions are asked now, where the result asked for none."""
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -175,19 +159,7 @@ class ResultRows:
     def over(self, values: np.ndarray, kinds: Sequence[str], ufunc: np.ufunc) -> np.ndarray:
         """Return for every row what a ufunc makes of all rows that differ from it in nothing but some conditions.
 
-        Parameters
-        ----------
-        values : ndarray, shape ``self.shape``
-            A value of every row.
-        kinds
-            Conditions of `CONDITIONS`.
-        ufunc
-            Takes two values: the least, the greatest, the sum.
-
-        Returns
-        -------
-        ndarray, shape ``self.shape``
-            The same in all of these rows.
+        Values and result have the shape of the grid; the ufunc takes two values: the least, the greatest, the sum.
         """
         over = [name for name in self.varying() if condition_of(name) in kinds]
         if not over:
@@ -238,13 +210,7 @@ class ResultRows:
         return margins
 
     def row(self, number: int) -> dict[str, Any]:
-        """Return one row of the table, None for null.
-
-        Raises
-        ------
-        IndexError
-            The table does not have this row (yet).
-        """
+        """Return one row of the table, None for null; IndexError where the table does not have it (yet)."""
         row: dict[str, Any] = self.finished.row(number).to_pylist()[0]
         if BOULDER_MASS in row and BOULDER_MASS not in self.settings["inputs"]:
             del row[BOULDER_MASS]  # answers tell it whether it was given or not
@@ -280,12 +246,8 @@ class ResultRows:
 def read_rows(folder: Location, finished: FinishedRows | AnswerFile | None = None) -> ResultRows:
     """Read what the page needs of a result, which may be open already.
 
-    Raises
-    ------
-    StoreError
-        There is no result in the folder, or it is damaged.
-    ReportError
-        The file is not one of answers, or rows of it are missing or in another order.
+    Raises StoreError where there is no result in the folder or it is damaged, and ReportError where a file is not one
+    of answers, or rows of it are missing or in another order.
     """
     finished = finished or result_of(folder, ReportError)
     settings = finished.identity["settings"]
@@ -322,7 +284,7 @@ def read_rows(folder: Location, finished: FinishedRows | AnswerFile | None = Non
         for name, along in (sets[axis].inputs if axis in sets else {axis: values}).items():
             inputs[name] = along.reshape([-1 if k == index else 1 for k in range(len(axes))])
     words, robustness = zip(*names, (NOT_YET, ""), strict=True)
-    return ResultRows(folder, finished, words, codes, dict(grades), axes, sets, inputs, robustness)
+    return ResultRows(finished, words, codes, dict(grades), axes, sets, inputs, robustness)
 
 
 def _check_whole(file: AnswerFile, path: Location) -> None:

@@ -103,15 +103,7 @@ class Sheet(NamedTuple):
 
 
 def sheet_of(rows: ResultRows, answer: Answer, units: str) -> Sheet:
-    """Return the first page of a result.
-
-    Parameters
-    ----------
-    rows, answer
-        The result, and what it says.
-    units
-        Units shown first, ``si`` or ``us``.
-    """
+    """Return the first page of a result; the scale bar of the drawing is in the units that are shown first."""
     # Of the result of `sweep uncertainty` nobody asked a probability.
     need = replace(answer.need, probability=None) if rows.kind == UNCERTAINTY else answer.need
     found, row, settings = need.recommendation, answer.row, rows.settings

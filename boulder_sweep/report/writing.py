@@ -124,7 +124,12 @@ def write_report(
     given = {k: value for k, value in answer.row.items() if k != BOULDER_MASS or k in rows.settings["inputs"]}
     chosen = chosen or [_shown(answer.named, given)]
     identity = rows.finished.identity
-    notes = _notes_on_rules(rows.finished.judged_by)
+    notes = []
+    if rows.finished.judged_by:
+        notes.append(
+            f"The verdicts of the table were {rows.finished.judged_by}. Simulations in this page follow the rules of "
+            f"version {versions()['boulder-sweep']} and may differ from it."
+        )
     settings, control = identity["settings"], Control(**identity["control"])
     units = units or units_in(settings)
     readings = Readings(**identity["readings"])
@@ -193,13 +198,7 @@ def write_explorer(sweep: Sweep, number: int, page: str | Path, *, units: str | 
 
 
 def checked_page(path: str | Path) -> Path:
-    """Return the path of a page if it can be written there.
-
-    Raises
-    ------
-    ReportError
-        Its name has another ending, or its folder does not exist or holds the result of a run.
-    """
+    """Return the path of a page; ReportError where its name has another ending or it cannot be written there."""
     target = Path(path)
     if target.suffix.lower() not in KINDS:
         raise ReportError(f"{path}: the name of a page must end in {', '.join(KINDS[:-1])} or {KINDS[-1]}")
@@ -214,12 +213,9 @@ def example() -> Sweep:
 
 
 def _page_maker() -> Callable[..., str]:
-    """Return the function that makes the page; its libraries are an extra.
+    """Return the function that makes the page.
 
-    Raises
-    ------
-    ReportError
-        One of them is not installed, or the kernel of the page was built from other sources.
+    ReportError where its libraries, an extra, are not installed, or its kernel was built from other sources.
     """
     try:
         from boulder_sweep.report.page import assembled
@@ -232,16 +228,6 @@ def _page_maker() -> Callable[..., str]:
 def _shown(one: NamedDesign, row: Mapping[str, Any]) -> dict[str, Any]:
     """Return a row as the page shows it."""
     return {"title": one.title, "number": one.number, "inputs": inputs_of(row), "shape": row.get("shape")}
-
-
-def _notes_on_rules(judged_by: str) -> list[str]:
-    """Return a note on the rules by which a table was judged, if the simulator in the page has others."""
-    if not judged_by:
-        return []
-    return [
-        f"The verdicts of the table were {judged_by}. Simulations in this page follow the rules of version "
-        f"{versions()['boulder-sweep']} and may differ from it."
-    ]
 
 
 def _general_notes(settings: Mapping[str, Any], control: Control, units: str) -> list[str]:
@@ -284,13 +270,7 @@ def _facts(identity: Mapping[str, Any], command: str, out: str = "") -> list[tup
 
 
 def _written(page: Path, text: str) -> Path:
-    """Write the page, or print it to PDF, as a whole or not at all.
-
-    Raises
-    ------
-    ReportError
-        The system refuses it; or see `printed`.
-    """
+    """Write the page, or print it to PDF, as a whole or not at all; ReportError where that is refused."""
     content = printed(text) if page.suffix.lower() == ".pdf" else text.encode()
     try:
         with replacing(page) as file:
@@ -301,13 +281,7 @@ def _written(page: Path, text: str) -> Path:
 
 
 def browser() -> str:
-    """Return the executable of a Chromium.
-
-    Raises
-    ------
-    ReportError
-        There is none.
-    """
+    """Return the executable of a Chromium; ReportError where there is none."""
     named = next(filter(None, map(shutil.which, BROWSERS)), None)
     if not named:
         raise ReportError(f"a PDF is printed by Chromium, which was not found: install Chromium or Chrome, or {HELP}")
@@ -315,13 +289,7 @@ def browser() -> str:
 
 
 def printed(html: str) -> bytes:
-    """Return a page as PDF.
-
-    Raises
-    ------
-    ReportError
-        There is no Chromium, or it does not print the page.
-    """
+    """Return a page as PDF; ReportError where there is no Chromium, or it does not print the page."""
     program = browser()
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         page, target = Path(folder, "page.html"), Path(folder, "page.pdf")
@@ -360,12 +328,7 @@ def printed(html: str) -> bytes:
 def _ended(program: str, words: Sequence[str], said: Path) -> tuple[int, str]:
     """Run a browser to its end; return its exit code, and the end of what it said, which goes into a file.
 
-    No process is left behind.
-
-    Raises
-    ------
-    ReportError
-        It does not start, or not end in time.
+    No process is left behind. ReportError where it does not start, or not end in time.
     """
     # Otherwise it leaves a socket among the user's temporary files, whose path must be short, and settings elsewhere.
     environment = {**os.environ, "TMPDIR": ".", "GSETTINGS_BACKEND": "memory"}

@@ -41,15 +41,7 @@ def call(function: Callable[..., Any], *arguments: Any, **named: Any) -> Call:
 class Pool:
     """Yields the results of calls, made by threads of this process, with a bounded number of calls in progress.
 
-    Parameters
-    ----------
-    jobs
-        Threads; all cores by default. With one job everything runs in the calling thread.
-
-    Raises
-    ------
-    TypeError, ValueError
-        The number of threads is not a whole number, or out of range.
+    All cores by default; with one job everything runs in the calling thread. See `check_jobs` for other numbers.
     """
 
     def __init__(self, jobs: int | None):
@@ -57,15 +49,7 @@ class Pool:
         self._jobs = jobs
 
     def __call__(self, calls: Iterable[Call], *, in_order: bool = True) -> Iterator[Any]:
-        """Make the calls.
-
-        Parameters
-        ----------
-        calls
-            What to call.
-        in_order
-            Whether results come in the order of the calls, or as they are there.
-        """
+        """Make the calls; results come in their order, or else as they are there."""
         calls = iter(calls)
         first = list(itertools.islice(calls, 2))
         calls = itertools.chain(first, calls)
@@ -85,11 +69,6 @@ class Cluster:
     Some calls for each thread wait there, more where threads come. They go to Dask itself: by joblib's backend, a
     cluster that has one thread to begin with would get nothing to do, and calls that Dask has given up would be waited
     for without end.
-
-    Parameters
-    ----------
-    client
-        Of the cluster.
     """
 
     def __init__(self, client: Any):
@@ -101,21 +80,9 @@ class Cluster:
         return max(sum(self._client.ncores().values()), 1)
 
     def __call__(self, calls: Iterable[Call], shared: Any = None) -> Iterator[Any]:
-        """Make the calls.
+        """Make the calls; an argument that they share is sent once.
 
-        Parameters
-        ----------
-        calls
-            What to call.
-        shared
-            An argument that calls have in common; it is sent once.
-
-        Raises
-        ------
-        BackendError
-            The workers cannot make a call.
-        ClusterLostError
-            The scheduler or the workers are gone.
+        BackendError where the workers cannot make a call, ClusterLostError where they or the scheduler are gone.
         """
         try:
             yield from self._results(iter(calls), shared)
@@ -153,10 +120,7 @@ class Cluster:
 def cluster(jobs: int | None, scheduler: str | None) -> Iterator[Cluster]:
     """Connect to the cluster of a scheduler, or give one of so many threads within this process.
 
-    Raises
-    ------
-    BackendError
-        The workers are not available.
+    BackendError where the workers are not available.
     """
     try:
         distributed = import_module("distributed")  # an extra: most users have no cluster
@@ -227,13 +191,7 @@ def fingerprint() -> Fingerprint:
 
 
 def refuse_other_versions(there: Fingerprint) -> None:
-    """Refuse to compute here, on a worker, for a machine with other versions.
-
-    Raises
-    ------
-    BackendError
-        The fingerprint of that machine is another.
-    """
+    """Refuse by BackendError to compute here, on a worker, for a machine with other versions."""
     if fingerprint() != there:
         raise BackendError(
             "a worker and this machine have different versions of boulder-sweep, Python or NumPy, or processors that "
@@ -265,13 +223,7 @@ def available_cores() -> int:
 
 
 def check_backend(backend: str, scheduler: str | None) -> None:
-    """Refuse backends that do not exist.
-
-    Raises
-    ------
-    BackendError
-        Unknown name, or the address of a scheduler without Dask.
-    """
+    """Refuse an unknown backend, and the address of a scheduler without Dask, by BackendError."""
     if backend not in BACKENDS:
         raise BackendError(f"unknown backend {backend!r}: choose one of {', '.join(BACKENDS)}")
     if scheduler is not None and backend != DASK:
@@ -279,13 +231,7 @@ def check_backend(backend: str, scheduler: str | None) -> None:
 
 
 def check_jobs(jobs: int | None) -> None:
-    """Refuse a number of workers that is not a whole number, below one, or above `MOST_JOBS`.
-
-    Raises
-    ------
-    TypeError, ValueError
-        Says what is allowed.
-    """
+    """TypeError where a number of workers is not whole, ValueError where it is below one or above `MOST_JOBS`."""
     if jobs is None:
         return
     if not isinstance(jobs, int) or isinstance(jobs, bool):

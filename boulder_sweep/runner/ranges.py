@@ -7,7 +7,7 @@ nothing more is computed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -71,77 +71,44 @@ class StoppedError(Exception):
 
 @dataclass
 class Work:
-    """How the rows of one sweep are computed and written; the same for every worker, and picklable.
-
-    Parameters
-    ----------
-    evaluate
-        Simulates and judges a block.
-    make_block
-        Gives the inputs of some rows.
-    metadata
-        What the files of all parts have in common.
-    out
-        The folder, by path or URL.
-    rows_per_block
-        Rows that are computed at once.
-    made_by
-        What a worker elsewhere must have, see `pool.fingerprint`.
-    """
+    """How the rows of one sweep are computed and written; the same for every worker, and picklable."""
 
     evaluate: Callable[[DesignBlock], Judged]
+    """Simulates and judges a block."""
     make_block: Callable[[int, int], DesignBlock]
+    """Gives the inputs of some rows."""
     metadata: Mapping[bytes, bytes]
+    """What the files of all parts have in common."""
     out: str
+    """The folder, by path or URL."""
     rows_per_block: int
+    """Rows that are computed at once."""
     made_by: Fingerprint | None = None
+    """What a worker elsewhere must have."""
     _failures: int = field(default=0, init=False)
 
     def write(self, first: int, stop: int, tick: Callable[[int], None] = lambda rows: None) -> PartReport:
-        """Compute a range and write its part.
+        """Compute a range and write its part; `tick` is called with the rows of each block, and may raise to stop.
 
-        Parameters
-        ----------
-        first, stop
-            The range.
-        tick
-            Called with the rows of each block that is done; it may raise to stop.
-
-        Raises
-        ------
-        ComputationError
-            As for `judged`.
-        WriteError
-            The part cannot be written.
-        BackendError
-            This worker has other versions.
+        ComputationError as `judged`; WriteError where the part cannot be written; BackendError where this worker has
+        other versions.
         """
         if self.made_by is not None:
             refuse_other_versions(self.made_by)
         from boulder_sweep.store.part import encoded_part  # imports pyarrow
 
         pieces = []
-        for start, end in self._blocks(first, stop):
-            pieces.append(self.judged(start, end))
+        for start, end in Ranges(stop - first, -(-(stop - first) // self.rows_per_block)):
+            pieces.append(self.judged(first + start, first + end))
             tick(end - start)
         content, verdicts = encoded_part(self.make_block(first, stop), joined(pieces), self.metadata)
         part = put_part(location_of(self.out), first, stop, content)
         return PartReport(part.name, stop - first, len(content), verdicts)
 
-    def _blocks(self, first: int, stop: int) -> Iterator[tuple[int, int]]:
-        count = -(-(stop - first) // self.rows_per_block)
-        return (
-            (first + number * (stop - first) // count, first + (number + 1) * (stop - first) // count)
-            for number in range(count)
-        )
-
     def judged(self, start: int, stop: int) -> Judged:
         """Compute the rows [start, stop); those that raise alone are rows of verdict ``error``.
 
-        Raises
-        ------
-        ComputationError
-            So many calls have failed, of these rows or others, that something must be wrong with all of them.
+        ComputationError where so many calls have failed that something must be wrong with all rows.
         """
         try:
             return self.evaluate(self.make_block(start, stop))

@@ -204,22 +204,12 @@ def run(
 
 
 class _Run:
-    """The computing part of a run.
-
-    Attributes
-    ----------
-    before : int or None
-        Rows of an earlier run; None where they are not counted yet.
-    written : list of PartReport
-        Parts written by this run.
-    jobs : int
-        Workers.
-    """
+    """The computing part of a run, with the parts that it has written; `before` are the rows of an earlier run."""
 
     def __init__(
         self, out: Location, signals: Signals, rows: int, jobs: int, backend: str, scheduler: str | None
     ) -> None:
-        self.before: int | None = None
+        self.before: int | None = None  # not counted yet
         self.written, self.jobs = list[PartReport](), jobs
         self._out, self._signals, self._rows = out, signals, rows
         self._backend, self._scheduler = backend, scheduler

@@ -56,15 +56,7 @@ class Ranges:
 
 
 def ranges_of(rows: int, rows_wanted: float) -> Ranges:
-    """Return the ranges of a table.
-
-    Parameters
-    ----------
-    rows
-        Of the whole table, 1 or more.
-    rows_wanted
-        Rows that take the work that a range should have.
-    """
+    """Return the ranges of a table of 1 row or more; so many are wanted, by the work that a range should have."""
     size = min(max(int(rows_wanted), FEWEST_ROWS), MOST_ROWS)
     count = -(-rows // size)
     if rows >= TOGETHER * FEWEST_ROWS:
@@ -105,10 +97,7 @@ def part_files(names: Sequence[str]) -> list[PartFile]:
 def put_part(out: Location, first: int, stop: int, content: bytes | memoryview) -> PartFile:
     """Write a part; it appears whole, or not at all. Another worker may write the same part, too.
 
-    Raises
-    ------
-    WriteError
-        It cannot be written; other parts are unchanged.
+    WriteError where it cannot be written; other parts are unchanged.
     """
     part = PartFile(first, stop, hash_of(content))
     try:
@@ -122,13 +111,7 @@ def put_part(out: Location, first: int, stop: int, content: bytes | memoryview) 
 
 
 def check_writable(out: Location) -> None:
-    """Find out whether a folder can be written; what is on an object store shows with the first part.
-
-    Raises
-    ------
-    WriteError
-        It cannot.
-    """
+    """WriteError where a folder cannot be written; what is on an object store shows with the first part."""
     if isinstance(out, Path):
         try:
             with _passing(out):
@@ -203,12 +186,9 @@ def clear(out: Location) -> None:
 
 
 def make(out: Location) -> bool:
-    """Make a folder if there is none; True where it is new. On object stores folders exist by their files only.
+    """Make a folder if there is none; True where it is new, StoreError where it cannot be made.
 
-    Raises
-    ------
-    StoreError
-        It cannot be made.
+    On object stores folders exist by their files only.
     """
     if not isinstance(out, Path):
         return False
@@ -226,13 +206,7 @@ def make(out: Location) -> bool:
 
 
 def remove_parts(out: Location, names: Sequence[str]) -> None:
-    """Remove parts, the last rows first.
-
-    Raises
-    ------
-    WriteError
-        One cannot be removed.
-    """
+    """Remove parts, the last rows first; WriteError where one cannot be removed."""
     try:
         for name in sorted(names, reverse=True):
             remove(out / name)
@@ -242,14 +216,9 @@ def remove_parts(out: Location, names: Sequence[str]) -> None:
 
 @contextmanager
 def locked(out: Location) -> Iterator[None]:
-    """Refuse a second run into a folder from this machine.
+    """Refuse a second run into a folder from this machine by FolderInUseError.
 
     Two runs would do no harm, but the work twice. So where there are no locks, there is none.
-
-    Raises
-    ------
-    FolderInUseError
-        Another run writes into the folder.
     """
     from filelock import FileLock, Timeout  # only runs need it
 
@@ -283,19 +252,8 @@ def _runtime_folder() -> Path:
 def check_target(target: Location, refusal: type[BoulderSweepError]) -> None:
     """Check that a file may be written at a location; readers would take one within a result for rows of it.
 
-    Parameters
-    ----------
-    target
-        The file, by path or URL.
-    refusal
-        The error to raise.
-
-    Raises
-    ------
-    BoulderSweepError
-        Its folder does not exist, cannot be written or holds the result of a run, or a folder has its name.
-    LinkError
-        A link has its name.
+    Raises the refusal where its folder does not exist, cannot be written or holds the result of a run, or a folder has
+    its name, and LinkError where a link has its name.
     """
     folder = target.absolute().parent if isinstance(target, Path) else target.parent
     if isinstance(target, Path) and not folder.is_dir():

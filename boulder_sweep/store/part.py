@@ -51,33 +51,16 @@ _TYPES = {
 def table_schema(metadata: Mapping[bytes, bytes] | None = None, more: Iterable[str] = ()) -> pa.Schema:
     """Return the schema of the table, with unit and meaning of every column in its field metadata.
 
-    Parameters
-    ----------
-    metadata
-        Goes into the metadata of the file.
-    more
-        Names of the columns that not every table has: optional inputs, and text columns that the settings file gives.
+    `more` names the columns that not every table has: optional inputs, and text columns that the settings file gives.
     """
     specs = [*COLUMNS, *(column_spec(name) for name in more)]
     return pa.schema([_field(spec, _TYPES[spec.type]) for spec in specs], metadata=_complete(metadata, specs))
 
 
 def part_table(block: DesignBlock, judged: Judged, metadata: Mapping[bytes, bytes]) -> pa.Table:
-    """Combine the inputs and outcomes of the same rows.
+    """Combine the inputs and outcomes of the same rows; null where a value is NaN.
 
-    Parameters
-    ----------
-    block
-        Inputs of the rows [start, stop).
-    judged
-        Outcomes of the same rows.
-    metadata
-        Goes into the metadata of the file.
-
-    Returns
-    -------
-    pyarrow.Table
-        Columns in the order of the register, then those that not every table has; null where a value is NaN.
+    The columns are in the order of the register; those that not every table has come last.
     """
     arrays = [number_array(block.design_id())]
     arrays += [_input_array(block.columns[spec.name]) for spec in INPUTS]
@@ -95,14 +78,7 @@ def encoded_part(
 ) -> tuple[memoryview, dict[str, int]]:
     """Return the bytes of a part, and its rows of each verdict and reason, see `verdict_counts`.
 
-    Parameters
-    ----------
-    block
-        Inputs of the rows [start, stop) of one range.
-    judged
-        Outcomes of the same rows.
-    metadata
-        What all parts have in common, see `provenance.file_metadata`.
+    The metadata is what all parts have in common, see `provenance.file_metadata`.
     """
     verdicts = verdict_counts(judged)
     own = {"range": [block.start, block.stop], "verdicts": verdicts}

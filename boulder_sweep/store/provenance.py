@@ -69,24 +69,10 @@ def identity(
     control: Mapping[str, Any],
     accuracy: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Collect what all rows of one table have in common.
+    """Collect what all rows of one table have in common, as plain data.
 
-    Parameters
-    ----------
-    settings
-        The resolved settings: every default filled in, units in the names.
-    readings
-        Which formulas are read as printed.
-    control
-        How the motion is integrated: step, horizon, limit, soil elements.
-    accuracy
-        The accuracy requested, and its steps.
-
-    Returns
-    -------
-    dict
-        Plain data with the keys ``format``, ``settings``, ``readings``, ``control``, ``accuracy``, ``versions``,
-        ``settings_sha256``, ``kernels_sha256``, ``rules_sha256``.
+    Settings are resolved: every default filled in, units in the names. The readings say which formulas are read as
+    printed, the control how the motion is integrated, the accuracy what was requested, and its steps.
     """
     content = {
         "format": FORMAT,
@@ -116,10 +102,7 @@ def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
 def identity_in(metadata: Mapping[bytes, bytes] | None) -> dict[str, Any]:
     """Return the identity in the metadata of a file, and what else `file_metadata` wrote; empty of another file.
 
-    Raises
-    ------
-    ValueError, RecursionError
-        It holds what no command writes.
+    ValueError or RecursionError where it holds what no command writes.
     """
     texts = {key.decode(errors="replace"): value for key, value in (metadata or {}).items()}
     entries = {key.removeprefix(PREFIX): value for key, value in texts.items() if key.startswith(PREFIX)}
@@ -152,10 +135,7 @@ def _is_deep(content: Any) -> bool:
 def other_version(there: Any) -> str:
     """Say which version wrote a result that this one does not read, and what to do; empty of a result that it reads.
 
-    Parameters
-    ----------
-    there
-        The identity of the result, see `identity`; anything at all of a stranger's.
+    The identity of a stranger's result may be anything at all.
     """
     there = there if isinstance(there, Mapping) else {}
     if there.get("format") == FORMAT:
@@ -171,17 +151,9 @@ def other_version(there: Any) -> str:
 
 
 def check_identity(there: Mapping[str, Any]) -> None:
-    """Check what a result says of itself, before anything is made of it: settings, control, readings and versions.
+    """Check the identity of a result before anything is made of it: settings, control, readings and versions.
 
-    Parameters
-    ----------
-    there
-        The identity of the result, see `identity`.
-
-    Raises
-    ------
-    ValueError
-        It holds what no command writes; the text says what.
+    ValueError says what it holds that no command writes.
     """
     from boulder_sweep.settings.stored import check_control, check_stored  # not needed by runs
 
@@ -197,13 +169,7 @@ def check_identity(there: Mapping[str, Any]) -> None:
 
 
 def judged_by(there: Mapping[str, Any]) -> str:
-    """Say whose rules judged a table; empty where this version has the same rules and kernels.
-
-    Parameters
-    ----------
-    there
-        The identity of the table, see `identity`.
-    """
+    """Say whose rules judged a table of this identity; empty where this version has the same rules and kernels."""
     names = {"rules": rules_sha256, "kernels": kernels_sha256}
     if all(there.get(f"{name}_sha256") == today() for name, today in names.items()):
         return ""
@@ -216,13 +182,8 @@ def judged_by(there: Mapping[str, Any]) -> str:
 def file_metadata(identity_: Mapping[str, Any], **more: Any) -> dict[bytes, bytes]:
     """Metadata of a file: the identity of its rows, and more entries by name; None for none.
 
-    Parameters
-    ----------
-    identity_
-        See `identity`.
-    more
-        Of a part: ``rows`` of its table and the number of its ``ranges``. Of answers: the command that would ``repeat``
-        them.
+    Of a part: ``rows`` of its table and the number of its ``ranges``. Of answers: the command that would ``repeat``
+    them.
     """
     return {
         f"{PREFIX}{key}".encode(): (value if isinstance(value, str) else canonical(value)).encode(

@@ -90,14 +90,8 @@ class Contents:
 def contents(folder: Location) -> Contents:
     """Read every part of a folder: compare its bytes with its name, and what it says with its rows.
 
-    Raises
-    ------
-    TwoResultsError
-        Two intact parts hold the same rows.
-    OtherVersionError
-        Another version wrote them.
-    StoreError
-        They cannot be read.
+    TwoResultsError where two intact parts hold the same rows, OtherVersionError where another version wrote them,
+    StoreError where they cannot be read.
     """
     found, known = Contents(), dict[frozenset[Any], Table]()
     parts = _parts_in(folder)
@@ -209,13 +203,7 @@ def _parts_in(folder: Location) -> list[PartFile]:
 
 
 def refuse_two(folder: Location, parts: Sequence[PartFile]) -> None:
-    """Refuse two parts that hold the same rows.
-
-    Raises
-    ------
-    TwoResultsError
-        Names them.
-    """
+    """Refuse two parts that hold the same rows by TwoResultsError."""
     seen: dict[int, PartFile] = {}
     for part in parts:
         other = seen.setdefault(part.first, part)
@@ -227,15 +215,7 @@ def refuse_two(folder: Location, parts: Sequence[PartFile]) -> None:
 
 
 def refuse_no_result(folder: Location) -> None:
-    """Say why a path without parts holds no result.
-
-    Raises
-    ------
-    NotASweepError
-        There is none.
-    StoreError
-        It cannot be read.
-    """
+    """Say by NotASweepError why a path without parts holds no result; StoreError where it cannot be read."""
     try:
         is_there = is_folder(folder)
     except OSError as problem:
@@ -257,37 +237,13 @@ def refuse_no_result(folder: Location) -> None:
 
 
 class FinishedRows:
-    """The rows of a result that are finished now; later ones are ignored.
+    """The rows of a result that are finished now; later ones, of a run that is writing into its folder, are ignored.
 
-    Parameters
-    ----------
-    folder
-        The output folder; a run may be writing into it.
+    `rows` are the whole table's, `rows_done` the finished ones; `identity` is what all rows have in common, see
+    `provenance`; `judged_by` says whose rules judged them, empty where this version's did: others are warned of.
 
-    Attributes
-    ----------
-    rows : int
-        Rows of the whole table.
-    rows_done : int
-        Rows that are finished.
-    columns : tuple of str
-        Names of the columns.
-    identity : dict
-        What all rows have in common, see `provenance`.
-    judged_by : str
-        Whose rules judged the rows; empty where this version's did.
-
-    Warns
-    -----
-    OlderRulesWarning
-        The rows were judged by other rules.
-
-    Raises
-    ------
-    NotASweepError
-        There is no result in the folder.
-    DamagedError, OtherVersionError
-        No part can be read, two hold the same rows, or another version wrote them.
+    NotASweepError where there is no result in the folder; DamagedError or OtherVersionError where no part can be read,
+    two hold the same rows, or another version wrote them.
     """
 
     def __init__(self, folder: Location):
@@ -310,19 +266,9 @@ class FinishedRows:
             warnings.warn(f"{folder} was {self.judged_by}", OlderRulesWarning, stacklevel=2)
 
     def tables(self, columns: Sequence[str] | None = None, *, verify: bool = True) -> Iterator[pa.Table]:
-        """Yield all rows in the order of the designs, a part at a time.
+        """Yield all rows in the order of the designs, a part at a time; of all columns, or of some.
 
-        Parameters
-        ----------
-        columns
-            Names of the columns wanted; all by default.
-        verify
-            Compare every part with the hash in its name.
-
-        Raises
-        ------
-        DamagedError
-            A part is truncated, changed or of another run.
+        DamagedError where a part is truncated or of another run; changed, only where its hash is verified.
         """
         wanted = list(columns) if columns is not None else None
         return _ahead(lambda part: self._read(part, wanted, verify), self._parts)
@@ -330,12 +276,8 @@ class FinishedRows:
     def row(self, number: int) -> pa.Table:
         """Return one row, from the one part that holds it.
 
-        Raises
-        ------
-        IndexError
-            The table has no such row, or it is not computed yet.
-        DamagedError
-            Its part is truncated, changed or of another run.
+        IndexError where there is no such row, or not yet; DamagedError where its part is truncated, changed or of
+        another run.
         """
         if not 0 <= number < self.rows:
             held = counted(self.rows, "design")

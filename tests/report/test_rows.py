@@ -133,7 +133,7 @@ def test_the_largest_map_takes_little_of_a_page(rows):
     }
     codes = np.random.default_rng(3).integers(0, 4, 1_500_000).astype(np.uint8)
     names = ("pass", "fail: overturns", "fail: penetration", "undecided: error", NOT_YET)
-    large = type(rows)(rows.folder, rows.finished, names, codes, {}, axes, {}, {})
+    large = type(rows)(rows.finished, names, codes, {}, axes, {}, {})
     kept = thinned(large)
     assert kept.words == ""
     assert len(json.dumps(table_data(large, kept))) < 1_000_000

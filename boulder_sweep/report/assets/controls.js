@@ -197,10 +197,7 @@ class Axes {
 
 /** Plays the motion of one design in its side view: one animation at a time, from where the reader left it. */
 class Player {
-  /**
-   * @param {string} panel
-   * @param {() => void} moved what to do when the slider has moved
-   */
+  /** @param {string} panel @param {() => void} moved what to do when the slider has moved */
   constructor(panel, moved) {
     this.slider = byId(`${panel}-time`);
     this.button = byId(`${panel}-play`);
@@ -221,11 +218,7 @@ class Player {
     this.button.addEventListener("click", () => (this.frame === 0 ? this.play() : this.pause()));
   }
 
-  /**
-   * Take another motion.
-   * @param {Float64Array} times of its samples [s]
-   * @param {number} sample shown first
-   */
+  /** Take another motion. @param {Float64Array} times of its samples [s] @param {number} sample shown first */
   load(times, sample) {
     this.pause();
     this.left = false;
@@ -269,10 +262,7 @@ class Player {
 
 /** Turns numbers of the table into what people read, in one of two systems of units. */
 class Units {
-  /**
-   * @param {UnitTable} table
-   * @param {string} system si or us
-   */
+  /** @param {UnitTable} table @param {string} system si or us */
   constructor(table, system) {
     this.table = table;
     this.system = system;
@@ -339,21 +329,14 @@ class Units {
   }
 }
 
-/**
- * A number for reading: four digits that count, thousands apart.
- * @param {number} value
- */
+/** A number for reading: four digits that count, thousands apart. @param {number} value */
 function number(value) {
   if (!Number.isFinite(value)) return value > 0 ? "∞" : "–";
   if (value !== 0 && Math.abs(value) < 1e-3) return value.toLocaleString("en-US", { maximumSignificantDigits: 2 });
   return Number(value.toPrecision(Math.abs(value) >= 1e4 ? 5 : 4)).toLocaleString("en-US", { maximumFractionDigits: 9 });
 }
 
-/**
- * A number of at most six digits, as Python's format `g` writes it.
- * @param {number} value
- * @param {number} [digits]
- */
+/** A number of at most six digits, as Python's format `g` writes it. @param {number} value @param {number} [digits] */
 function sixDigits(value, digits = 6) {
   const [figures, power] = value.toExponential(digits - 1).split("e");
   if (Number(power) >= -4 && Number(power) < digits) return String(Number(value.toPrecision(digits)));

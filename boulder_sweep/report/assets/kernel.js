@@ -34,11 +34,7 @@ const CALL = 2 + 24;
 
 /** The compiled kernels. Every call writes its arguments into the module's memory and reads the results there. */
 class Kernel {
-  /**
-   * @param {WebAssembly.Instance} instance
-   * @param {Layout} layout
-   * @param {Soil} soil
-   */
+  /** @param {WebAssembly.Instance} instance @param {Layout} layout @param {Soil} soil */
   constructor(instance, layout, soil) {
     /** @type {any} */
     this.exports = instance.exports;
@@ -49,11 +45,7 @@ class Kernel {
     this.base = Math.ceil(this.exports.__heap_base.value / 8) * 8;
   }
 
-  /**
-   * @param {string} packed the module
-   * @param {Layout} layout
-   * @param {Soil} soil
-   */
+  /** @param {string} packed the module @param {Layout} layout @param {Soil} soil */
   static async load(packed, layout, soil) {
     const { instance } = await WebAssembly.instantiate(await unpacked(packed));
     return new Kernel(instance, layout, soil);

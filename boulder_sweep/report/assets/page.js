@@ -48,26 +48,12 @@ class Page {
     this.maps = { live: map("live"), sweep: map("sweep") };
   }
 
-  /**
-   * Show a design: verdict, numbers, side view, curves.
-   * @param {string} panel
-   * @param {Record<string, number>} design
-   */
-  show(panel, design) {
-    this.showMotion(panel, design);
-    this.showEnergy(panel);
-  }
-
   /** @param {string} panel */
   showEnergy(panel) {
     this.plots.drawEnergy(panel, this.motions[panel].motion, this.units, this.data.parts, this.data.rules.rotation);
   }
 
-  /**
-   * Show all of a design but where the energy goes.
-   * @param {string} panel
-   * @param {Record<string, number>} design
-   */
+  /** Show all of a design but where the energy goes. @param {string} panel @param {Record<string, number>} design */
   showMotion(panel, design) {
     const { judged: found, motion, inputs } = this.simulator.whole(design);
     this.showFound(panel, found, motion, inputs);
@@ -207,7 +193,7 @@ class Page {
       since = performance.now();
     }
     const cells = places.map(({ x, y }, k) => ({
-      x, y, margin: found[k].margin, pick: () => ({ [across]: x, [up]: y }),
+      x, y, pick: () => ({ [across]: x, [up]: y }),
       name: found[k].reason === "" ? found[k].verdict : `${found[k].verdict}: ${found[k].reason}`,
     }));
     this.showCells(cells);
@@ -244,13 +230,13 @@ class Page {
     const columns = [...this.data.outcomes, ...this.inputs];
     byId("list").hidden = this.list.length === 0;
     byId("list-head").replaceChildren(...["verdict", ...columns.map((one) => this.units.title(one.label, one.unit))].map((words) => element("th", words)));
-    const found = this.list.map((design) => this.simulator.whole(design).judged);
     byId("list-rows").replaceChildren(
-      ...this.list.map((design, k) => {
+      ...this.list.map((design) => {
         const line = document.createElement("tr");
-        const known = { ...this.simulator.completed(design).inputs, ...found[k] };
+        const { inputs, judged } = this.simulator.whole(design);
+        const known = { ...inputs, ...judged };
         const values = columns.map((one) => this.units.bare(known[one.name], one.unit));
-        line.append(...[`${found[k].verdict} ${found[k].reason}`, ...values].map((words) => element("td", words)));
+        line.append(...[`${judged.verdict} ${judged.reason}`, ...values].map((words) => element("td", words)));
         return line;
       }),
     );
@@ -258,9 +244,9 @@ class Page {
 
   /** @returns {string} the list with the names and units of the table */
   csv() {
-    const found = this.list.map((design) => this.simulator.whole(design).judged);
-    const names = [...this.inputs.map((input) => input.name), ...Object.keys(found[0] ?? {})];
-    return csvOf(names, this.list.map((design, k) => ({ ...this.simulator.completed(design).inputs, ...found[k] })));
+    const found = this.list.map((design) => this.simulator.whole(design));
+    const names = [...this.inputs.map((input) => input.name), ...Object.keys(found[0]?.judged ?? {})];
+    return csvOf(names, found.map(({ inputs, judged }) => ({ ...inputs, ...judged })));
   }
 
   /** Show everything anew, in other units. */
@@ -271,7 +257,8 @@ class Page {
       place.textContent = this.units.text(Number(value), String(unit), Number(up ?? 0));
     }
     this.data.chosen.forEach((/** @type {any} */ one, /** @type {number} */ k) => {
-      this.show(`chosen${k}`, one.inputs);
+      this.showMotion(`chosen${k}`, one.inputs);
+      this.showEnergy(`chosen${k}`);
       byId(`chosen${k}-inputs`).replaceChildren(
         ...this.inputs.map((input) => this.row(input.label, one.inputs[input.name], input.unit, Number(input.name === "embedment_depth_m"))),
       );

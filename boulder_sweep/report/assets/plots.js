@@ -17,8 +17,7 @@ class Plots {
   /** @param {{docs: any, items: any}} made what Python made */
   static async load(made) {
     Bokeh.set_log_level("error");
-    const views = await Bokeh.embed.embed_items(made.docs, made.items);
-    void views;
+    await Bokeh.embed.embed_items(made.docs, made.items);
     return new Plots(Bokeh.documents.at(-1));
   }
 
@@ -32,21 +31,12 @@ class Plots {
     return this.document.get_model_by_name(name);
   }
 
-  /**
-   * Fill a source.
-   * @param {string} name
-   * @param {Record<string, any>} data columns
-   */
+  /** Fill a source. @param {string} name @param {Record<string, any>} data columns */
   fill(name, data) {
     this.find(name).data = data;
   }
 
-  /**
-   * Name the axes of a figure.
-   * @param {string} figure
-   * @param {string} x
-   * @param {string} y
-   */
+  /** Name the axes of a figure. @param {string} figure @param {string} x @param {string} y */
   title(figure, x, y) {
     this.find(`${figure}-x`).axis_label = x;
     this.find(`${figure}-y`).axis_label = y;
@@ -63,11 +53,7 @@ class Plots {
     }
   }
 
-  /**
-   * Show a map as a strip if it has one input only.
-   * @param {string} panel
-   * @param {boolean} flat
-   */
+  /** Show a map as a strip if it has one input only. @param {string} panel @param {boolean} flat */
   flatten(panel, flat) {
     this.find(`${panel}-map-y`).visible = !flat;
     const map = this.find(`${panel}-map`);
@@ -149,8 +135,8 @@ class Plots {
 
 /**
  * One rectangle of a map; `names` has all designs that lie there, `name` the worst of them, which is picked.
- * @typedef {{x: number, y: number, name: string, margin?: number | null, pick: () => Record<string, number>,
- *   names?: string[], answer?: string}} Cell
+ * @typedef {{x: number, y: number, name: string, pick: () => Record<string, number>, names?: string[],
+ *   answer?: string}} Cell
  */
 
 /** Share by which values may differ that are the same but for their last digits. */
@@ -192,20 +178,14 @@ function gradeOf(rows, codes, design) {
   return rows.grades[codes[names.reduce((at, name, k) => at * rows.values[name].length + places[k], 0)]];
 }
 
-/**
- * Unpack what Python packed.
- * @param {string} base64
- */
+/** Unpack what Python packed. @param {string} base64 */
 async function unpacked(base64) {
   const packed = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-/**
- * The ends of the intervals around ascending values, halfway between neighbours.
- * @param {number[]} values
- */
+/** The ends of the intervals around ascending values, halfway between neighbours. @param {number[]} values */
 function ends(values) {
   const inner = values.slice(1).map((value, k) => (value + values[k]) / 2);
   const [first, last] = [values[0], values[values.length - 1]];
@@ -213,7 +193,13 @@ function ends(values) {
   return [2 * first - inner[0], ...inner, 2 * last - inner[inner.length - 1]];
 }
 
-/** A map of verdicts over two inputs: its rectangles, its legend, and how the reader chooses a rectangle. */
+/** @type {Record<string, [number, number]>} to the right and up */
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowDown: [0, -1], ArrowUp: [0, 1] };
+
+/**
+ * A map of verdicts over two inputs: its rectangles, its legend, and how the reader chooses a rectangle: by a click, or
+ * by keys, of which an arrow goes to the next rectangle, and Enter picks it.
+ */
 class VerdictMap {
   /** @param {string} panel @param {Plots} plots @param {Units} units @param {Record<string, string>} colours by verdict */
   constructor(panel, plots, units, colours) {
@@ -221,9 +207,12 @@ class VerdictMap {
     this.plots = plots;
     this.units = units;
     this.colours = colours;
-    this.walker = new Walker(panel, plots, units);
     /** @type {Cell[]} */
     this.cells = [];
+    /** Where the keys have gone. */
+    this.at = { x: 0, y: 0 };
+    this.labels = { x: "", y: "" };
+    this.shown = { x: "", y: "" };
   }
 
   /**
@@ -231,11 +220,11 @@ class VerdictMap {
    * @param {Cell[]} cells
    * @param {{x: string, y: string}} labels
    * @param {{x: string, y: string}} shown units of the table
-   * @param {{x: number, y: number} | null} here the design shown elsewhere
+   * @param {{x: number, y: number} | null} here the design shown elsewhere; keys begin there, or in the middle
    */
   draw(cells, labels, shown, here) {
     const { plots, panel, units } = this;
-    this.cells = cells;
+    [this.cells, this.labels, this.shown] = [cells, labels, shown];
     const [sx, sy] = [units.size(shown.x), units.size(shown.y)];
     /** @param {number[]} values */
     const steps = (values) => {
@@ -262,12 +251,13 @@ class VerdictMap {
       verdict: cells.map(wordsOf),
       across: cells.map((cell) => cell.x / sx),
       up: cells.map((cell) => cell.y / sy),
-      margin: cells.map((cell) => cell.margin ?? NaN),
     });
     plots.fill(`${panel}-here`, here === null ? { x: [], y: [] } : { x: [here.x / sx], y: [here.y / sy] });
     plots.flatten(panel, labels.y === "");
     plots.title(`${panel}-map`, units.title(labels.x, shown.x), units.title(labels.y, shown.y));
-    this.walker.over(cells, labels, shown, here);
+    const middle = (/** @type {number[]} */ values) => values.sort((a, b) => a - b)[values.length >> 1] ?? 0;
+    this.at = here ?? { x: middle(cells.map((cell) => cell.x)), y: middle(cells.map((cell) => cell.y)) };
+    byId(`${panel}-at`).textContent = "";
     this.drawLegend();
   }
 
@@ -302,7 +292,39 @@ class VerdictMap {
       source.selected.indices = [];
       pick(this.cells[picked]);
     });
-    this.walker.listen(pick);
+    byId(`figure-${this.panel}-map`).addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
+      const arrow = ARROWS[event.key];
+      if (arrow === undefined && event.key !== "Enter") return;
+      event.preventDefault();
+      if (this.cells.length === 0) return;
+      if (arrow === undefined) pick(this.nearest());
+      else this.move(arrow);
+    });
+  }
+
+  /** @returns {Cell} the rectangle nearest to where the reader is */
+  nearest() {
+    const [wide, high] = [extent(this.cells.map((cell) => cell.x)), extent(this.cells.map((cell) => cell.y))];
+    const far = (/** @type {Cell} */ cell) => Math.hypot((cell.x - this.at.x) / wide, (cell.y - this.at.y) / high);
+    return this.cells.reduce((best, cell) => (far(cell) < far(best) ? cell : best));
+  }
+
+  /** @param {[number, number]} arrow */
+  move([right, up]) {
+    const from = this.nearest();
+    const levels = (/** @type {"x" | "y"} */ axis) => [...new Set(this.cells.map((cell) => cell[axis]))].sort((a, b) => a - b);
+    const next = (/** @type {"x" | "y"} */ axis, /** @type {number} */ step) => {
+      const along = levels(axis);
+      return along[Math.min(Math.max(along.indexOf(from[axis]) + step, 0), along.length - 1)];
+    };
+    this.at = { x: next("x", right), y: next("y", up) };
+    const found = this.nearest();
+    this.at = { x: found.x, y: found.y };
+    const [sx, sy] = [this.units.size(this.shown.x), this.units.size(this.shown.y)];
+    this.plots.fill(`${this.panel}-here`, { x: [found.x / sx], y: [found.y / sy] });
+    const words = (/** @type {"x" | "y"} */ axis) => `${this.labels[axis]} ${this.units.text(found[axis], this.shown[axis])}`;
+    const place = this.labels.y === "" ? words("x") : `${words("x")}, ${words("y")}`;
+    byId(`${this.panel}-at`).textContent = `${place}: ${wordsOf(found)}`;
   }
 }
 
@@ -384,75 +406,6 @@ function tableCells(rows, codes, across, up, held) {
       })),
     ),
   );
-}
-
-/** @type {Record<string, [number, number]>} to the right and up */
-const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowDown: [0, -1], ArrowUp: [0, 1] };
-
-/** Moves over a map by keys: an arrow goes to the next rectangle, Enter picks it. */
-class Walker {
-  /** @param {string} panel @param {Plots} plots @param {Units} units */
-  constructor(panel, plots, units) {
-    this.panel = panel;
-    this.plots = plots;
-    this.units = units;
-    /** @type {Cell[]} */
-    this.cells = [];
-    this.at = { x: 0, y: 0 };
-    this.labels = { x: "", y: "" };
-    this.shown = { x: "", y: "" };
-  }
-
-  /**
-   * Move over other rectangles from now on.
-   * @param {Cell[]} cells
-   * @param {{x: string, y: string}} labels
-   * @param {{x: string, y: string}} shown units of the table
-   * @param {{x: number, y: number} | null} here where to begin; in the middle without it
-   */
-  over(cells, labels, shown, here) {
-    [this.cells, this.labels, this.shown] = [cells, labels, shown];
-    const middle = (/** @type {number[]} */ values) => values.sort((a, b) => a - b)[values.length >> 1] ?? 0;
-    this.at = here ?? { x: middle(cells.map((cell) => cell.x)), y: middle(cells.map((cell) => cell.y)) };
-    byId(`${this.panel}-at`).textContent = "";
-  }
-
-  /** @param {(cell: Cell) => void} pick */
-  listen(pick) {
-    byId(`figure-${this.panel}-map`).addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
-      const arrow = ARROWS[event.key];
-      if (arrow === undefined && event.key !== "Enter") return;
-      event.preventDefault();
-      if (this.cells.length === 0) return;
-      if (arrow === undefined) pick(this.nearest());
-      else this.move(arrow);
-    });
-  }
-
-  /** @returns {Cell} the rectangle nearest to where the reader is */
-  nearest() {
-    const [wide, high] = [extent(this.cells.map((cell) => cell.x)), extent(this.cells.map((cell) => cell.y))];
-    const far = (/** @type {Cell} */ cell) => Math.hypot((cell.x - this.at.x) / wide, (cell.y - this.at.y) / high);
-    return this.cells.reduce((best, cell) => (far(cell) < far(best) ? cell : best));
-  }
-
-  /** @param {[number, number]} arrow */
-  move([right, up]) {
-    const from = this.nearest();
-    const levels = (/** @type {"x" | "y"} */ axis) => [...new Set(this.cells.map((cell) => cell[axis]))].sort((a, b) => a - b);
-    const next = (/** @type {"x" | "y"} */ axis, /** @type {number} */ step) => {
-      const along = levels(axis);
-      return along[Math.min(Math.max(along.indexOf(from[axis]) + step, 0), along.length - 1)];
-    };
-    this.at = { x: next("x", right), y: next("y", up) };
-    const found = this.nearest();
-    this.at = { x: found.x, y: found.y };
-    const [sx, sy] = [this.units.size(this.shown.x), this.units.size(this.shown.y)];
-    this.plots.fill(`${this.panel}-here`, { x: [found.x / sx], y: [found.y / sy] });
-    const words = (/** @type {"x" | "y"} */ axis) => `${this.labels[axis]} ${this.units.text(found[axis], this.shown[axis])}`;
-    const place = this.labels.y === "" ? words("x") : `${words("x")}, ${words("y")}`;
-    byId(`${this.panel}-at`).textContent = `${place}: ${wordsOf(found)}`;
-  }
 }
 
 /** @param {number[]} values @returns {number} how far they reach, never 0 */

@@ -18,12 +18,7 @@ class SideView {
     this.svg = svg;
   }
 
-  /**
-   * Draw one sample of a motion.
-   * @param {Scene} s
-   * @param {Motion} motion
-   * @param {number} sample
-   */
+  /** Draw one sample of a motion. @param {Scene} s @param {Motion} motion @param {number} sample */
   draw(s, motion, sample) {
     this.svg.replaceChildren();
     const slope = Math.tan(Math.PI / 4 + s.friction / 2);

@@ -165,7 +165,17 @@ class Simulator {
    * @returns {Judged[]}
    */
   rows(designs) {
-    return this.judged(designs, this.data.controls);
+    const complete = designs.map((design) => this.completed(design));
+    const inputs = complete.map((one) => one.inputs);
+    const { rules, controls } = this.data;
+    const results = this.kernel.rows(inputs.map((one) => this.kernelDesign(one)), inputs, controls, rules.limits);
+    return complete.map(({ inputs, refusal }, row) => {
+      const found = judge(results, row, inputs, rules);
+      found.step_s = found.end_time_s === null ? null : exact(results.step[row]);
+      if (refusal === "") return found;
+      const nothing = Object.fromEntries(Object.keys(found).map((name) => [name, null]));
+      return { ...nothing, verdict: "error", reason: refusal, rating: null };
+    });
   }
 
   /**
@@ -207,25 +217,6 @@ class Simulator {
   motionless() {
     const none = this.data.layout.history.map((/** @type {string} */ name) => [name, new Float64Array(0)]);
     return { time: new Float64Array(0), columns: Object.fromEntries(none), c_x: 0, c_y: 0 };
-  }
-
-  /**
-   * @param {Record<string, number>[]} designs
-   * @param {number[][]} controls that `Kernel.rows` takes
-   * @returns {Judged[]}
-   */
-  judged(designs, controls) {
-    const complete = designs.map((design) => this.completed(design));
-    const inputs = complete.map((one) => one.inputs);
-    const { rules } = this.data;
-    const results = this.kernel.rows(inputs.map((one) => this.kernelDesign(one)), inputs, controls, rules.limits);
-    return complete.map(({ inputs, refusal }, row) => {
-      const found = judge(results, row, inputs, rules);
-      found.step_s = found.end_time_s === null ? null : exact(results.step[row]);
-      if (refusal === "") return found;
-      const nothing = Object.fromEntries(Object.keys(found).map((name) => [name, null]));
-      return { ...nothing, verdict: "error", reason: refusal, rating: null };
-    });
   }
 }
 
