@@ -137,10 +137,10 @@ def need(
     refuse_unwritable(out, picture)
 
     unused = _unused(sweep, question["most"] or question["least"] or EMBEDMENT[1])
-    notes = [note for note in sweep.notes if not (unused and note.key.startswith("site.embedment"))]
-    notes += [Problem(Position(grid), "not used: the depth is searched", BY_NAME[name].path) for name in unused]
+    told = [note for note in sweep.notes if not (unused and note.key.startswith("site.embedment"))]
+    told += [Problem(Position(grid), "not used: the depth is searched", BY_NAME[name].path) for name in unused]
     shares = {name: question[name] for name in ("margin", "probability")}
-    say_how = partial(say_notes, replace(sweep, notes=tuple(notes)), units, **shares)
+    say_how = partial(say_notes, replace(sweep, notes=tuple(told)), units, **shares)
     with working(quiet, of="designs" if question["probability"] is None else "values") as progress:
         result = answer(sweep, **question, jobs=jobs, progress=progress, ready=None if quiet else say_how)
     if as_json:
