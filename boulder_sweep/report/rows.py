@@ -246,7 +246,7 @@ class ResultRows:
 def read_rows(folder: Location, finished: FinishedRows | AnswerFile | None = None) -> ResultRows:
     """Read what the page needs of a result, which may be open already.
 
-    Raises StoreError where there is no result in the folder or it is damaged, and ReportError where a file is not one
+    Raise StoreError where there is no result in the folder or it is damaged, and ReportError where a file is not one
     of answers, or rows of it are missing or in another order.
     """
     finished = finished or result_of(folder, ReportError)

@@ -215,7 +215,7 @@ def example() -> Sweep:
 def _page_maker() -> Callable[..., str]:
     """Return the function that makes the page.
 
-    ReportError where its libraries, an extra, are not installed, or its kernel was built from other sources.
+    Raise ReportError where its libraries, an extra, are not installed, or its kernel was built from other sources.
     """
     try:
         from boulder_sweep.report.page import assembled
@@ -328,7 +328,7 @@ def printed(html: str) -> bytes:
 def _ended(program: str, words: Sequence[str], said: Path) -> tuple[int, str]:
     """Run a browser to its end; return its exit code, and the end of what it said, which goes into a file.
 
-    No process is left behind. ReportError where it does not start, or not end in time.
+    No process is left behind. Raise ReportError where it does not start, or not end in time.
     """
     # Otherwise it leaves a socket among the user's temporary files, whose path must be short, and settings elsewhere.
     environment = {**os.environ, "TMPDIR": ".", "GSETTINGS_BACKEND": "memory"}

@@ -82,7 +82,7 @@ class Cluster:
     def __call__(self, calls: Iterable[Call], shared: Any = None) -> Iterator[Any]:
         """Make the calls; an argument that they share is sent once.
 
-        BackendError where the workers cannot make a call, ClusterLostError where they or the scheduler are gone.
+        Raise BackendError where the workers cannot make a call, ClusterLostError where they or the scheduler are gone.
         """
         try:
             yield from self._results(iter(calls), shared)
@@ -120,7 +120,7 @@ class Cluster:
 def cluster(jobs: int | None, scheduler: str | None) -> Iterator[Cluster]:
     """Connect to the cluster of a scheduler, or give one of so many threads within this process.
 
-    BackendError where the workers are not available.
+    Raise BackendError where the workers are not available.
     """
     try:
         distributed = import_module("distributed")  # an extra: most users have no cluster
@@ -231,7 +231,7 @@ def check_backend(backend: str, scheduler: str | None) -> None:
 
 
 def check_jobs(jobs: int | None) -> None:
-    """TypeError where a number of workers is not whole, ValueError where it is below one or above `MOST_JOBS`."""
+    """Raise TypeError where a number of workers is not whole, ValueError where it is not from 1 to `MOST_JOBS`."""
     if jobs is None:
         return
     if not isinstance(jobs, int) or isinstance(jobs, bool):

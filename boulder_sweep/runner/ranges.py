@@ -90,8 +90,8 @@ class Work:
     def write(self, first: int, stop: int, tick: Callable[[int], None] = lambda rows: None) -> PartReport:
         """Compute a range and write its part; `tick` is called with the rows of each block, and may raise to stop.
 
-        ComputationError as `judged`; WriteError where the part cannot be written; BackendError where this worker has
-        other versions.
+        Raise ComputationError as `judged` does, WriteError where the part cannot be written, and BackendError where
+        this worker has other versions.
         """
         if self.made_by is not None:
             refuse_other_versions(self.made_by)
@@ -108,7 +108,7 @@ class Work:
     def judged(self, start: int, stop: int) -> Judged:
         """Compute the rows [start, stop); those that raise alone are rows of verdict ``error``.
 
-        ComputationError where so many calls have failed that something must be wrong with all rows.
+        Raise ComputationError where so many calls have failed that something must be wrong with all rows.
         """
         try:
             return self.evaluate(self.make_block(start, stop))

@@ -419,24 +419,8 @@ def estimate(
 ) -> Estimate:
     """Estimate what a run will take from a timed sample of a tenth of a second; nothing is written.
 
-    Parameters
-    ----------
-    sweep, out, jobs, simulate
-        See `run`.
-    resume
-        Count only the rows that are missing in `out` or damaged there.
-
-    Returns
-    -------
-    Estimate
-        Rows, time and disk.
-
-    Raises
-    ------
-    TypeError, ValueError
-        The number of jobs is not a whole number, or out of range.
-    StoreError
-        A run cannot be resumed in `out`.
+    With `resume`, only the rows that are missing in `out` or damaged there are counted. Raise StoreError where a run
+    cannot be resumed in it, and for other arguments what `run` raises.
     """
     check_jobs(jobs)
     sweep = at_values(sweep)

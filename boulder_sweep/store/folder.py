@@ -97,7 +97,7 @@ def part_files(names: Sequence[str]) -> list[PartFile]:
 def put_part(out: Location, first: int, stop: int, content: bytes | memoryview) -> PartFile:
     """Write a part; it appears whole, or not at all. Another worker may write the same part, too.
 
-    WriteError where it cannot be written; other parts are unchanged.
+    Raise WriteError where it cannot be written; other parts are unchanged.
     """
     part = PartFile(first, stop, hash_of(content))
     try:
@@ -111,7 +111,7 @@ def put_part(out: Location, first: int, stop: int, content: bytes | memoryview) 
 
 
 def check_writable(out: Location) -> None:
-    """WriteError where a folder cannot be written; what is on an object store shows with the first part."""
+    """Raise WriteError where a folder cannot be written; what is on an object store shows with the first part."""
     if isinstance(out, Path):
         try:
             with _passing(out):
@@ -252,7 +252,7 @@ def _runtime_folder() -> Path:
 def check_target(target: Location, refusal: type[BoulderSweepError]) -> None:
     """Check that a file may be written at a location; readers would take one within a result for rows of it.
 
-    Raises the refusal where its folder does not exist, cannot be written or holds the result of a run, or a folder has
+    Raise the refusal where its folder does not exist, cannot be written or holds the result of a run, or a folder has
     its name, and LinkError where a link has its name.
     """
     folder = target.absolute().parent if isinstance(target, Path) else target.parent

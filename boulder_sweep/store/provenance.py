@@ -102,7 +102,7 @@ def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
 def identity_in(metadata: Mapping[bytes, bytes] | None) -> dict[str, Any]:
     """Return the identity in the metadata of a file, and what else `file_metadata` wrote; empty of another file.
 
-    ValueError or RecursionError where it holds what no command writes.
+    Raise ValueError or RecursionError where it holds what no command writes.
     """
     texts = {key.decode(errors="replace"): value for key, value in (metadata or {}).items()}
     entries = {key.removeprefix(PREFIX): value for key, value in texts.items() if key.startswith(PREFIX)}
@@ -153,7 +153,7 @@ def other_version(there: Any) -> str:
 def check_identity(there: Mapping[str, Any]) -> None:
     """Check the identity of a result before anything is made of it: settings, control, readings and versions.
 
-    ValueError says what it holds that no command writes.
+    Raise ValueError, which says what it holds that no command writes.
     """
     from boulder_sweep.settings.stored import check_control, check_stored  # not needed by runs
 

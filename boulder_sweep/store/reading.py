@@ -90,8 +90,8 @@ class Contents:
 def contents(folder: Location) -> Contents:
     """Read every part of a folder: compare its bytes with its name, and what it says with its rows.
 
-    TwoResultsError where two intact parts hold the same rows, OtherVersionError where another version wrote them,
-    StoreError where they cannot be read.
+    Raise TwoResultsError where two intact parts hold the same rows, OtherVersionError where another version wrote
+    them, StoreError where they cannot be read.
     """
     found, known = Contents(), dict[frozenset[Any], Table]()
     parts = _parts_in(folder)
@@ -242,8 +242,8 @@ class FinishedRows:
     `rows` are the whole table's, `rows_done` the finished ones; `identity` is what all rows have in common, see
     `provenance`; `judged_by` says whose rules judged them, empty where this version's did: others are warned of.
 
-    NotASweepError where there is no result in the folder; DamagedError or OtherVersionError where no part can be read,
-    two hold the same rows, or another version wrote them.
+    Raise NotASweepError where there is no result in the folder; DamagedError or OtherVersionError where no part can
+    be read, two hold the same rows, or another version wrote them.
     """
 
     def __init__(self, folder: Location):
@@ -268,7 +268,7 @@ class FinishedRows:
     def tables(self, columns: Sequence[str] | None = None, *, verify: bool = True) -> Iterator[pa.Table]:
         """Yield all rows in the order of the designs, a part at a time; of all columns, or of some.
 
-        DamagedError where a part is truncated or of another run; changed, only where its hash is verified.
+        Raise DamagedError where a part is truncated, of another run or, if its hash is to be verified, changed.
         """
         wanted = list(columns) if columns is not None else None
         return _ahead(lambda part: self._read(part, wanted, verify), self._parts)
@@ -276,8 +276,8 @@ class FinishedRows:
     def row(self, number: int) -> pa.Table:
         """Return one row, from the one part that holds it.
 
-        IndexError where there is no such row, or not yet; DamagedError where its part is truncated, changed or of
-        another run.
+        Raise IndexError where there is no such row, or not yet; DamagedError where its part is truncated, changed or
+        of another run.
         """
         if not 0 <= number < self.rows:
             held = counted(self.rows, "design")
