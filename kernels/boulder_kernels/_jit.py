@@ -18,8 +18,6 @@ not notice that a function it calls has changed in another file. Another process
 standard input, keeps the code on the disk, and answers each with a byte. So every process that runs kernels loads them,
 the first one as well, and all run the same code: code that was compiled in the same process may fuse other products and
 differ in the last bits. That process ends with the one that started it, or when nothing was asked for a while.
-
-Named tuples go into kernels and out of arrays and lanes by `taken`, `load` and `store`, whole.
 """
 
 from __future__ import annotations
@@ -51,8 +49,6 @@ from typing import Any, get_type_hints
 import llvmlite.binding
 import numba
 import numpy as np
-from llvmlite import ir
-from numba.core import cgutils
 
 CACHE_VARIABLE = "BOULDER_SWEEP_CACHE_DIR"
 """Environment variable that names another folder for compiled kernels."""
@@ -324,10 +320,12 @@ _TYPES: dict[Any, Any] = {}
 
 
 def _key_of(value: Any) -> Any:
-    """Return what the Numba type of an argument depends on: a number, None, an array, or a named tuple of these."""
+    """Return what the Numba type of an argument depends on: a number, None, an array, a record, or a named tuple."""
     if isinstance(value, np.ndarray):
         flags = value.flags
         return type(value), value.dtype, value.ndim, flags.c_contiguous, flags.f_contiguous, flags.writeable
+    if isinstance(value, np.void):
+        return type(value), value.dtype
     return (type(value), *map(_key_of, value)) if isinstance(value, tuple) else type(value)
 
 
@@ -488,163 +486,6 @@ def through(add: Callable[..., Any]) -> Callable[..., Any]:
 def fields_of(kind: Any) -> dict[str, Any]:
     """Return the names of the fields of a named tuple and what they are: float, int, bool or another named tuple."""
     return get_type_hints(kind)
-
-
-def _as(kind: Any, number: Any) -> Any:
-    """Return a number as a field has it."""
-    return kind(number) if kind in (int, bool) else number
-
-
-def _type_named(kind: Any) -> Any:
-    """Return the Numba type of a named tuple, or of a number."""
-    if not hasattr(kind, "_fields"):
-        return {int: numba.types.intp, bool: numba.types.boolean}.get(kind, numba.types.float64)
-    return numba.types.BaseTuple.from_types([_type_named(each) for each in fields_of(kind).values()], kind)
-
-
-def _place(builder: Any, record: Any, offset: int, array: Any, lane: Any) -> Any:
-    """Return where one lane has its number of a field."""
-    numbers = ir.ArrayType(ir.DoubleType(), array.nitems)
-    return cgutils.gep_inbounds(builder, cgutils.get_record_member(builder, record, offset, numbers), 0, lane)
-
-
-def _loaded(context: Any, builder: Any, kind: Any, record: Any, begin: int, of: Any, lane: Any) -> Any:
-    """Make a named tuple of one lane's numbers in a record that lies behind the beginning of another."""
-    values = []
-    for name, each in zip(kind.fields, kind.types, strict=True):
-        if name not in of.fields:
-            values.append(context.get_constant(each, ABSENT.get(name, 0)))
-        elif isinstance(each, numba.types.BaseTuple):
-            values.append(_loaded(context, builder, each, record, begin + of.offset(name), of.typeof(name), lane))
-        else:
-            number = builder.load(_place(builder, record, begin + of.offset(name), of.typeof(name), lane))
-            values.append(context.cast(builder, number, numba.types.float64, each))
-    return context.make_tuple(builder, kind, values)
-
-
-@numba.extending.intrinsic
-def _load(typing: Any, record: Any, lane: Any, kind: Any) -> Any:
-    """Load a named tuple, see `load`."""
-    named = _type_named(kind.instance_class)
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        """Load its numbers one by one."""
-        return _loaded(context, builder, named, arguments[0], 0, record, arguments[1])
-
-    return named(record, numba.types.intp, kind), generate
-
-
-@numba.extending.intrinsic
-def _store(typing: Any, record: Any, lane: Any, value: Any) -> Any:
-    """Store a named tuple, see `store`."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        """Store its numbers one by one."""
-        to, at, values = arguments
-        for i, (name, each) in enumerate(zip(value.fields, value.types, strict=True)):
-            if name in record.fields:
-                number = context.cast(builder, builder.extract_value(values, i), each, numba.types.float64)
-                builder.store(number, _place(builder, to, record.offset(name), record.typeof(name), at))
-        return context.get_dummy_value()
-
-    return numba.types.void(record, numba.types.intp, value), generate
-
-
-ABSENT = {"w_0": 1.0}
-"""What stands for a number that a record of the lanes has no field for, where it is not zero: the compiler knows it,
-and leaves out what is multiplied by zero."""
-
-
-def load(record: Any, lane: int, kind: Any) -> Any:
-    """Return one lane's numbers in a record as a named tuple.
-
-    Parameters
-    ----------
-    record
-        It has a field of shape (lanes,) for each number, and a record for each named tuple; what it has none of is
-        `ABSENT`.
-    lane
-        The lane, not negative.
-    kind
-        The named tuple.
-    """
-    values = []
-    for name, each in fields_of(kind).items():
-        if name not in record.dtype.names:
-            values.append(ABSENT.get(name, 0.0))
-        elif hasattr(each, "_fields"):
-            values.append(load(record[name], lane, each))
-        else:
-            values.append(_as(each, record[name][lane]))
-    return kind(*values)
-
-
-@overload(load)
-def _load_in_kernels(record: Any, lane: Any, kind: Any) -> Callable[..., Any]:
-    intrinsic: Any = _load
-    return lambda record, lane, kind: intrinsic(record, lane, kind)
-
-
-def store(record: Any, lane: int, value: Any) -> None:
-    """Write those numbers of a named tuple into one lane that a record has a field for; see `load`."""
-    for name in value._fields:
-        if name in record.dtype.names:
-            record[name][lane] = getattr(value, name)
-
-
-@overload(store)
-def _store_in_kernels(record: Any, lane: Any, value: Any) -> Callable[..., None]:
-    intrinsic: Any = _store
-    return lambda record, lane, value: intrinsic(record, lane, value)
-
-
-def _address(context: Any, builder: Any, array: Any, value: Any, at: tuple[Any, ...]) -> Any:
-    """Return where an array has the number at some indices."""
-    numbers = context.make_helper(builder, array, value)
-    place = numbers.data
-    for index, stride in zip(at, cgutils.unpack_tuple(builder, numbers.strides, array.ndim), strict=True):
-        place = cgutils.pointer_add(builder, place, builder.mul(index, stride))
-    return place
-
-
-@numba.extending.intrinsic
-def _take(typing: Any, numbers: Any, first: Any, row: Any, kind: Any) -> Any:
-    """Take a named tuple out of an array, see `taken`."""
-    named, number = _type_named(kind.instance_class), numba.types.intp
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        """Load its numbers one by one."""
-        array, begin, column, _ = arguments
-        values = []
-        for i, each in enumerate(named.types):
-            at = builder.add(begin, context.get_constant(number, i)), column
-            loaded = builder.load(_address(context, builder, numbers, array, at[: numbers.ndim]))
-            values.append(context.cast(builder, loaded, numbers.dtype, each))
-        return context.make_tuple(builder, named, values)
-
-    return named(numbers, number, number, kind), generate
-
-
-def taken(numbers: np.ndarray, first: int, row: int, kind: Any) -> Any:
-    """Return the numbers of an array that begin at an index, in one of its columns if it has any, as a named tuple.
-
-    Parameters
-    ----------
-    numbers
-        Shape (m,) or (m, n).
-    first, row
-        The index of the first number, and the column, not negative.
-    kind
-        The named tuple, whose fields they are in its order.
-    """
-    column = numbers[first:] if numbers.ndim == 1 else numbers[first:, row]
-    return kind(*(_as(each, number) for each, number in zip(fields_of(kind).values(), column, strict=False)))
-
-
-@overload(taken)
-def _taken(numbers: Any, first: Any, row: Any, kind: Any) -> Callable[..., Any]:
-    intrinsic: Any = _take
-    return lambda numbers, first, row, kind: intrinsic(numbers, first, row, kind)
 
 
 @numba.extending.intrinsic

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import exact_inlined, inlined, kernel, taken
+from ._jit import exact_inlined, inlined, kernel
 from .design import Constants
 from .dynamics import soil_reaction
 from .events import AT_END, TOLERANCE, GapFactors, needs_moment
@@ -106,8 +106,13 @@ BEHIND = 1.0 + 0.3 * AT_END * TOLERANCE
 @inlined
 def control_in(c: np.ndarray) -> Control:
     """Return the control that an array holds, in the order of its fields; booleans are 0 or 1."""
-    control: Control = taken(c, 0, 0, Control)
-    return control
+    h, horizon, theta_limit, longest_horizon, event_tolerance = c[0], c[1], c[2], c[8], c[11]
+    error_estimate, stop_at_limit, locate_yield, refined = c[4] != 0.0, c[5] != 0.0, c[6] != 0.0, c[7] != 0.0
+    last_resort, paired, side_by_side = c[9] != 0.0, c[10] != 0.0, c[12] != 0.0
+    return Control(
+        h, horizon, theta_limit, int(c[3]), error_estimate, stop_at_limit, locate_yield, refined,
+        longest_horizon, last_resort, paired, event_tolerance, side_by_side,
+    )  # fmt: skip
 
 
 @inlined

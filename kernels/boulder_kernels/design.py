@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import exact_inlined, exact_kernel, inlined, taken
+from ._jit import exact_inlined, exact_kernel, inlined
 from .numerics import direction, half_tangent
 
 
@@ -112,8 +112,8 @@ def design_at(table: DesignTable, row: int) -> Design:
 @inlined
 def design_in(a: np.ndarray, row: int) -> Design:
     """Return the design in a column of an array."""
-    design: Design = taken(a, 0, row, Design)
-    return design
+    x = a[:, row]
+    return Design(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12], x[13], x[14])
 
 
 class Constants(NamedTuple):
@@ -219,6 +219,13 @@ class Body(NamedTuple):
     """Half the length of its foot [m]."""
     lean: float
     """Distance of the boulder's centre from the middle of the foot, towards the vehicle [m]."""
+
+
+@inlined
+def body_in(a: np.ndarray, first: int, row: int) -> Body:
+    """Return the body in a column of an array from an index on."""
+    x = a[first:, row]
+    return Body(x[0], x[1], x[2], x[3], x[4], x[5], x[6])
 
 
 @exact_inlined

@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import inlined, kernel, taken
+from ._jit import inlined, kernel
 from .design import Constants, Design, Readings, design_in
 from .dormand_prince import DenseOutput, displacement_at, state_at, turning_point
 from .dynamics import (
@@ -206,8 +206,8 @@ def outcome_table(out: np.ndarray) -> OutcomeTable:
 @inlined
 def outcome_in(a: np.ndarray, row: int) -> OutcomeTable:
     """Return the outcome in a column of an array."""
-    outcome: OutcomeTable = taken(a, 0, row, OutcomeTable)
-    return outcome
+    x = a[:, row]
+    return OutcomeTable(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10])
 
 
 @kernel
@@ -763,8 +763,8 @@ def modes_of(y: State, turning: int, touching: bool, c: Any) -> Modes:
 @inlined
 def state_of(record: Record, sample: int) -> State:
     """Return the state at a sample."""
-    y: State = taken(record.states[sample], 0, 0, State)
-    return y
+    y = record.states[sample]
+    return State(y[0], y[1], y[2], y[3], y[4], y[5])
 
 
 @inlined

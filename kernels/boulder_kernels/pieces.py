@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import by_types, exact_inlined, exact_kernel, inlined, kernel, taken, through, type_of
+from ._jit import by_types, exact_inlined, exact_kernel, inlined, kernel, through, type_of
 from .design import (
     HEIGHT,
     WIDTH,
@@ -77,6 +77,13 @@ class GivenPiece(NamedTuple):
     """Width w_0 + w_1 r as a ratio of the design's width [-]."""
 
 
+@inlined
+def given_piece_in(a: np.ndarray, first: int, row: int) -> GivenPiece:
+    """Return the piece that is given in a column of an array from an index on."""
+    x = a[first:, row]
+    return GivenPiece(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7])
+
+
 class Piece(NamedTuple):
     """One piece of soil, worked out."""
 
@@ -97,6 +104,12 @@ class Piece(NamedTuple):
     """Width w_0 + w_1 r as a ratio of the design's width [-], for which K, P and R are given."""
 
 
+@inlined
+def piece_in(x: np.ndarray) -> Piece:
+    """Return the piece that an array holds."""
+    return Piece(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8])
+
+
 class SoilSums(NamedTuple):
     """What is integrated over all pieces once for a design; zero before the first."""
 
@@ -112,6 +125,12 @@ class SoilSums(NamedTuple):
     Z_2: float
     Z_3: float
     """Antiderivatives of w R r^i at both ends of the pieces, added up, i = 0 ... 3 [kg/m]."""
+
+
+@inlined
+def sums_in(x: np.ndarray) -> SoilSums:
+    """Return the sums that an array holds."""
+    return SoilSums(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8])
 
 
 class FewPieces(NamedTuple):
@@ -423,6 +442,8 @@ def constants_of_few(design: Design, readings: Readings, body: Body, given: tupl
     return constants_in_soil(design, readings, body, so_far, FewPieces(so_far.sums, pieces))
 
 
+BELOW = len(Design._fields)
+"""Rows of a table of designs above what is given of the soil."""
 BODY_SIZE, PIECE_SIZE = len(Body._fields), len(GivenPiece._fields)
 """How many numbers are given of a body, and of each piece."""
 COUNTS = (1, 2, 4, 8)
@@ -650,14 +671,14 @@ def walk_by_arrays(line: Line, soil: ManyPieces) -> Walk:
     """Return what is met on the way down through `ManyPieces`."""
     w = start_walk(sums_of(soil))
     for m in range(len(soil.pieces)):
-        w = pass_piece(w, line, taken(soil.pieces[m], 0, 0, Piece))
+        w = pass_piece(w, line, piece_in(soil.pieces[m]))
     return w
 
 
 @by_types
 def sums_of(soil: Any) -> Callable[..., SoilSums]:
     """Return the sums of pieces."""
-    return (lambda soil: soil.sums) if type_of(soil) is FewPieces else (lambda soil: taken(soil.sums, 0, 0, SoilSums))
+    return (lambda soil: soil.sums) if type_of(soil) is FewPieces else (lambda soil: sums_in(soil.sums))
 
 
 @inlined
