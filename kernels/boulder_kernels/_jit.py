@@ -103,15 +103,9 @@ def _cache_folder() -> str | None:
 def _make_private_folder(folder: Path) -> Path:
     """Make a folder with access for this user only, and check that nobody else can put files into it, or has.
 
-    Returns
-    -------
-    Path
-        Without symbolic links, which could be changed later.
+    The path that is returned has no symbolic links, which could be changed later.
 
-    Raises
-    ------
-    OSError
-        It cannot be made, others can change it or a folder above it, or a file in it is another user's.
+    Raises ``OSError``: it cannot be made, others can change it or a folder above it, or a file in it is another user's.
     """
     folder = Path(os.path.realpath(folder))
     missing = [path for path in (folder, *folder.parents) if not path.exists()]
@@ -192,19 +186,9 @@ _owner = 0
 def compile_elsewhere(kernel: Any, kinds: tuple[Any, ...], folder: Path) -> None:
     """Have another process compile a kernel, and keep the code in a folder.
 
-    Parameters
-    ----------
-    kernel
-        The `Kernel`.
-    kinds
-        Numba types of its arguments.
-    folder
-        Where the code is kept.
+    ``kernel``: the `Kernel`; ``kinds``: Numba types of its arguments; ``folder``: where the code is kept.
 
-    Raises
-    ------
-    OSError
-        There is no such process, or it could not do it.
+    Raises ``OSError``: there is no such process, or it could not do it.
     """
     request = pickle.dumps((kernel.__module__, kernel.__qualname__, kinds, folder))
     for _ in range(2):  # it may just have ended, since nothing was asked for a while
@@ -387,12 +371,8 @@ class Kernel:
     def _loaded(self, kinds: tuple[Any, ...], folder: Path) -> Any:
         """Load what is kept for arguments of some types, and have it compiled first if there is nothing.
 
-        Raises
-        ------
-        OSError
-            It cannot be compiled by another process, or not be kept.
-        Exception
-            It is damaged.
+        Raises ``OSError``: it cannot be compiled by another process, or not be kept. Raises ``Exception``: it is
+        damaged.
         """
         if not self.mark(kinds, folder).exists():
             with announce(self.__qualname__):
@@ -464,13 +444,10 @@ def is_none(value: Any) -> bool:
 def through(add: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function that passes what has been met on from item to item of a tuple, and returns what was met in all.
 
-    Inside kernels every item is a call of its own: a loop would keep the one over lanes from being vectorised, and
-    what has been met could not change its type.
+    Inside kernels every item is a call of its own: a loop would keep the one over lanes from being vectorised, and what
+    has been met could not change its type.
 
-    Parameters
-    ----------
-    add
-        Takes what has been met before an item, a state, and the item.
+    ``add`` takes what has been met before an item, a state, and the item.
     """
 
     @by_types

@@ -65,14 +65,9 @@ def numbers_of(names: tuple[str, ...]) -> np.dtype:
 def group_type(pieces: int, has_strength: bool, has_outline: bool) -> np.dtype:
     """Return the type of a group of lanes.
 
-    Parameters
-    ----------
-    pieces
-        Number of pieces of the soil of a design, in `boulder_kernels.pieces.COUNTS`; 0 for uniform soils beside boxes.
-    has_strength
-        Whether the ultimate resistance of a piece may be other than proportional to the depth.
-    has_outline
-        Whether boulders are no boxes.
+    ``pieces``: number of pieces of the soil of a design, in `boulder_kernels.pieces.COUNTS`; 0 for uniform soils beside
+    boxes; ``has_strength``: whether the ultimate resistance of a piece may be other than proportional to the depth;
+    ``has_outline``: whether boulders are no boxes.
     """
     records: list[Any] = []
     given = BELOW

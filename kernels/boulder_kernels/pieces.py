@@ -234,16 +234,9 @@ def next_piece(
 ) -> tuple[GivenPiece, Cursor]:
     """Return the piece that begins at a ratio of the depth, and where the next begins (Eq 145); the last is repeated.
 
-    Parameters
-    ----------
-    design
-        The design, SI; the layers replace density, friction angle and subgrade reaction of its soil.
-    layers, outline
-        Layers, shape (M, 6), and outline, shape (P, 4), of the design.
-    low
-        Where it begins.
-    at
-        What lies there.
+    ``design``: the design, SI; the layers replace density, friction angle and subgrade reaction of its soil; ``layers,
+    outline``: layers, shape (M, 6), and outline, shape (P, 4), of the design; ``low``: where it begins; ``at``: what
+    lies there.
     """
     d, last, m, i = design.d, len(layers) - 1, at.layer, at.piece
     layer_to = min(layers[m, TO] / d, 1.0) if m < last else 1.0
@@ -352,14 +345,8 @@ def lumped_with(so_far: LumpedSoil, piece: Piece, given: GivenPiece, design: Des
 def fill_pieces(design: Design, layers: np.ndarray, outline: np.ndarray, soil: ManyPieces) -> LumpedSoil:
     """Cut layers and outline into pieces (Eq 145), and return what follows from them.
 
-    Parameters
-    ----------
-    design
-        The design, SI; the layers replace density, friction angle and subgrade reaction of its soil.
-    layers, outline
-        Layers, shape (M, 6), and outline, shape (P, 4), of the design.
-    soil
-        Pieces to fill.
+    ``design``: the design, SI; the layers replace density, friction angle and subgrade reaction of its soil; ``layers,
+    outline``: layers, shape (M, 6), and outline, shape (P, 4), of the design; ``soil``: pieces to fill.
     """
     so_far, low, at, to = nothing_lumped(), 0.0, cursor_at_soil_line(design, outline), soil.pieces
     for n in range(len(to)):
@@ -459,14 +446,8 @@ def lanes_count(pieces: int) -> int:
 def write_given(designs: np.ndarray, layers: np.ndarray, outlines: np.ndarray, out: np.ndarray) -> None:
     """Write what lanes are given of designs beside `Design`: the body, and the pieces one after another.
 
-    Parameters
-    ----------
-    designs
-        The designs, SI, shape (15, n).
-    layers, outlines
-        Layers, shape (n, M, 6), and outlines, shape (n, P, 4).
-    out
-        Shape (BODY_SIZE + C PIECE_SIZE, n), of C pieces.
+    ``designs``: the designs, SI, shape (15, n); ``layers, outlines``: layers, shape (n, M, 6), and outlines, shape (n,
+    P, 4); ``out``: shape (BODY_SIZE + C PIECE_SIZE, n), of C pieces.
     """
     for row in range(out.shape[1]):
         design, outline = design_in(designs, row), outlines[row]

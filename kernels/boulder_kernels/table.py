@@ -181,17 +181,8 @@ def take_first_steps(group: Any, readings: Readings, control: Control) -> None:
 def start_designs(group: Any, designs: np.ndarray, first: int, readings: Readings, control: Control) -> None:
     """Put as many designs as there are lanes into a group, and take their first step where it ends as it should.
 
-    Parameters
-    ----------
-    group
-        The group.
-    designs, first
-        The designs of `LaneDesigns`, and the row of the design in the first lane.
-    readings, control
-        How they are simulated.
+    ``designs, first``: the designs of `LaneDesigns`, and the row of the design in the first lane.
 
-    Notes
-    -----
     A lane is left with the status RUNNING, or with the status of a design that needs no integration or allows none.
     """
     compute_constants(group, designs, first, readings, control)
@@ -278,13 +269,9 @@ def run_lanes(
 ) -> Outcome:
     """Simulate every design of a table, and return the outcome of the last that has ended.
 
-    Parameters
-    ----------
-    designs, readings, control, record, out
-        The same as in `simulate_lanes`, with designs for whole groups.
-    groups, rows
-        The lanes, see `empty_groups`; the rows of the designs in them, EMPTY before they are
-        filled, and behind them 0.
+    ``designs, readings, control, record, out``: the same as in `simulate_lanes`, with designs for whole groups;
+    ``groups, rows``: the lanes, see `empty_groups`; the rows of the designs in them, EMPTY before they are filled, and
+    behind them 0.
     """
     for lane in range(LANES):
         next_design(groups, rows, lane, designs, readings, control, out)
@@ -338,23 +325,12 @@ def simulate_lanes(
 ) -> Outcome:
     """Simulate every design of a table in lanes, by a closed form of the soil.
 
-    Parameters
-    ----------
-    given
-        The designs.
-    readings
-        Which formulas are read as printed.
-    control
-        How they are simulated, its choice of soil ignored. One that does not stop at the limit is for one design.
-    record
-        Filled with the time history of one design at the times it names; for several, one that keeps nothing.
-    out
-        Where the outcomes go in the order of the designs, an array of `boulder_kernels.outcomes.empty_outcomes`.
+    ``control``: how they are simulated, its choice of soil ignored. One that does not stop at the limit is for one
+    design; ``record``: filled with the time history of one design at the times it names; for several, one that keeps
+    nothing; ``out``: where the outcomes go in the order of the designs, an array of
+    `boulder_kernels.outcomes.empty_outcomes`.
 
-    Returns
-    -------
-    Outcome
-        The outcome of the design that ended last.
+    Returns the outcome of the design that ended last.
     """
     rows = np.full(LANES + 1, EMPTY)
     rows[NEXT] = 0
@@ -391,14 +367,8 @@ def run_rows(
 ) -> Outcome:
     """Simulate designs one by one, in any soil, and return the last outcome.
 
-    Parameters
-    ----------
-    designs
-        Shape (15, n), at least one.
-    soils
-        Their soils; None for boxes in uniform soils.
-    readings, control, record, out
-        See `simulate_lanes`.
+    ``designs``: shape (15, n), at least one; ``soils``: their soils; None for boxes in uniform soils; ``readings,
+    control, record, out``: see `simulate_lanes`.
     """
     outcome = failed(Status.INVALID.value)
     for row in range(designs.shape[1]):
@@ -463,12 +433,9 @@ def solve_rows(
 def solve(table: DesignTable, readings: Readings, control: Control) -> tuple[np.ndarray, np.ndarray]:
     """Solve every design of a table once.
 
-    Returns
-    -------
-    out : ndarray, shape (11, n)
-        Rows in the order of `OutcomeTable`, with the errors of the steps of one solution.
-    second : ndarray, shape (n,)
-        Which second solution each of them needs, see `boulder_kernels.outcomes.StepErrors`.
+    Returns ``out``, shape (11, n): rows in the order of `OutcomeTable`, with the errors of the steps of one
+    solution; ``second``, shape (n,): which second solution each of them needs, see
+    `boulder_kernels.outcomes.StepErrors`.
     """
     out, soils = empty_outcomes(len(table.L)), None
     if isinstance(table, PiecewiseTable):
