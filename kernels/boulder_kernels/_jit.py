@@ -55,13 +55,7 @@ CACHE_VARIABLE = "BOULDER_SWEEP_CACHE_DIR"
 
 
 def source_hash() -> str:
-    """Hash of all kernel sources: which code computed a table.
-
-    Returns
-    -------
-    str
-        64 hexadecimal digits (SHA-256 over names and contents, in order of name).
-    """
+    """Return which code computed a table: SHA-256 over names and contents of all kernel sources, 64 hex digits."""
     digest = hashlib.sha256()
     for source in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(source.name.encode())
@@ -324,14 +318,7 @@ def _type_of(value: Any) -> Any:
 class Kernel:
     """A kernel that is compiled when it is first called, by Python or by another kernel; see `kernel`.
 
-    Numba's dispatcher supplies every attribute that is not defined here.
-
-    Attributes
-    ----------
-    py_func : callable
-        The function itself.
-    options : dict
-        What Numba is asked for.
+    ``py_func`` is the function itself. Numba's dispatcher supplies every attribute that is not defined here.
     """
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
@@ -499,18 +486,7 @@ def _compiled(function: Callable[..., Any], fastmath: set[str], *, inline: bool 
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a function for the machine at its first call, keeping the result on disk.
-
-    Parameters
-    ----------
-    function
-        Plain Python on scalars, NamedTuples and NumPy arrays.
-
-    Returns
-    -------
-    callable
-        A `Kernel`; ``.py_func`` is the function itself.
-    """
+    """Compile a function on numbers, named tuples and arrays at its first call, and keep the code; see `Kernel`."""
     return _compiled(function, {"contract", "nsz"})
 
 

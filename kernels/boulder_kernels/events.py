@@ -146,22 +146,9 @@ def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: boo
     top = float(modes.yielded_top) if locate_yield else UNSOUGHT
     base = float(modes.yielded_base) if locate_yield else UNSOUGHT
     return GapFactors(
-        contact=contact,
-        rotation_0=rotation_0,
-        rotation_abs_M=rotation_abs_M,
-        rotation_theta=rotation_theta,
-        rotation_omega=rotation_omega,
-        couple_M=couple_M,
-        couple_abs_M=couple_abs_M,
-        couple_limit=couple_limit,
-        corner_0=corner_0,
-        corner_theta=corner_theta,
-        arm=arm,
-        top=top,
-        base=base,
-        limit=theta_stop,
-        tolerance=tolerance,
-    )
+        contact, rotation_0, rotation_abs_M, rotation_theta, rotation_omega, couple_M, couple_abs_M, couple_limit,
+        corner_0, corner_theta, arm, top, base, theta_stop, tolerance,
+    )  # fmt: skip
 
 
 @inlined

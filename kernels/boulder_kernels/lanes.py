@@ -16,11 +16,12 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 
-from ._jit import IS_PLAIN, by_types, inlined, on_lines, through
+from ._jit import IS_PLAIN, by_types, inlined, kernel, on_lines, through
 from .design import Constants, Design, Readings, body_in, constants_of
 from .dynamics import Acceleration, Modes, State, Switches
 from .events import GapFactors
 from .impact import Clock, Impact, Pace
+from .numerics import put
 from .outcomes import Compression, Maxima
 from .pieces import (
     BELOW,
@@ -343,11 +344,9 @@ def load_lean(group: Any, lane: int) -> Callable[..., float]:
 @by_types
 def store_strength(to: Any, lane: int, P_0: float) -> Callable[..., None]:
     """Store P_0 of a piece that has a field for it."""
-    return (lambda to, lane, P_0: None) if field_of(to, "P_0") is None else _store_strength
-
-
-def _store_strength(to: Any, lane: int, P_0: float) -> None:
-    to.P_0[lane] = P_0
+    if field_of(to, "P_0") is None:
+        return lambda to, lane, P_0: None
+    return lambda to, lane, P_0: put(to.P_0, 0, lane, P_0)
 
 
 @by_types
@@ -363,11 +362,9 @@ def _store_widths(to: Any, lane: int, w_0: float, w_1: float) -> None:
 @by_types
 def store_lean(to: Any, lane: int, lean: float) -> Callable[..., None]:
     """Store ``lean`` in a group that has a field for it."""
-    return (lambda to, lane, lean: None) if field_of(to, "lean") is None else _store_lean
-
-
-def _store_lean(to: Any, lane: int, lean: float) -> None:
-    to.lean[lane] = lean
+    if field_of(to, "lean") is None:
+        return lambda to, lane, lean: None
+    return lambda to, lane, lean: put(to.lean, 0, lane, lean)
 
 
 @inlined
@@ -455,7 +452,7 @@ def constants_in_lane(group: Any, lane: int, design: Design, readings: Readings)
     )
 
 
-@inlined
+@kernel
 def copy_start(group: Any, lane: int, start: Any, other: int) -> None:
     """Copy constants and impact from a lane of one group to a lane of another, or of the same."""
     i = load_impact(start, other)
@@ -465,7 +462,7 @@ def copy_start(group: Any, lane: int, start: Any, other: int) -> None:
     store_modes(group, lane, i)
 
 
-@inlined
+@kernel
 def copy_step(group: Any, lane: int, start: Any, other: int) -> None:
     """Copy the end of a step, too."""
     copy_start(group, lane, start, other)

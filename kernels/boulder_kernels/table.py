@@ -191,7 +191,7 @@ def start_designs(group: Any, designs: np.ndarray, first: int, readings: Reading
     take_first_steps(group, readings, control)
 
 
-@inlined
+@kernel
 def next_design(
     groups: Any, rows: np.ndarray, lane: int, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray
 ) -> None:
