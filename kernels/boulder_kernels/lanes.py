@@ -189,7 +189,7 @@ def store_clock(to: Any, lane: int, c: Clock) -> None:
 
 @inlined
 def load_modes(m: Any, lane: int) -> Modes:
-    """Load the modes."""
+    """Load the modes of the motion."""
     turning, touching, corner, arm = int(m.turning[lane]), m.touching[lane] != 0.0, m.corner[lane], m.arm[lane]
     return Modes(turning, touching, corner, arm, int(m.yielded_top[lane]), int(m.yielded_base[lane]))
 
@@ -327,7 +327,7 @@ def load_strength(piece: Any, lane: int) -> Callable[..., float]:
 
 @by_types
 def load_widths(piece: Any, lane: int) -> Callable[..., tuple[float, float]]:
-    """Return w_0 and w_1 of a piece; where it has no fields for them the compiler knows them, as of a box."""
+    """Return w_0 and w_1 of a piece; where it has no fields for them the compiler knows that they are 1 and 0."""
     if field_of(piece, "w_0") is None:
         return lambda piece, lane: (1.0, 0.0)
     return lambda piece, lane: (piece.w_0[lane], piece.w_1[lane])
