@@ -13,7 +13,7 @@ from numba import carray, types
 from numba.extending import intrinsic
 
 from boulder_kernels import Control, Design, Outcome, Problem, Readings, Record
-from boulder_kernels._jit import inlined, kernel, taken
+from boulder_kernels._jit import inlined, kernel
 from boulder_kernels.control import STEP_RATIO, control_for, control_in
 from boulder_kernels.design import design_in
 from boulder_kernels.dynamics import constants_in
@@ -135,7 +135,8 @@ def write_history(
             break
         sample = sample_of(record, i, c, design.m_v, readings)
         stored, touching = sample.stored, record.touching[i] > 0.0
-        exchanged = taken(record.exchanged[i], 0, 0, ExchangedEnergies)
+        e = record.exchanged[i]
+        exchanged = ExchangedEnergies(e[0], e[1], e[2], e[3])
         write_numbers(out[:, i], y)
         out[TOUCHING, i] = record.touching[i]
         out[TOUCHING + 1, i] = -design.m_v * sample.rate.a_v if touching else 0.0

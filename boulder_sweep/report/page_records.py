@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from boulder_kernels import Control, Design, DesignTable, OutcomeTable, Readings
-from boulder_kernels._jit import inlined, taken
+from boulder_kernels._jit import inlined
 from boulder_kernels.design import FAR
 from boulder_kernels.dynamics import State
 from boulder_kernels.ground import Ground
@@ -133,8 +133,7 @@ ROWS_CALL, HISTORY_CALL = record_type(RowsCall), record_type(HistoryCall)
 @inlined
 def readings_from(s: np.ndarray) -> Readings:
     """Return the first numbers of an array as readings."""
-    readings: Readings = taken(s, 0, 0, Readings)
-    return readings
+    return Readings(s[0] != 0.0, s[1] != 0.0, s[2] != 0.0, s[3] != 0.0, s[4] != 0.0)
 
 
 @inlined

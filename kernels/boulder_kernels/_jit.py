@@ -18,8 +18,6 @@ not notice that a function it calls has changed in another file. Another process
 standard input, keeps the code on the disk, and answers each with a byte. So every process that runs kernels loads them,
 the first one as well, and all run the same code: code that was compiled in the same process may fuse other products and
 differ in the last bits. That process ends with the one that started it, or when nothing was asked for a while.
-
-Named tuples go into kernels and out of arrays and lanes by `taken`, `load` and `store`, whole.
 """
 
 from __future__ import annotations
@@ -51,21 +49,13 @@ from typing import Any, get_type_hints
 import llvmlite.binding
 import numba
 import numpy as np
-from llvmlite import ir
-from numba.core import cgutils
 
 CACHE_VARIABLE = "BOULDER_SWEEP_CACHE_DIR"
 """Environment variable that names another folder for compiled kernels."""
 
 
 def source_hash() -> str:
-    """Hash of all kernel sources: which code computed a table.
-
-    Returns
-    -------
-    str
-        64 hexadecimal digits (SHA-256 over names and contents, in order of name).
-    """
+    """Return which code computed a table: SHA-256 over names and contents of all kernel sources, 64 hex digits."""
     digest = hashlib.sha256()
     for source in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(source.name.encode())
@@ -107,15 +97,9 @@ def _cache_folder() -> str | None:
 def _make_private_folder(folder: Path) -> Path:
     """Make a folder with access for this user only, and check that nobody else can put files into it, or has.
 
-    Returns
-    -------
-    Path
-        Without symbolic links, which could be changed later.
+    The path that is returned has no symbolic links, which could be changed later.
 
-    Raises
-    ------
-    OSError
-        It cannot be made, others can change it or a folder above it, or a file in it is another user's.
+    Raises ``OSError``: it cannot be made, others can change it or a folder above it, or a file in it is another user's.
     """
     folder = Path(os.path.realpath(folder))
     missing = [path for path in (folder, *folder.parents) if not path.exists()]
@@ -196,19 +180,9 @@ _owner = 0
 def compile_elsewhere(kernel: Any, kinds: tuple[Any, ...], folder: Path) -> None:
     """Have another process compile a kernel, and keep the code in a folder.
 
-    Parameters
-    ----------
-    kernel
-        The `Kernel`.
-    kinds
-        Numba types of its arguments.
-    folder
-        Where the code is kept.
+    ``kernel``: the `Kernel`; ``kinds``: Numba types of its arguments; ``folder``: where the code is kept.
 
-    Raises
-    ------
-    OSError
-        There is no such process, or it could not do it.
+    Raises ``OSError``: there is no such process, or it could not do it.
     """
     request = pickle.dumps((kernel.__module__, kernel.__qualname__, kinds, folder))
     for _ in range(2):  # it may just have ended, since nothing was asked for a while
@@ -324,10 +298,12 @@ _TYPES: dict[Any, Any] = {}
 
 
 def _key_of(value: Any) -> Any:
-    """Return what the Numba type of an argument depends on: a number, None, an array, or a named tuple of these."""
+    """Return what the Numba type of an argument depends on: a number, None, an array, a record, or a named tuple."""
     if isinstance(value, np.ndarray):
         flags = value.flags
         return type(value), value.dtype, value.ndim, flags.c_contiguous, flags.f_contiguous, flags.writeable
+    if isinstance(value, np.void):
+        return type(value), value.dtype
     return (type(value), *map(_key_of, value)) if isinstance(value, tuple) else type(value)
 
 
@@ -342,14 +318,7 @@ def _type_of(value: Any) -> Any:
 class Kernel:
     """A kernel that is compiled when it is first called, by Python or by another kernel; see `kernel`.
 
-    Numba's dispatcher supplies every attribute that is not defined here.
-
-    Attributes
-    ----------
-    py_func : callable
-        The function itself.
-    options : dict
-        What Numba is asked for.
+    ``py_func`` is the function itself. Numba's dispatcher supplies every attribute that is not defined here.
     """
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
@@ -389,12 +358,8 @@ class Kernel:
     def _loaded(self, kinds: tuple[Any, ...], folder: Path) -> Any:
         """Load what is kept for arguments of some types, and have it compiled first if there is nothing.
 
-        Raises
-        ------
-        OSError
-            It cannot be compiled by another process, or not be kept.
-        Exception
-            It is damaged.
+        Raises ``OSError``: it cannot be compiled by another process, or not be kept. Raises ``Exception``: it is
+        damaged.
         """
         if not self.mark(kinds, folder).exists():
             with announce(self.__qualname__):
@@ -466,13 +431,10 @@ def is_none(value: Any) -> bool:
 def through(add: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function that passes what has been met on from item to item of a tuple, and returns what was met in all.
 
-    Inside kernels every item is a call of its own: a loop would keep the one over lanes from being vectorised, and
-    what has been met could not change its type.
+    Inside kernels every item is a call of its own: a loop would keep the one over lanes from being vectorised, and what
+    has been met could not change its type.
 
-    Parameters
-    ----------
-    add
-        Takes what has been met before an item, a state, and the item.
+    ``add`` takes what has been met before an item, a state, and the item.
     """
 
     @by_types
@@ -488,163 +450,6 @@ def through(add: Callable[..., Any]) -> Callable[..., Any]:
 def fields_of(kind: Any) -> dict[str, Any]:
     """Return the names of the fields of a named tuple and what they are: float, int, bool or another named tuple."""
     return get_type_hints(kind)
-
-
-def _as(kind: Any, number: Any) -> Any:
-    """Return a number as a field has it."""
-    return kind(number) if kind in (int, bool) else number
-
-
-def _type_named(kind: Any) -> Any:
-    """Return the Numba type of a named tuple, or of a number."""
-    if not hasattr(kind, "_fields"):
-        return {int: numba.types.intp, bool: numba.types.boolean}.get(kind, numba.types.float64)
-    return numba.types.BaseTuple.from_types([_type_named(each) for each in fields_of(kind).values()], kind)
-
-
-def _place(builder: Any, record: Any, offset: int, array: Any, lane: Any) -> Any:
-    """Return where one lane has its number of a field."""
-    numbers = ir.ArrayType(ir.DoubleType(), array.nitems)
-    return cgutils.gep_inbounds(builder, cgutils.get_record_member(builder, record, offset, numbers), 0, lane)
-
-
-def _loaded(context: Any, builder: Any, kind: Any, record: Any, begin: int, of: Any, lane: Any) -> Any:
-    """Make a named tuple of one lane's numbers in a record that lies behind the beginning of another."""
-    values = []
-    for name, each in zip(kind.fields, kind.types, strict=True):
-        if name not in of.fields:
-            values.append(context.get_constant(each, ABSENT.get(name, 0)))
-        elif isinstance(each, numba.types.BaseTuple):
-            values.append(_loaded(context, builder, each, record, begin + of.offset(name), of.typeof(name), lane))
-        else:
-            number = builder.load(_place(builder, record, begin + of.offset(name), of.typeof(name), lane))
-            values.append(context.cast(builder, number, numba.types.float64, each))
-    return context.make_tuple(builder, kind, values)
-
-
-@numba.extending.intrinsic
-def _load(typing: Any, record: Any, lane: Any, kind: Any) -> Any:
-    """Load a named tuple, see `load`."""
-    named = _type_named(kind.instance_class)
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        """Load its numbers one by one."""
-        return _loaded(context, builder, named, arguments[0], 0, record, arguments[1])
-
-    return named(record, numba.types.intp, kind), generate
-
-
-@numba.extending.intrinsic
-def _store(typing: Any, record: Any, lane: Any, value: Any) -> Any:
-    """Store a named tuple, see `store`."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        """Store its numbers one by one."""
-        to, at, values = arguments
-        for i, (name, each) in enumerate(zip(value.fields, value.types, strict=True)):
-            if name in record.fields:
-                number = context.cast(builder, builder.extract_value(values, i), each, numba.types.float64)
-                builder.store(number, _place(builder, to, record.offset(name), record.typeof(name), at))
-        return context.get_dummy_value()
-
-    return numba.types.void(record, numba.types.intp, value), generate
-
-
-ABSENT = {"w_0": 1.0}
-"""What stands for a number that a record of the lanes has no field for, where it is not zero: the compiler knows it,
-and leaves out what is multiplied by zero."""
-
-
-def load(record: Any, lane: int, kind: Any) -> Any:
-    """Return one lane's numbers in a record as a named tuple.
-
-    Parameters
-    ----------
-    record
-        It has a field of shape (lanes,) for each number, and a record for each named tuple; what it has none of is
-        `ABSENT`.
-    lane
-        The lane, not negative.
-    kind
-        The named tuple.
-    """
-    values = []
-    for name, each in fields_of(kind).items():
-        if name not in record.dtype.names:
-            values.append(ABSENT.get(name, 0.0))
-        elif hasattr(each, "_fields"):
-            values.append(load(record[name], lane, each))
-        else:
-            values.append(_as(each, record[name][lane]))
-    return kind(*values)
-
-
-@overload(load)
-def _load_in_kernels(record: Any, lane: Any, kind: Any) -> Callable[..., Any]:
-    intrinsic: Any = _load
-    return lambda record, lane, kind: intrinsic(record, lane, kind)
-
-
-def store(record: Any, lane: int, value: Any) -> None:
-    """Write those numbers of a named tuple into one lane that a record has a field for; see `load`."""
-    for name in value._fields:
-        if name in record.dtype.names:
-            record[name][lane] = getattr(value, name)
-
-
-@overload(store)
-def _store_in_kernels(record: Any, lane: Any, value: Any) -> Callable[..., None]:
-    intrinsic: Any = _store
-    return lambda record, lane, value: intrinsic(record, lane, value)
-
-
-def _address(context: Any, builder: Any, array: Any, value: Any, at: tuple[Any, ...]) -> Any:
-    """Return where an array has the number at some indices."""
-    numbers = context.make_helper(builder, array, value)
-    place = numbers.data
-    for index, stride in zip(at, cgutils.unpack_tuple(builder, numbers.strides, array.ndim), strict=True):
-        place = cgutils.pointer_add(builder, place, builder.mul(index, stride))
-    return place
-
-
-@numba.extending.intrinsic
-def _take(typing: Any, numbers: Any, first: Any, row: Any, kind: Any) -> Any:
-    """Take a named tuple out of an array, see `taken`."""
-    named, number = _type_named(kind.instance_class), numba.types.intp
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        """Load its numbers one by one."""
-        array, begin, column, _ = arguments
-        values = []
-        for i, each in enumerate(named.types):
-            at = builder.add(begin, context.get_constant(number, i)), column
-            loaded = builder.load(_address(context, builder, numbers, array, at[: numbers.ndim]))
-            values.append(context.cast(builder, loaded, numbers.dtype, each))
-        return context.make_tuple(builder, named, values)
-
-    return named(numbers, number, number, kind), generate
-
-
-def taken(numbers: np.ndarray, first: int, row: int, kind: Any) -> Any:
-    """Return the numbers of an array that begin at an index, in one of its columns if it has any, as a named tuple.
-
-    Parameters
-    ----------
-    numbers
-        Shape (m,) or (m, n).
-    first, row
-        The index of the first number, and the column, not negative.
-    kind
-        The named tuple, whose fields they are in its order.
-    """
-    column = numbers[first:] if numbers.ndim == 1 else numbers[first:, row]
-    return kind(*(_as(each, number) for each, number in zip(fields_of(kind).values(), column, strict=False)))
-
-
-@overload(taken)
-def _taken(numbers: Any, first: Any, row: Any, kind: Any) -> Callable[..., Any]:
-    intrinsic: Any = _take
-    return lambda numbers, first, row, kind: intrinsic(numbers, first, row, kind)
 
 
 @numba.extending.intrinsic
@@ -681,18 +486,7 @@ def _compiled(function: Callable[..., Any], fastmath: set[str], *, inline: bool 
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a function for the machine at its first call, keeping the result on disk.
-
-    Parameters
-    ----------
-    function
-        Plain Python on scalars, NamedTuples and NumPy arrays.
-
-    Returns
-    -------
-    callable
-        A `Kernel`; ``.py_func`` is the function itself.
-    """
+    """Compile a function on numbers, named tuples and arrays at its first call, and keep the code; see `Kernel`."""
     return _compiled(function, {"contract", "nsz"})
 
 

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import exact_inlined, inlined, kernel, taken
+from ._jit import exact_inlined, inlined, kernel
 from .design import Constants
 from .dynamics import soil_reaction
 from .events import AT_END, TOLERANCE, GapFactors, needs_moment
@@ -106,8 +106,13 @@ BEHIND = 1.0 + 0.3 * AT_END * TOLERANCE
 @inlined
 def control_in(c: np.ndarray) -> Control:
     """Return the control that an array holds, in the order of its fields; booleans are 0 or 1."""
-    control: Control = taken(c, 0, 0, Control)
-    return control
+    h, horizon, theta_limit, longest_horizon, event_tolerance = c[0], c[1], c[2], c[8], c[11]
+    error_estimate, stop_at_limit, locate_yield, refined = c[4] != 0.0, c[5] != 0.0, c[6] != 0.0, c[7] != 0.0
+    last_resort, paired, side_by_side = c[9] != 0.0, c[10] != 0.0, c[12] != 0.0
+    return Control(
+        h, horizon, theta_limit, int(c[3]), error_estimate, stop_at_limit, locate_yield, refined,
+        longest_horizon, last_resort, paired, event_tolerance, side_by_side,
+    )  # fmt: skip
 
 
 @inlined
@@ -153,17 +158,9 @@ def largest_force(c: Constants) -> float:
 def largest_speed(reach: float, inverse_J: float, c: Constants) -> float:
     """Upper bound of the speed of the boulder anywhere in the soil [m/s].
 
-    Parameters
-    ----------
-    reach
-        Bound of the lever of the soil [m].
-    inverse_J
-        Reciprocal of the moment of inertia that turns [1/(kg m^2)].
-    c
-        Constants of the design.
+    ``reach``: bound of the lever of the soil [m]; ``inverse_J``: reciprocal of the moment of inertia that turns [1/(kg
+    m^2)].
 
-    Notes
-    -----
     The energy of the truck bounds it, were it all in the boulder. So does a blow, whose point of contact moves off at
     no more than twice the speed of the truck: an end of the boulder then moves at most 1 + sqrt(1 + (reach/gyration)^2)
     times as fast as the truck, whatever the lever of the blow.
@@ -178,19 +175,12 @@ def largest_speed(reach: float, inverse_J: float, c: Constants) -> float:
 def rates_of(theta_stop: float, c: Constants) -> Rates:
     """Upper bounds of the rates of a design.
 
-    Parameters
-    ----------
-    theta_stop
-        Rotation at which the simulation ends [rad].
-    c
-        Constants of the design.
+    ``theta_stop``: rotation at which the simulation ends [rad].
 
-    Notes
-    -----
     The stiffness matrix of boulder and truck is a sum, and its largest eigenvalue at most the sum of the largest
-    eigenvalues of its terms. The soil's follows from the integrals of r, r lever and r lever^2 over the depth,
-    r = 0 ... 1, with the lever (r d - z_0) cos(theta) + l_n sin(theta). Where the printed restoring moment doubles the
-    net moment, the boulder turns as if half as heavy.
+    eigenvalues of its terms. The soil's follows from the integrals of r, r lever and r lever^2 over the depth, r = 0
+    ... 1, with the lever (r d - z_0) cos(theta) + l_n sin(theta). Where the printed restoring moment doubles the net
+    moment, the boulder turns as if half as heavy.
     """
     sin = sine_versine(theta_stop).sin if theta_stop < QUARTER_TURN else 1.0
     inverse_J = 2.0 * c.inverse_J_eff if c.theta_corner < theta_stop else c.inverse_J_eff
@@ -229,14 +219,8 @@ def stable_step(r: Rates) -> float:
 def refusal(h: float, h_asked: float, horizon: float, r: Rates) -> int:
     """Status with which a design is refused because of its steps, or ACCEPTED.
 
-    Parameters
-    ----------
-    h, h_asked
-        Step of the design, and step asked for [s].
-    horizon
-        Longest simulated time [s].
-    r
-        Rates of the design.
+    ``h, h_asked``: step of the design, and step asked for [s]; ``horizon``: longest simulated time [s]; ``r``: rates of
+    the design.
     """
     asked = horizon / h_asked
     most = min(max(MOST_SHORTENING * asked, STEPS_ALWAYS), MOST_STEPS)
@@ -264,18 +248,10 @@ def corrected(t: float, m_1: float, m_2: float, m_3: float, m_4: float, m_5: flo
 def onset_of(c: Constants) -> float:
     """Time after the first touch at which the net moment exceeds the couple of the weight [s].
 
-    Parameters
-    ----------
-    c
-        Constants of a design, in any soil that has not been moved yet.
+    ``c``: constants of a design, in any soil that has not been moved yet.
 
-    Returns
-    -------
-    float
-        No positive number where the blow does not turn the boulder away from the truck.
+    It is no positive number where the blow does not turn the boulder away from the truck.
 
-    Notes
-    -----
     With the compression of the spring u, its rate without the damper w = v_v - v_b, and x = x_b, v = v_b the motion is
 
         u' = w - r u, w' = -(k_m + p) u + q x, x' = v, v' = p u - q x
@@ -312,13 +288,8 @@ def onset_of(c: Constants) -> float:
 def first_length(h: float, g: GapFactors, c: Constants) -> float:
     """Length of the first step of a simulation by steps of length h [s].
 
-    Parameters
-    ----------
-    h
-        Length of the steps.
-    g, c
-        Factors of the gaps at the first touch, and constants of the design. As printed a boulder is not seated, and the
-        first step is like any.
+    ``h``: length of the steps; ``g, c``: factors of the gaps at the first touch, and constants of the design. As
+    printed a boulder is not seated, and the first step is like any.
     """
     onset = onset_of(c)
     return onset if needs_moment(g) & (onset > 0.0) & (onset < h) else h

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import exact_inlined, exact_kernel, inlined, taken
+from ._jit import exact_inlined, exact_kernel, inlined
 from .numerics import direction, half_tangent
 
 
@@ -112,8 +112,8 @@ def design_at(table: DesignTable, row: int) -> Design:
 @inlined
 def design_in(a: np.ndarray, row: int) -> Design:
     """Return the design in a column of an array."""
-    design: Design = taken(a, 0, row, Design)
-    return design
+    x = a[:, row]
+    return Design(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12], x[13], x[14])
 
 
 class Constants(NamedTuple):
@@ -221,6 +221,13 @@ class Body(NamedTuple):
     """Distance of the boulder's centre from the middle of the foot, towards the vehicle [m]."""
 
 
+@inlined
+def body_in(a: np.ndarray, first: int, row: int) -> Body:
+    """Return the body in a column of an array from an index on."""
+    x = a[first:, row]
+    return Body(x[0], x[1], x[2], x[3], x[4], x[5], x[6])
+
+
 @exact_inlined
 def body_of_box(design: Design) -> Body:
     """Return the box of the paper as a rigid body (Eqs 3, 4, 15, 16)."""
@@ -256,12 +263,8 @@ class SoilMass(NamedTuple):
 def soil_mass(design: Design, elements: int) -> SoilMass:
     """Sums of Eqs 3, 4 and 13 over the soil elements, or their limits for N -> infinity.
 
-    Parameters
-    ----------
-    design
-        The design, SI.
-    elements
-        N, or 0 for the limit: a wedge of mass rho_s W tan(theta_w) d^2/2 with its centre at 2d/3 over the base.
+    ``design``: the design, SI; ``elements``: N, or 0 for the limit: a wedge of mass rho_s W tan(theta_w) d^2/2 with its
+    centre at 2d/3 over the base.
     """
     if elements == 0:
         d = design.d
@@ -335,20 +338,9 @@ def constants_with(
 ) -> Constants:
     """Constants of the motion of one design in a soil of which mass, spring, drag and yield are known.
 
-    Parameters
-    ----------
-    design
-        The design, SI.
-    readings
-        Which formulas are read as printed.
-    elements
-        Number N of soil elements; 0 for the closed form.
-    body
-        The boulder.
-    soil
-        The soil lumped on the boulder.
-    K_soil, R_soil, x_yield
-        Spring [N/m], drag [kg/m] and yield displacement [m] of the soil, see `Constants`.
+    ``design``: the design, SI; ``elements``: number N of soil elements; 0 for the closed form; ``body``: the boulder;
+    ``soil``: the soil lumped on the boulder; ``K_soil, R_soil, x_yield``: spring [N/m], drag [kg/m] and yield
+    displacement [m] of the soil, see `Constants`.
     """
     d = design.d
     m_b = body.m_b
@@ -488,12 +480,8 @@ def at_height(outline: np.ndarray, column: int, z: float) -> float:
 def body_of_outline(design: Design, outline: np.ndarray) -> Body:
     """Mass, centre, moment of inertia and reach of a boulder with an outline (Eqs 141 to 144).
 
-    Parameters
-    ----------
-    design
-        The design, SI; its density is the mass over the volume within the outline.
-    outline
-        The outline, shape (P, 4).
+    ``design``: the design, SI; its density is the mass over the volume within the outline; ``outline``: the outline,
+    shape (P, 4).
     """
     d = design.d
     volume = x = z_c = xx = zz = line = 0.0

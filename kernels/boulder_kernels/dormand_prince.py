@@ -44,17 +44,11 @@ class Tableau(NamedTuple):
 def tableau(nodes: str, rows: tuple[str, ...], lower: str, orders: tuple[int, int]) -> Tableau:
     """Return a method from its coefficients as written.
 
-    Parameters
-    ----------
-    nodes, rows, lower
-        Nodes, rows of stage weights below the diagonal, and weights of the solution of lower order, as fractions.
-    orders
-        Orders of both solutions, up to the fourth, for the conditions of quadrature.
+    ``nodes, rows, lower``: nodes, rows of stage weights below the diagonal, and weights of the solution of lower order,
+    as fractions; ``orders``: orders of both solutions, up to the fourth, for the conditions of quadrature.
 
-    Raises
-    ------
-    AssertionError
-        A coefficient is mistyped: a row does not sum to its node, or a condition of quadrature is missed.
+    Raises ``AssertionError``: a coefficient is mistyped: a row does not sum to its node, or a condition of quadrature
+    is missed.
     """
     C, second = ([Fraction(number) for number in given.split()] for given in (nodes, lower))
     A = [[Fraction(number) for number in row.split()] + [Fraction(0)] * (len(C) - i) for i, row in enumerate(rows)]
@@ -153,28 +147,12 @@ all_stages, difference = stages(len(C) - 1), weighted(ERROR)
 def step(y: State, k1: Acceleration, h: float, s: Switches, c: Constants) -> tuple[State, Acceleration, float]:
     """Advance the state by one step with the modes frozen.
 
-    Parameters
-    ----------
-    y
-        State at the start.
-    k1
-        Acceleration there (the last stage of the step before, or fresh after a change of mode).
-    h
-        Length of the step [s].
-    s
-        Factors of the modes of this step.
-    c
-        Constants of the design.
+    ``y``: state at the start; ``k1``: acceleration there (the last stage of the step before, or fresh after a change of
+    mode); ``h``: length of the step [s]; ``s``: factors of the modes of this step.
 
-    Returns
-    -------
-    State
-        State at the end, of fifth order.
-    Acceleration
-        Acceleration there, which the next step starts with.
-    float
-        Difference of the solutions of fifth and of fourth order: the sum over the velocities, the rotation counted
-        at the arm of `boulder_kernels.design.error_arm` [m/s].
+    Returns the state at the end, of fifth order; the acceleration there, which the next step starts with; and the
+    difference of the solutions of fifth and of fourth order: the sum over the velocities, the rotation counted at the
+    arm of `boulder_kernels.design.error_arm` [m/s].
     """
     m = all_stages(y, k1, h, s, c)
     off = abs(difference(m.a_b)) + abs(difference(m.a_v)) + error_arm(c) * abs(difference(m.alpha_b))
@@ -208,14 +186,8 @@ class DenseOutput(NamedTuple):
 def track(h: float, x: float, v: float, a: float, x_end: float, v_end: float, a_end: float) -> Track:
     """Quintic Hermite polynomial of one degree of freedom.
 
-    Parameters
-    ----------
-    h
-        Length of the step [s].
-    x, v, a
-        Displacement, velocity and acceleration at the start.
-    x_end, v_end, a_end
-        The same at the end.
+    ``h``: length of the step [s]; ``x, v, a``: displacement, velocity and acceleration at the start; ``x_end, v_end,
+    a_end``: the same at the end.
     """
     hv, ha = h * v, 0.5 * h * h * a
     # What is left at the end of displacement, slope and half the curvature of the parabola from the start.

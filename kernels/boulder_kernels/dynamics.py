@@ -152,21 +152,11 @@ def soil_energy(k: Kinematics, c: Constants) -> float:
 def constants_in(design: Design, readings: Readings, elements: int, profile: Any) -> Callable[..., Any]:
     """Constants of the motion of one design in its soil.
 
-    Parameters
-    ----------
-    design
-        The design, SI; layers replace density, friction angle and subgrade reaction of its soil.
-    readings
-        Which formulas are read as printed.
-    elements
-        Number N of elements of a uniform soil, or 0 for the closed form.
-    profile
-        Its `SoilProfile`, whose record the constants keep; None for the uniform soil of a box.
+    ``design``: the design, SI; layers replace density, friction angle and subgrade reaction of its soil; ``elements``:
+    number N of elements of a uniform soil, or 0 for the closed form; ``profile``: its `SoilProfile`, whose record the
+    constants keep; None for the uniform soil of a box.
 
-    Returns
-    -------
-    Constants or SoilConstants
-        Non-finite or non-positive where the design is impossible, see `boulder_kernels.design.is_computable`.
+    They are non-finite or non-positive where the design is impossible, see `boulder_kernels.design.is_computable`.
     """
     if is_none(profile):
         return lambda design, readings, elements, profile: constants_of(design, readings, elements)
@@ -352,14 +342,7 @@ class Acceleration(NamedTuple):
 def acceleration(y: State, s: Switches, c: Constants) -> Acceleration:
     """Right-hand side of Eq 52 in the present modes.
 
-    Parameters
-    ----------
-    y
-        The state.
-    s
-        Factors of the present modes.
-    c
-        Constants of the design.
+    ``s``: factors of the present modes.
     """
     sin, versin = sine_versine(y.theta_b)
     soil = soil_reaction(soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c), c)

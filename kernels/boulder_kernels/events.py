@@ -114,18 +114,9 @@ class Gaps(NamedTuple):
 def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: bool, tolerance: float) -> GapFactors:
     """Factors of the gaps in the present modes.
 
-    Parameters
-    ----------
-    modes
-        The present modes.
-    c
-        Constants of the design.
-    theta_stop
-        Rotation at which the simulation ends [rad].
-    locate_yield
-        Whether a step is cut where the soil at the top or the base reaches its ultimate resistance.
-    tolerance
-        Precision with which events are located, as a fraction of the step; as printed it is `TOLERANCE`.
+    ``modes``: the present modes; ``theta_stop``: rotation at which the simulation ends [rad]; ``locate_yield``: whether
+    a step is cut where the soil at the top or the base reaches its ultimate resistance; ``tolerance``: precision with
+    which events are located, as a fraction of the step; as printed it is `TOLERANCE`.
     """
     rotation_0 = rotation_abs_M = rotation_theta = rotation_omega = 0.0
     couple_M = couple_abs_M = couple_limit = arm = 0.0
@@ -155,22 +146,9 @@ def gap_factors(modes: Modes, c: Constants, theta_stop: float, locate_yield: boo
     top = float(modes.yielded_top) if locate_yield else UNSOUGHT
     base = float(modes.yielded_base) if locate_yield else UNSOUGHT
     return GapFactors(
-        contact=contact,
-        rotation_0=rotation_0,
-        rotation_abs_M=rotation_abs_M,
-        rotation_theta=rotation_theta,
-        rotation_omega=rotation_omega,
-        couple_M=couple_M,
-        couple_abs_M=couple_abs_M,
-        couple_limit=couple_limit,
-        corner_0=corner_0,
-        corner_theta=corner_theta,
-        arm=arm,
-        top=top,
-        base=base,
-        limit=theta_stop,
-        tolerance=tolerance,
-    )
+        contact, rotation_0, rotation_abs_M, rotation_theta, rotation_omega, couple_M, couple_abs_M, couple_limit,
+        corner_0, corner_theta, arm, top, base, theta_stop, tolerance,
+    )  # fmt: skip
 
 
 @inlined
@@ -190,18 +168,8 @@ def contact_gap(u: float, g: GapFactors, c: Constants) -> float:
 def gaps_of(y: State, M: float, u: float, sin: float, versin: float, g: GapFactors, c: Constants) -> Gaps:
     """Gaps of all events.
 
-    Parameters
-    ----------
-    y
-        The state.
-    M
-        Net moment of soil and truck [N m].
-    u
-        Compression of the vehicle's spring [m].
-    sin, versin
-        sin(theta_b) and 1 - cos(theta_b).
-    g, c
-        Factors of the present modes, and constants of the design.
+    ``M``: net moment of soil and truck [N m]; ``u``: compression of the vehicle's spring [m]; ``sin, versin``:
+    sin(theta_b) and 1 - cos(theta_b); ``g, c``: factors of the present modes, and constants of the design.
     """
     k, arm = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c), signed_arm(sin, versin, c)
     couple = g.couple_M * M + g.couple_abs_M * abs(M) + g.couple_limit * abs(arm)
@@ -233,19 +201,9 @@ SEATING_ANGLE = 1e-9
 def mode_at_rest(M: float, corner: float, sin: float, versin: float, c: Constants) -> int:
     """Printed reading: mode of a boulder whose angular velocity has come to zero (Eqs 37-39).
 
-    Parameters
-    ----------
-    M
-        Net moment of soil and truck [N m].
-    corner
-        Sign of sin(gamma_N + theta_b).
-    sin, versin
-        sin(theta_b) and 1 - cos(theta_b).
-    c
-        Constants of the design.
+    ``M``: net moment of soil and truck [N m]; ``corner``: sign of sin(gamma_N + theta_b); ``sin, versin``: sin(theta_b)
+    and 1 - cos(theta_b).
 
-    Notes
-    -----
     At omega = 0 the printed moment jumps, and the equations have no solution in the classical sense while the net
     moment is within the limit. Integrated literally, the boulder arrives at an omega just over zero, where Eq 39
     cancels every other moment up to the limit of Eq 37, whichever way it points. So it stays until the net moment is
@@ -286,14 +244,8 @@ def yield_mode(displacement: float, c: Constants) -> int:
 def changes_counted(event: float, begun: float, modes: Modes) -> float:
     """Return 1.0 if an event changes how a boulder rocks, else 0.0.
 
-    Parameters
-    ----------
-    event
-        The event a step was cut at.
-    begun
-        Start of the step [s]. That a boulder begins to turn in the first step does not count.
-    modes
-        Modes before; modes of printed readings do not count.
+    ``event``: the event a step was cut at; ``begun``: start of the step [s]. That a boulder begins to turn in the first
+    step does not count; ``modes``: modes before; modes of printed readings do not count.
     """
     return 1.0 if event == ROTATION and begun > 0.0 and modes.turning <= LAST_OF_GRAVITY else 0.0
 
@@ -302,18 +254,8 @@ def changes_counted(event: float, begun: float, modes: Modes) -> float:
 def change_mode(event: int, y: State, M: float, modes: Modes, c: Constants) -> tuple[State, Modes]:
     """Cross an event: the modes that follow, and the state with its crossing made exact.
 
-    Parameters
-    ----------
-    event
-        Which event was reached.
-    y
-        State there.
-    M
-        Net moment of soil and truck there [N m]; asked for by the events ROTATION and COUPLE only.
-    modes
-        Modes before.
-    c
-        Constants of the design.
+    ``event``: which event was reached; ``y``: state there; ``M``: net moment of soil and truck there [N m]; asked for
+    by the events ROTATION and COUPLE only; ``modes``: modes before.
     """
     turning, touching = modes.turning, modes.touching
     corner, arm = modes.corner, modes.arm
@@ -359,17 +301,9 @@ RETURNS_WITHIN = 1.5
 def length_after(event: float, h: float, omega_b: float, alpha_b: float) -> float:
     """Length of the step that follows an event [s].
 
-    Parameters
-    ----------
-    event
-        The event.
-    h
-        Length of the steps [s].
-    omega_b, alpha_b
-        Angular velocity [rad/s] and acceleration [rad/s^2] in the modes that follow.
+    ``event``: the event; ``h``: length of the steps [s]; ``omega_b, alpha_b``: angular velocity [rad/s] and
+    acceleration [rad/s^2] in the modes that follow.
 
-    Notes
-    -----
     A boulder that has passed its base returns to it after 2 |omega/alpha|. Where the net moment nearly balances the
     weight on one side, the swing to the other side lasts less than a hundredth of a step. As a part of a whole step it
     would be smaller than the precision of the search for its end, and the energy of the boulder would be lost there.
@@ -460,12 +394,7 @@ def weights_of(end: Gaps, dense: DenseOutput, g: GapFactors, c: Constants) -> Ga
 
     A step is retried that passes a kink between AT_ONCE and `landed`; one passed outside is not looked for.
 
-    Parameters
-    ----------
-    end
-        Gaps at the end of the step.
-    dense, g, c
-        The step.
+    ``end``: gaps at the end of the step.
     """
     top, base = 0.0, 0.0
     if end.top < 0.0 or end.base < 0.0:
@@ -489,12 +418,7 @@ def weights_of(end: Gaps, dense: DenseOutput, g: GapFactors, c: Constants) -> Ga
 def refined(event: int, tau: float, b: Bracket, g: GapFactors, dense: DenseOutput) -> float:
     """Fraction of a step at which the forces jump, or the limit is reached, by Newton's method on the rotation.
 
-    Parameters
-    ----------
-    event, tau, b
-        The event, where the search has put it, and its bracket.
-    g, dense
-        The step.
+    ``event, tau, b``: the event, where the search has put it, and its bracket.
     """
     if b.f_low <= 0.0:
         return tau  # a search that has closed on its start stays there
@@ -524,8 +448,6 @@ def sought(
 ) -> tuple[int, float]:
     """First event of a step among those with a weight, and the fraction of the step at which it happens.
 
-    Notes
-    -----
     The search narrows a bracket around the point at which the least gap passes zero. A gap that starts at zero and
     opens only by rounding counts as crossed at once: the step still advances, and the next mode resolves it.
     """
@@ -558,23 +480,12 @@ def first_event(
 ) -> tuple[int, float]:
     """First event of a step.
 
-    Parameters
-    ----------
-    y, M
-        State and net moment [N m] at the start of the step.
-    end
-        Gaps at its end.
-    dense, g, switches, c
-        The step.
+    ``y, M``: state and net moment [N m] at the start of the step; ``end``: gaps at its end.
 
-    Returns
-    -------
-    event, tau
-        The event and the fraction of the step at which it happens; NONE and 1.0 where there is none. Where the event is
-        SHORTEN, nothing is kept of the step, and it is retried with the fraction tau of its length.
+    Returns ``event, tau``: the event and the fraction of the step at which it happens; NONE and 1.0 where there is
+    none. Where the event is SHORTEN, nothing is kept of the step, and it is retried with the fraction tau of its
+    length.
 
-    Notes
-    -----
     The modes are frozen in the right-hand side, but the ultimate resistance of the soil is not: a step that ran across
     its kink gains nothing from locating it. So the step is retried, to end just behind the kink.
     """

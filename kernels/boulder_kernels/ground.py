@@ -67,12 +67,7 @@ def capped_coefficient(K_p: float, W: float, d: float) -> float:
     R = 1 + 1.6 (K_p - K_a)^0.67 / (1 + 5 W/d) is the increase of the passive pressure on a wall of limited width by the
     soil beside it, after Ovesen and Brinch Hansen, for a wall that stands alone and reaches the surface.
 
-    Parameters
-    ----------
-    K_p
-        Rankine's coefficient.
-    W, d
-        Width of the boulder and depth of embedment [m].
+    ``K_p``: Rankine's coefficient; ``W, d``: width of the boulder and depth of embedment [m].
     """
     R = 1.0 + 1.6 * math.pow(K_p - 1.0 / K_p, 0.67) / (1.0 + 5.0 * W / d)
     return min(K_p * K_p, K_p * R)
@@ -187,23 +182,13 @@ def put_soil(
 ) -> None:
     """Write what the soil as it lies makes of n designs.
 
-    Parameters
-    ----------
-    table
-        The designs, SI, arrays of shape (n,); K_epsilon is multiplied where the pressure is proportional to depth.
-    ground
-        What lies around them.
-    layered
-        Whether the pressure is not proportional to the depth.
-    slices
-        Slices of the buried depth that a law which depends on the width takes beside a boulder that is no box.
-    profile
-        Height, width and reaches of the boulders as shares of their sides, shape (P, 4); P = 0 of boxes.
-    layers
-        Where the layers go, shape (n, M, 6), see `boulder_kernels.pieces`: one for every boundary of soil or water,
-        and one more for every cut between slices; M may be 0 where nothing asks for layers.
-    outlines
-        Where the outlines go, shape (n, P, 4), see `boulder_kernels.design`.
+    ``table``: the designs, SI, arrays of shape (n,); K_epsilon is multiplied where the pressure is proportional to
+    depth; ``ground``: what lies around them; ``layered``: whether the pressure is not proportional to the depth;
+    ``slices``: slices of the buried depth that a law which depends on the width takes beside a boulder that is no box;
+    ``profile``: height, width and reaches of the boulders as shares of their sides, shape (P, 4); P = 0 of boxes;
+    ``layers``: where the layers go, shape (n, M, 6), see `boulder_kernels.pieces`: one for every boundary of soil or
+    water, and one more for every cut between slices; M may be 0 where nothing asks for layers; ``outlines``: where the
+    outlines go, shape (n, P, 4), see `boulder_kernels.design`.
     """
     cuts = slices - 1 if len(profile) > 0 and ground.law == WIDTH_CAPPED else 0
     for row in range(len(layers)):

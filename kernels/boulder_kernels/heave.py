@@ -203,18 +203,9 @@ def friction_of(phi: float, form: HeaveOptions) -> float:
 def heave_constants(design: Design, c: Constants, form: HeaveOptions, base: Base, fineness: int) -> HeaveConstants:
     """Constants of the motion of a box in uniform soil with heave and friction (Eqs 131-134).
 
-    Parameters
-    ----------
-    design
-        The design, SI; its ``K_epsilon`` carries the law of the resistance.
-    c
-        Its `boulder_kernels.design.constants_of`, with corrected readings and the soil in closed form.
-    form
-        What is added to the planar motion.
-    base
-        The ground under the foot.
-    fineness
-        1 for 16 pieces, up to `FINEST`; their number grows by its square.
+    ``design``: the design, SI; its ``K_epsilon`` carries the law of the resistance; ``c``: its
+    `boulder_kernels.design.constants_of`, with corrected readings and the soil in closed form; ``fineness``: 1 for 16
+    pieces, up to `FINEST`; their number grows by its square.
     """
     density = design.rho_s - (WATER if base.water <= 0.0 else 0.0)
     friction = friction_of(design.phi, form)
@@ -396,18 +387,8 @@ def lay_soil(
     err on the safe side. The width is the boulder's beside the part. Sides that widen upwards lose the soil as they
     rise and do not rub. Cohesion gives no friction. The boulder's buoyancy and the soil below the foot are left out.
 
-    Parameters
-    ----------
-    work
-        The workspace.
-    layers, outline
-        Layers, shape (M, 6), and outline, shape (P, 4), of the design.
-    base
-        The ground under the foot, with its water.
-    soil
-        Pieces of the soil beside the boulder, filled.
-    f
-        Constants of the design.
+    ``work``: the workspace; ``layers, outline``: layers, shape (M, 6), and outline, shape (P, 4), of the design;
+    ``base``: the ground under the foot, with its water; ``soil``: pieces of the soil beside the boulder, filled.
     """
     d, parts, reach = f.c.d, soil.pieces, f.heave if base.varies else 0.0
     foot = math.tan(2.0 / 3.0 * layers[layer_under(d, layers), FRICTION])
@@ -783,22 +764,9 @@ def forces(
 ) -> Forces:
     """Generalised forces at a state (Eqs 132-135).
 
-    Parameters
-    ----------
-    x_b, v_b
-        Displacement of the common centre of mass [m] and its velocity [m/s].
-    theta_b, omega_b
-        Rotation [rad] and angular velocity [rad/s].
-    y_b, w_b
-        Rise of the common centre of mass [m] and its velocity [m/s].
-    x_v, v_v
-        The truck.
-    touching
-        Whether truck and boulder touch.
-    work
-        The workspace of the design.
-    f
-        Constants of the design.
+    ``x_b, v_b``: displacement of the common centre of mass [m] and its velocity [m/s]; ``theta_b, omega_b``: rotation
+    [rad] and angular velocity [rad/s]; ``y_b, w_b``: rise of the common centre of mass [m] and its velocity [m/s];
+    ``x_v, v_v``: the truck; ``touching``: whether truck and boulder touch; ``work``: the workspace of the design.
     """
     c = f.c
     sin, versin = sine_versine(theta_b)

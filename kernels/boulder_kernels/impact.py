@@ -236,16 +236,8 @@ def passed_maxima(
 ) -> Maxima:
     """Maxima after a step that passes: what is reported grows or falls all through it, but for force and crush.
 
-    Parameters
-    ----------
-    m
-        Maxima before it.
-    t, h
-        Its start and its length [s].
-    y, y_end, start, end
-        States and compressions at its ends.
-    switches
-        Factors of its modes.
+    ``m``: maxima before it; ``t, h``: its start and its length [s]; ``y, y_end, start, end``: states and compressions
+    at its ends; ``switches``: factors of its modes.
     """
     t_end = t + h
     theta, t_theta = grown(m.theta, m.t_theta, abs(y_end.theta_b), t_end)
@@ -303,19 +295,10 @@ def decide(
 ) -> tuple[int, float, float]:
     """Decide whether a simulation ends with a step that does not reach the limit.
 
-    Parameters
-    ----------
-    i
-        The impact at its start.
-    y, m, t
-        State, maxima and time [s] where it is cut.
-    c, readings, control
-        See `follow`.
+    ``i``: the impact at its start; ``y, m, t``: state, maxima and time [s] where it is cut; ``c, readings, control``:
+    see `follow`.
 
-    Returns
-    -------
-    status, barrier, horizon
-        How it ended or RUNNING, and what `Clock` says of the others.
+    Returns ``status, barrier, horizon``: how it ended or RUNNING, and what `Clock` says of the others.
     """
     barrier, horizon, provable = i.clock.barrier, i.clock.horizon, proof_is_possible(readings)
     if control.stop_at_limit and provable and y.v_v <= 0.0:
@@ -339,16 +322,8 @@ def follow(
 ) -> StepResult:
     """Find what follows from a step that is not plain: its first event, its peaks, the modes behind it, or the end.
 
-    Parameters
-    ----------
-    i
-        The impact at the start of the step.
-    y_end, k_end, error
-        State and acceleration at its end, and its error, from `boulder_kernels.dormand_prince.step`.
-    c
-        Constants of the design.
-    readings, control
-        How it is simulated.
+    ``i``: the impact at the start of the step; ``y_end, k_end, error``: state and acceleration at its end, and its
+    error, from `boulder_kernels.dormand_prince.step`.
     """
     clock, g, modes, switches = i.clock, i.factors, i.modes, i.switches
     if not is_finite(y_end):
@@ -414,14 +389,7 @@ def longest_time(control: Control, h_full: float) -> float:
 def first_touch(h_touching: float, h_apart: float, c: Constants, readings: Readings, control: Control) -> Impact:
     """Return an impact at the first touch.
 
-    Parameters
-    ----------
-    h_touching, h_apart
-        Steps [s] while the truck touches and while not.
-    c
-        Constants of the design.
-    readings, control
-        How it is simulated.
+    ``h_touching, h_apart``: steps [s] while the truck touches and while not.
     """
     y, modes = State(0.0, 0.0, 0.0, 0.0, 0.0, c.v_0), initial_modes(readings, c)
     switches, g = enter_modes(modes, readings, stop_of(control), control.locate_yield, control.event_tolerance, c)
@@ -499,28 +467,14 @@ class Problem(NamedTuple):
 def simulate_alone(problem: Problem, readings: Readings, control: Control, record: Record) -> Outcome:
     """Simulate one impact with a fixed time step, each step cut where a mode changes.
 
-    Parameters
-    ----------
-    problem
-        Design and soil. Kernels are compiled for each kind of soil.
-    readings
-        Which formulas are read as printed.
-    control
-        Step, horizon, limit, representation of the soil.
-    record
-        Filled with the time history at the times it names.
+    ``problem``: design and soil. Kernels are compiled for each kind of soil; ``control``: step, horizon, limit,
+    representation of the soil; ``record``: filled with the time history at the times it names.
 
-    Returns
-    -------
-    Outcome
-        Maxima from the dense output; NaN where the status says that there is no result, see `Status`.
+    Returns maxima from the dense output; NaN where the status says that there is no result, see `Status`.
 
-    Notes
-    -----
-    Within a step the modes are frozen and the right-hand side is smooth. Where a step passes an event, it is kept
-    up to the event by its dense output, whose local error of order five adds once per event what every step
-    adds to the solution, so the order of the method is kept. A motion that became non-finite is retried with a
-    shorter step.
+    Within a step the modes are frozen and the right-hand side is smooth. Where a step passes an event, it is kept up to
+    the event by its dense output, whose local error of order five adds once per event what every step adds to the
+    solution, so the order of the method is kept. A motion that became non-finite is retried with a shorter step.
     """
     if problem.design.H - problem.design.d <= problem.design.e_bumper:
         return failed(Status.NO_CONTACT.value)
@@ -612,12 +566,8 @@ def longest_step(theta_limit: float, c: Constants) -> float:
 def simulate_last_resort(design: Design, status: int, readings: Readings, control: Control, record: Record) -> Outcome:
     """Simulate one impact; what cannot be decided within the steps allowed keeps the status it is refused with.
 
-    Parameters
-    ----------
-    design, status
-        The design, in uniform soil, and that status.
-    readings, control, record
-        The same as in `simulate_alone`; the record keeps nothing.
+    ``design, status``: the design, in uniform soil, and that status; ``readings, control, record``: the same as in
+    `simulate_alone`; the record keeps nothing.
     """
     if not (control.last_resort and control.stop_at_limit):
         return failed(status)

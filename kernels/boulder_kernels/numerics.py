@@ -61,23 +61,15 @@ class SineVersine(NamedTuple):
 def sine_versine(theta: float) -> SineVersine:
     """Sine and versine of an angle by polynomials of its half.
 
-    The versine is returned in place of the cosine because displacements need 1 - cos(theta), which a
-    cosine near 1 would give with a large relative error.
+    The versine is returned in place of the cosine because displacements need 1 - cos(theta), which a cosine near 1
+    would give with a large relative error.
 
-    Parameters
-    ----------
-    theta
-        Angle [rad], |theta| <= pi; beyond, the polynomials leave the functions gradually.
+    ``theta``: angle [rad], |theta| <= pi; beyond, the polynomials leave the functions gradually.
 
-    Returns
-    -------
-    SineVersine
-        Absolute error of either at most 1e-15 for |theta| <= pi; exact at 0.
+    The absolute error of either is at most 1e-15 for |theta| <= pi; exact at 0.
 
-    Notes
-    -----
-    The coefficients interpolate (sin(x)/x - 1)/x^2 and (cos(x) - 1)/x^2 in x^2 at the eight Chebyshev nodes
-    of [0, (pi/2)^2], computed in 50-digit arithmetic.
+    The coefficients interpolate (sin(x)/x - 1)/x^2 and (cos(x) - 1)/x^2 in x^2 at the eight Chebyshev nodes of [0,
+    (pi/2)^2], computed in 50-digit arithmetic.
     """
     x = 0.5 * theta
     z = x * x

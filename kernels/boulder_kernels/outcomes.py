@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import inlined, kernel, taken
+from ._jit import inlined, kernel
 from .design import Constants, Design, Readings, design_in
 from .dormand_prince import DenseOutput, displacement_at, state_at, turning_point
 from .dynamics import (
@@ -206,8 +206,8 @@ def outcome_table(out: np.ndarray) -> OutcomeTable:
 @inlined
 def outcome_in(a: np.ndarray, row: int) -> OutcomeTable:
     """Return the outcome in a column of an array."""
-    outcome: OutcomeTable = taken(a, 0, row, OutcomeTable)
-    return outcome
+    x = a[:, row]
+    return OutcomeTable(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10])
 
 
 @kernel
@@ -275,16 +275,10 @@ def compression_at(y: State, s: Switches, c: Constants) -> Compression:
 def highest(x: float, rate: float, x_end: float, rate_end: float, h: float) -> tuple[float, float]:
     """Largest value in a step of length h [s], by the cubic through both of its ends.
 
-    Parameters
-    ----------
-    x, rate, x_end, rate_end
-        Value [m] and rate [m/s] at its ends.
+    ``x, rate, x_end, rate_end``: value [m] and rate [m/s] at its ends.
 
-    Returns
-    -------
-    x, tau
-        The value [m] and the fraction of the step at which it is reached: inside where the rate goes from positive to
-        negative, else at the end. No branch, so that a loop over lanes stays vectorised.
+    Returns ``x, tau``: the value [m] and the fraction of the step at which it is reached: inside where the rate goes
+    from positive to negative, else at the end. No branch, so that a loop over lanes stays vectorised.
     """
     c_1, slope_end = h * rate, h * rate_end
     rise = x_end - x
@@ -316,20 +310,8 @@ def updated_maxima(
 ) -> tuple[Maxima, Compression]:
     """Maxima after a step, from its end and from the turning points inside, and the compression at its end.
 
-    Parameters
-    ----------
-    m
-        Maxima before the step.
-    t
-        Start of the step [s].
-    tau_end
-        Fraction of the step that was kept.
-    start
-        Compression at the start.
-    y_end
-        State where the step was cut.
-    dense, s, c
-        The step.
+    ``m``: maxima before the step; ``t``: start of the step [s]; ``tau_end``: fraction of the step that was kept;
+    ``start``: compression at the start; ``y_end``: state where the step was cut.
     """
     h = dense.h
     t_end = t + tau_end * h
@@ -420,14 +402,7 @@ def error_time(h: float, yield_located: bool) -> float:
 def step_errors(o: Outcome, design: Design, theta_limit: float, horizon: float) -> StepErrors:
     """Estimate the error of one solution.
 
-    Parameters
-    ----------
-    o
-        What it gave.
-    design
-        The design.
-    theta_limit, horizon
-        Limit of rotation [rad] and horizon [s].
+    ``o``: what it gave; ``theta_limit, horizon``: limit of rotation [rad] and horizon [s].
     """
     m, t_end = o.maxima, o.t_end
     depth, pushing = design.d / design.H, design.k_v / design.m_v
@@ -483,30 +458,19 @@ def safety_of(readings: Readings) -> float:
 def estimate_error(coarse: OutcomeTable, fine: OutcomeTable, design: Design, safety: float) -> tuple[float, float]:
     """Estimate the numerical errors of a solution of one design from a coarser one.
 
-    Parameters
-    ----------
-    coarse, fine
-        Solutions with a step and with a third of it, or half: numbers in place of columns.
-    design
-        The design.
-    safety
-        Factor from the difference of the two to the estimate.
+    ``coarse, fine``: solutions with a step and with a third of it, or half: numbers in place of columns; ``safety``:
+    factor from the difference of the two to the estimate.
 
-    Returns
-    -------
-    theta, x
-        Errors of the rotation [rad] and of the displacements [m] of the finer solution; its own where it failed.
+    Returns ``theta, x``: errors of the rotation [rad] and of the displacements [m] of the finer solution; its own where
+    it failed.
 
-    Notes
-    -----
-    The difference of two solutions is nearly the error of the coarser, many times the finer one's. It can be small
-    by chance, where two errors cross zero, but hardly in all that is reported at once. So the largest difference
-    counts: displacements and angles compared over the embedment depth, or half the height of the boulder where that is
-    more, and times over the speed of impact. A boulder that hardly turns owes its rotation no more than that rotation
-    itself to an error of the truck (LEAST_ROTATION where it is less), however small the boulder: beyond it only the
-    difference of the rotations counts.
-    Where only one of the two reached the limit of rotation, or failed, no estimate could be trusted: the error is
-    infinite. Where both did, the rotation is the limit itself.
+    The difference of two solutions is nearly the error of the coarser, many times the finer one's. It can be small by
+    chance, where two errors cross zero, but hardly in all that is reported at once. So the largest difference counts:
+    displacements and angles compared over the embedment depth, or half the height of the boulder where that is more,
+    and times over the speed of impact. A boulder that hardly turns owes its rotation no more than that rotation itself
+    to an error of the truck (LEAST_ROTATION where it is less), however small the boulder: beyond it only the difference
+    of the rotations counts. Where only one of the two reached the limit of rotation, or failed, no estimate could be
+    trusted: the error is infinite. Where both did, the rotation is the limit itself.
     """
     if np.isnan(fine.theta_max):
         return fine.theta_error, fine.x_error
@@ -534,18 +498,11 @@ def take_second(
 ) -> int:
     """Take a second solution of one design into account, and return which further one is needed.
 
-    Parameters
-    ----------
-    out, row
-        The solution that counts so far, with the errors of its steps, in an array of `empty_outcomes`. A finer one
-        takes its place. The errors become the larger of the finer solution's own and the difference of the two; of a
-        pair, the difference alone.
-    found, at
-        The second solution, the same way.
-    solution
-        Which one it is, `FINER` to `PAIR`.
-    design, safety
-        The design, and the factor from the difference to the estimate, see `safety_of`.
+    ``out, row``: the solution that counts so far, with the errors of its steps, in an array of `empty_outcomes`. A
+    finer one takes its place. The errors become the larger of the finer solution's own and the difference of the two;
+    of a pair, the difference alone; ``found, at``: the second solution, the same way; ``solution``: which one it is,
+    `FINER` to `PAIR`; ``design, safety``: the design, and the factor from the difference to the estimate, see
+    `safety_of`.
     """
     first, second = outcome_in(out, row), outcome_in(found, at)
     finer = solution == FINER
@@ -568,16 +525,9 @@ def take_seconds(
 ) -> None:
     """Take second solutions of some rows of a table into account.
 
-    Parameters
-    ----------
-    out, needed
-        Solutions of n designs, and which second one each needs, shapes (11, n) and (n,); both are written over.
-    rows
-        Numbers of m rows.
-    found, designs
-        Their second solutions and designs, shapes (11, m) and (15, m).
-    safety
-        Factor from the difference to the estimate, see `safety_of`.
+    ``out, needed``: solutions of n designs, and which second one each needs, shapes (11, n) and (n,); both are written
+    over; ``rows``: numbers of m rows; ``found, designs``: their second solutions and designs, shapes (11, m) and (15,
+    m); ``safety``: factor from the difference to the estimate, see `safety_of`.
     """
     for at in range(rows.size):
         row = rows[at]
@@ -628,18 +578,8 @@ def nothing_exchanged() -> ExchangedEnergies:
 def stored_energies(y: State, m_v: float, touching: bool, gravity_couple: bool, c: Constants) -> StoredEnergies:
     """Stored energies at a state [J].
 
-    Parameters
-    ----------
-    y
-        The state.
-    m_v
-        Mass of the truck [kg].
-    touching
-        Whether truck and boulder touch.
-    gravity_couple
-        Whether the restoring moment is the couple of the weight.
-    c
-        Constants of the design.
+    ``m_v``: mass of the truck [kg]; ``touching``: whether truck and boulder touch; ``gravity_couple``: whether the
+    restoring moment is the couple of the weight.
     """
     sin, versin = sine_versine(y.theta_b)
     k = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c)
@@ -763,8 +703,8 @@ def modes_of(y: State, turning: int, touching: bool, c: Any) -> Modes:
 @inlined
 def state_of(record: Record, sample: int) -> State:
     """Return the state at a sample."""
-    y: State = taken(record.states[sample], 0, 0, State)
-    return y
+    y = record.states[sample]
+    return State(y[0], y[1], y[2], y[3], y[4], y[5])
 
 
 @inlined
@@ -790,20 +730,9 @@ def evaluate_samples(
 ) -> None:
     """Evaluate the samples of a record.
 
-    Parameters
-    ----------
-    record
-        The record, with n samples.
-    c
-        Constants of the motion.
-    m_v
-        Mass of the vehicle [kg].
-    readings
-        Which formulas are read as printed.
-    rates
-        Where the fields of `Acceleration` go, shape (4, n).
-    stored
-        Where the fields of `StoredEnergies` go, shape (6, n) [J].
+    ``record``: the record, with n samples; ``c``: constants of the motion; ``m_v``: mass of the vehicle [kg];
+    ``rates``: where the fields of `Acceleration` go, shape (4, n); ``stored``: where the fields of `StoredEnergies` go,
+    shape (6, n) [J].
     """
     for i in range(record.times.size):
         s = sample_of(record, i, c, m_v, readings)

@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import by_types, exact_inlined, exact_kernel, inlined, kernel, taken, through, type_of
+from ._jit import by_types, exact_inlined, exact_kernel, inlined, kernel, through, type_of
 from .design import (
     HEIGHT,
     WIDTH,
@@ -77,6 +77,13 @@ class GivenPiece(NamedTuple):
     """Width w_0 + w_1 r as a ratio of the design's width [-]."""
 
 
+@inlined
+def given_piece_in(a: np.ndarray, first: int, row: int) -> GivenPiece:
+    """Return the piece that is given in a column of an array from an index on."""
+    x = a[first:, row]
+    return GivenPiece(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7])
+
+
 class Piece(NamedTuple):
     """One piece of soil, worked out."""
 
@@ -97,6 +104,12 @@ class Piece(NamedTuple):
     """Width w_0 + w_1 r as a ratio of the design's width [-], for which K, P and R are given."""
 
 
+@inlined
+def piece_in(x: np.ndarray) -> Piece:
+    """Return the piece that an array holds."""
+    return Piece(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8])
+
+
 class SoilSums(NamedTuple):
     """What is integrated over all pieces once for a design; zero before the first."""
 
@@ -112,6 +125,12 @@ class SoilSums(NamedTuple):
     Z_2: float
     Z_3: float
     """Antiderivatives of w R r^i at both ends of the pieces, added up, i = 0 ... 3 [kg/m]."""
+
+
+@inlined
+def sums_in(x: np.ndarray) -> SoilSums:
+    """Return the sums that an array holds."""
+    return SoilSums(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8])
 
 
 class FewPieces(NamedTuple):
@@ -215,16 +234,9 @@ def next_piece(
 ) -> tuple[GivenPiece, Cursor]:
     """Return the piece that begins at a ratio of the depth, and where the next begins (Eq 145); the last is repeated.
 
-    Parameters
-    ----------
-    design
-        The design, SI; the layers replace density, friction angle and subgrade reaction of its soil.
-    layers, outline
-        Layers, shape (M, 6), and outline, shape (P, 4), of the design.
-    low
-        Where it begins.
-    at
-        What lies there.
+    ``design``: the design, SI; the layers replace density, friction angle and subgrade reaction of its soil; ``layers,
+    outline``: layers, shape (M, 6), and outline, shape (P, 4), of the design; ``low``: where it begins; ``at``: what
+    lies there.
     """
     d, last, m, i = design.d, len(layers) - 1, at.layer, at.piece
     layer_to = min(layers[m, TO] / d, 1.0) if m < last else 1.0
@@ -333,14 +345,8 @@ def lumped_with(so_far: LumpedSoil, piece: Piece, given: GivenPiece, design: Des
 def fill_pieces(design: Design, layers: np.ndarray, outline: np.ndarray, soil: ManyPieces) -> LumpedSoil:
     """Cut layers and outline into pieces (Eq 145), and return what follows from them.
 
-    Parameters
-    ----------
-    design
-        The design, SI; the layers replace density, friction angle and subgrade reaction of its soil.
-    layers, outline
-        Layers, shape (M, 6), and outline, shape (P, 4), of the design.
-    soil
-        Pieces to fill.
+    ``design``: the design, SI; the layers replace density, friction angle and subgrade reaction of its soil; ``layers,
+    outline``: layers, shape (M, 6), and outline, shape (P, 4), of the design; ``soil``: pieces to fill.
     """
     so_far, low, at, to = nothing_lumped(), 0.0, cursor_at_soil_line(design, outline), soil.pieces
     for n in range(len(to)):
@@ -423,6 +429,8 @@ def constants_of_few(design: Design, readings: Readings, body: Body, given: tupl
     return constants_in_soil(design, readings, body, so_far, FewPieces(so_far.sums, pieces))
 
 
+BELOW = len(Design._fields)
+"""Rows of a table of designs above what is given of the soil."""
 BODY_SIZE, PIECE_SIZE = len(Body._fields), len(GivenPiece._fields)
 """How many numbers are given of a body, and of each piece."""
 COUNTS = (1, 2, 4, 8)
@@ -438,14 +446,8 @@ def lanes_count(pieces: int) -> int:
 def write_given(designs: np.ndarray, layers: np.ndarray, outlines: np.ndarray, out: np.ndarray) -> None:
     """Write what lanes are given of designs beside `Design`: the body, and the pieces one after another.
 
-    Parameters
-    ----------
-    designs
-        The designs, SI, shape (15, n).
-    layers, outlines
-        Layers, shape (n, M, 6), and outlines, shape (n, P, 4).
-    out
-        Shape (BODY_SIZE + C PIECE_SIZE, n), of C pieces.
+    ``designs``: the designs, SI, shape (15, n); ``layers, outlines``: layers, shape (n, M, 6), and outlines, shape (n,
+    P, 4); ``out``: shape (BODY_SIZE + C PIECE_SIZE, n), of C pieces.
     """
     for row in range(out.shape[1]):
         design, outline = design_in(designs, row), outlines[row]
@@ -650,14 +652,14 @@ def walk_by_arrays(line: Line, soil: ManyPieces) -> Walk:
     """Return what is met on the way down through `ManyPieces`."""
     w = start_walk(sums_of(soil))
     for m in range(len(soil.pieces)):
-        w = pass_piece(w, line, taken(soil.pieces[m], 0, 0, Piece))
+        w = pass_piece(w, line, piece_in(soil.pieces[m]))
     return w
 
 
 @by_types
 def sums_of(soil: Any) -> Callable[..., SoilSums]:
     """Return the sums of pieces."""
-    return (lambda soil: soil.sums) if type_of(soil) is FewPieces else (lambda soil: taken(soil.sums, 0, 0, SoilSums))
+    return (lambda soil: soil.sums) if type_of(soil) is FewPieces else (lambda soil: sums_in(soil.sums))
 
 
 @inlined

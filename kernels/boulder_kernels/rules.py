@@ -157,12 +157,8 @@ def margin_of(o: OutcomeTable, sizes: Sizes, limits: VerdictLimits) -> float:
 def rule_of(o: OutcomeTable, sizes: Sizes, limits: VerdictLimits) -> int:
     """Return the rule that decides a row.
 
-    Parameters
-    ----------
-    o
-        A solution of it, numbers in place of columns.
-    sizes, limits
-        Its inputs, and the limits of the criterion.
+    ``o``: a solution of it, numbers in place of columns; ``sizes, limits``: its inputs, and the limits of the
+    criterion.
     """
     penetration = penetration_of(o, sizes)
     if o.status == Status.NO_CONTACT.value:
@@ -295,12 +291,8 @@ def is_outside(value: float, least: float, most: float) -> bool:
 def flags_of(o: OutcomeTable, overlap: float, r: FlagInputs, t: TestedRange) -> int:
     """Flags of a row, bits of a whole number in the order of `FLAGS`.
 
-    Parameters
-    ----------
-    o, overlap
-        What counts of it, numbers in place of columns, and its overlap [m].
-    r, t
-        Its inputs, and what the model was tested on.
+    ``o, overlap``: what counts of it, numbers in place of columns, and its overlap [m]; ``r, t``: its inputs, and what
+    the model was tested on.
     """
     least, most = t.least, t.most
     rate, damping = np.sqrt(r.k_v / r.m_v), r.c_v / np.sqrt(r.k_v * r.m_v)
@@ -337,16 +329,9 @@ def write_flags(
 ) -> None:
     """Raise the flags of n rows.
 
-    Parameters
-    ----------
-    counted, overlap
-        The solutions that count, shape (11, n), and the overlap with the bumper, shape (n,) [m].
-    inputs
-        Records of `FlagInputs`, shape (n,).
-    tested
-        What the model was tested on.
-    out
-        Where the flags go, whole numbers, shape (n,).
+    ``counted, overlap``: the solutions that count, shape (11, n), and the overlap with the bumper, shape (n,) [m];
+    ``inputs``: records of `FlagInputs`, shape (n,); ``tested``: what the model was tested on; ``out``: where the flags
+    go, whole numbers, shape (n,).
     """
     for row in range(out.size):
         out[row] = flags_of(outcome_in(counted, row), overlap[row], inputs[row], tested)
@@ -397,14 +382,9 @@ def is_wanted(row: Course, status: int, control: Control) -> bool:
 def agree(coarse: OutcomeTable, fine: OutcomeTable, v_0: float) -> bool:
     """Whether two solutions of a row end alike.
 
-    Parameters
-    ----------
-    coarse, fine
-        Solutions whose steps differ by a factor of two or more, each with its estimated errors; numbers in place of
-        columns.
-    v_0
-        Speed of impact [m/s]: an error of the displacement is one of the time, too, see
-        `boulder_kernels.outcomes.estimate_error`.
+    ``coarse, fine``: solutions whose steps differ by a factor of two or more, each with its estimated errors; numbers
+    in place of columns; ``v_0``: speed of impact [m/s]: an error of the displacement is one of the time, too, see
+    `boulder_kernels.outcomes.estimate_error`.
     """
     limit = coarse.status == Status.LIMIT.value
     if limit != (fine.status == Status.LIMIT.value) or not np.isfinite(fine.x_error):
@@ -448,19 +428,12 @@ def consider(
 ) -> None:
     """Take one more solution of a row into account: it confirms what counts so far, or takes its place.
 
-    Parameters
-    ----------
-    rows, row
-        The rows, and the number of the one that was solved. Its course says which solution it needs next.
-    found, at
-        The solution, in an array of `boulder_kernels.outcomes.empty_outcomes`. One that cannot be computed changes
-        nothing but the first time; the last resort is not tried again.
-    number, controls
-        By which control it was solved, and all that there are, shape (count, 13), see `control_in`: each finer than
-        the one before. A row is decided where no further one is wanted; it has an unknown error where there are not
-        enough of them to confirm it.
-    limits
-        Limits of the criterion.
+    ``rows, row``: the rows, and the number of the one that was solved. Its course says which solution it needs next;
+    ``found, at``: the solution, in an array of `boulder_kernels.outcomes.empty_outcomes`. One that cannot be computed
+    changes nothing but the first time; the last resort is not tried again; ``number, controls``: by which control it
+    was solved, and all that there are, shape (count, 13), see `control_in`: each finer than the one before. A row is
+    decided where no further one is wanted; it has an unknown error where there are not enough of them to confirm it;
+    ``limits``: limits of the criterion.
     """
     sizes, control, solution = rows.sizes[row], control_in(controls[number]), outcome_in(found, at)
     course, counted = rows.courses[row], outcome_in(rows.counted, row)

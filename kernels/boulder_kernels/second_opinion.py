@@ -164,14 +164,8 @@ class Potential(NamedTuple):
 def potential_energy(x_b: float, theta_b: float, y_b: float, work: np.ndarray, f: HeaveConstants) -> Potential:
     """Return the potential energy of soil, base and weight at a position (Eq 136).
 
-    Parameters
-    ----------
-    x_b, theta_b, y_b
-        Displacement and rise of the common centre of mass [m], rotation [rad].
-    work
-        The workspace; where a strip is pressed beyond what it can bear, the work to press it there is counted.
-    f
-        Constants of the design.
+    ``x_b, theta_b, y_b``: displacement and rise of the common centre of mass [m], rotation [rad]; ``work``: the
+    workspace; where a strip is pressed beyond what it can bear, the work to press it there is counted.
     """
     sin, versin = sine_versine(theta_b)
     k = soil_kinematics(x_b, 0.0, 0.0, sin, versin, f.c)
@@ -216,16 +210,14 @@ def crush_energy(u: float, c: Constants) -> float:
 def least_energy(theta: float, work: np.ndarray, f: HeaveConstants) -> float:
     """Least potential energy at a rotation, wherever the boulder stands [J] (Eq 137).
 
-    Notes
-    -----
     Along x_b alone, and along y_b alone, the energy is convex: its least is where its slope is zero. The search goes
-    along either in turn until a turn gains nothing.
-    (As a face that widens upwards rises, depth and pressure of the soil both fall, and so their product is convex. As
-    one that narrows rises, the pressure grows: it counts as sunk by as much as it can be, which is no more than the
-    energy.) Along x_b the least is between the positions where the uppermost and the lowest soil are as they were, and
-    further by what an inclined face moves the soil; along y_b between those where all strips carry what they can, which
-    is more than the weight, and where the boulder is out of the soil. There may be several, of large rotations: the
-    search starts from the middle, and from where the uppermost soil is as it was.
+    along either in turn until a turn gains nothing. (As a face that widens upwards rises, depth and pressure of the
+    soil both fall, and so their product is convex. As one that narrows rises, the pressure grows: it counts as sunk by
+    as much as it can be, which is no more than the energy.) Along x_b the least is between the positions where the
+    uppermost and the lowest soil are as they were, and further by what an inclined face moves the soil; along y_b
+    between those where all strips carry what they can, which is more than the weight, and where the boulder is out of
+    the soil. There may be several, of large rotations: the search starts from the middle, and from where the uppermost
+    soil is as it was.
     """
     sin, versin = sine_versine(theta)
     upper = f.c.l_n * versin - f.c.z_0 * sin
@@ -326,18 +318,9 @@ def simulate_heave(
 ) -> HeaveOutcome:
     """Simulate one impact with heave and friction.
 
-    Parameters
-    ----------
-    f
-        Constants of the design.
-    m_v
-        Mass of the truck [kg], for the energy that is recorded.
-    control
-        Limit, horizon and tolerance.
-    work
-        Workspace, shape (WORKSPACE,), of a design at rest: what `boulder_kernels.heave.prepare` has filled.
-    record
-        Filled with the time history at the times it names.
+    ``m_v``: mass of the truck [kg], for the energy that is recorded; ``control``: limit, horizon and tolerance;
+    ``work``: workspace, shape (WORKSPACE,), of a design at rest: what `boulder_kernels.heave.prepare` has filled;
+    ``record``: filled with the time history at the times it names.
     """
     align_stack()
     c = f.c

@@ -63,15 +63,8 @@ def proof_is_possible(readings: Readings) -> bool:
 def least_elastic_energy(slope_x: float, c: Constants) -> float:
     """Lower bound of the elastic energy at a rotation, wherever the boulder stands [J].
 
-    Parameters
-    ----------
-    slope_x
-        Decrease of displacement over the depth, sin|theta| d [m]; not negative.
-    c
-        Constants of the design.
+    ``slope_x``: decrease of displacement over the depth, sin|theta| d [m]; not negative.
 
-    Notes
-    -----
     The least energy has its displacement between none at the soil line and none at the base, A = 0 ... slope_x.
     """
     if slope_x == 0.0:
@@ -98,12 +91,7 @@ def least_elastic_energy(slope_x: float, c: Constants) -> float:
 def energy_to_turn(theta_max: float, c: Constants) -> float:
     """Lower bound of the potential energy at theta = +-theta_max [J].
 
-    Parameters
-    ----------
-    theta_max
-        Rotation [rad].
-    c
-        Constants of a design whose restoring moment is the couple of the weight.
+    ``theta_max``: rotation [rad]; ``c``: constants of a design whose restoring moment is the couple of the weight.
     """
     sin, versin = sine_versine(theta_max)
     return least_couple(c) * sin + c.C_sin * versin + least_elastic_energy(c.d * sin, c)
@@ -128,11 +116,9 @@ def slope_along(x_max: float, s: float, along: float, c: Constants) -> float:
 def energy_to_move(x_max: float, theta_max: float, c: Constants) -> float:
     """Lower bound of the potential energy on x_b = x_max for |theta| <= theta_max [J].
 
-    Notes
-    -----
     With t = tan(theta_max/2), 1 - cos(theta) lies between 0 and t sin|theta|, so the lift of the weight is at least
-    sin|theta| (C_cos + C_sin t). What bounds the energy is then linear on either side of theta = 0, and least at one
-    of the corners.
+    sin|theta| (C_cos + C_sin t). What bounds the energy is then linear on either side of theta = 0, and least at one of
+    the corners.
     """
     sin_max, versin_max = sine_versine(theta_max)
     t = versin_max / sin_max if sin_max > 0.0 else 0.0
@@ -165,15 +151,8 @@ def energy_to_move(x_max: float, theta_max: float, c: Constants) -> float:
 def barrier_energy(m: Maxima, c: Constants) -> float:
     """Energy below which a motion can exceed none of its maxima so far [J].
 
-    Parameters
-    ----------
-    m
-        Maxima so far.
-    c
-        Constants of a design whose restoring moment is the couple of the weight.
+    ``m``: maxima so far; ``c``: constants of a design whose restoring moment is the couple of the weight.
 
-    Notes
-    -----
     A force of contact F takes the energy F^2/(2 k_v) in the truck's spring.
     """
     to_press = 0.5 * m.F_v * m.F_v / c.k_v
@@ -187,17 +166,9 @@ def barrier_energy(m: Maxima, c: Constants) -> float:
 def stays_below(theta_limit: float, y: State, c: Constants) -> bool:
     """Whether a rotation below its limit provably stays there, and the truck provably where it is or behind.
 
-    Parameters
-    ----------
-    theta_limit
-        Limit of rotation [rad].
-    y
-        The state, within the limit.
-    c
-        Constants of a design whose readings allow a proof, see `proof_is_possible`.
+    ``theta_limit``: limit of rotation [rad]; ``y``: the state, within the limit; ``c``: constants of a design whose
+    readings allow a proof, see `proof_is_possible`.
 
-    Notes
-    -----
     Of the angles to be passed some are tried, each half of the one before.
     """
     if y.v_v > 0.0:
@@ -221,12 +192,7 @@ def inside_maxima(y: State, m: Maxima) -> bool:
 def boulder_energy(y: State, c: Constants) -> float:
     """Energy E that can only fall once the truck has stopped moving forward [J].
 
-    Parameters
-    ----------
-    y
-        The state.
-    c
-        Constants of a design whose restoring moment is the couple of the weight.
+    ``c``: constants of a design whose restoring moment is the couple of the weight.
     """
     sin, versin = sine_versine(y.theta_b)
     k = soil_kinematics(y.x_b, y.v_b, y.omega_b, sin, versin, c)

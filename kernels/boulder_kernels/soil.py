@@ -74,14 +74,8 @@ class Potential(NamedTuple):
 def soil_kinematics(x_b: float, v_b: float, omega_b: float, sin: float, versin: float, c: Constants) -> Kinematics:
     """Lines of displacement (Eq 22), velocity (Eq 35) and lever (Eqs 7, 8, 20) along the depth.
 
-    Parameters
-    ----------
-    x_b, v_b, omega_b
-        Displacement [m] and velocity [m/s] of the centre of mass, angular velocity [rad/s].
-    sin, versin
-        sin(theta_b) and 1 - cos(theta_b).
-    c
-        Constants of the design.
+    ``x_b, v_b, omega_b``: displacement [m] and velocity [m/s] of the centre of mass, angular velocity [rad/s]; ``sin,
+    versin``: sin(theta_b) and 1 - cos(theta_b).
     """
     cos = 1.0 - versin
     lever_d = c.d * cos
@@ -115,12 +109,8 @@ def add_element(sums: np.ndarray, j: int, n: int, k: Kinematics, c: Constants) -
 def element_sums(k: Kinematics, c: Constants) -> Reaction:
     """Sum force and moment over the N elements: the paper's own method (Eqs 19-21, 26, 28, 36).
 
-    Parameters
-    ----------
-    k
-        Lines of displacement, velocity and lever along the depth.
-    c
-        Constants of the design; ``c.elements`` must be positive.
+    ``k``: lines of displacement, velocity and lever along the depth; ``c``: constants of the design; ``c.elements``
+    must be positive.
     """
     sums = partial_sums()
     whole = c.elements - c.elements % WIDTH
@@ -136,16 +126,11 @@ def element_sums(k: Kinematics, c: Constants) -> Reaction:
 def closed_form(k: Kinematics, c: Constants) -> Reaction:
     """Integrate force and moment over the depth exactly: the limit N -> infinity of `element_sums`.
 
-    With r = alpha/d in 0 ... 1 the integrands are r clip(A - s r, -y, y) and v|v|, each times 1 and r.
-    The clipped line takes the values +-y up to r_1 and from r_2 on; v changes sign at r_0. All three are
-    clamped to 0 ... 1, so that no case needs a branch.
+    With r = alpha/d in 0 ... 1 the integrands are r clip(A - s r, -y, y) and v|v|, each times 1 and r. The clipped line
+    takes the values +-y up to r_1 and from r_2 on; v changes sign at r_0. All three are clamped to 0 ... 1, so that no
+    case needs a branch.
 
-    Parameters
-    ----------
-    k
-        Lines of displacement, velocity and lever along the depth.
-    c
-        Constants of the design.
+    ``k``: lines of displacement, velocity and lever along the depth.
     """
     s = math.copysign(max(abs(k.slope_x), TINY), k.slope_x)
     p = math.copysign(max(abs(k.slope_v), TINY), k.slope_v)
@@ -190,15 +175,10 @@ def uniform_reaction(k: Kinematics, c: Constants) -> Reaction:
 def closed_potential(A: float, slope_x: float, c: Constants) -> Potential:
     """Elastic energy of the soil for N -> infinity, a convex function of the two numbers that fix its displacement.
 
-    The springs are elastic also beyond their limit: a spring holds u^2/2 up to the yield displacement y and
-    y |u| - y^2/2 beyond, times its stiffness.
+    The springs are elastic also beyond their limit: a spring holds u^2/2 up to the yield displacement y and y |u| -
+    y^2/2 beyond, times its stiffness.
 
-    Parameters
-    ----------
-    A, slope_x
-        Displacement at the soil line, and its decrease over the whole depth [m].
-    c
-        Constants of the design.
+    ``A, slope_x``: displacement at the soil line, and its decrease over the whole depth [m].
     """
     s = math.copysign(max(abs(slope_x), TINY), slope_x)
     y = math.copysign(c.x_yield, s)

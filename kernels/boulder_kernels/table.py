@@ -4,47 +4,24 @@ One loop advances all lanes by a step, each by its own clock (`attempt_steps`), 
 plain (`take_over_steps`). What follows from any other step is found for its lane alone, by the function that the single
 impact uses (`boulder_kernels.impact.follow`), and a lane whose design has ended goes on with the next of the table.
 Designs are started side by side, in a group of their own. What a lane computes does not depend on the others.
-
-**Memory.** A group of lanes is one record, in which every field has a number for each lane: ``group.y.theta_b[lane]``.
-A field keeps the numbers of neighbouring lanes next to each other, and all fields are parts of one record. The compiler
-can then see that no store touches a later load, and vectorises a loop over the lanes. A soil in pieces adds fields of
-its own.
 """
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
-from itertools import product
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 
-from ._jit import (
-    IS_PLAIN,
-    align_stack,
-    by_types,
-    fields_of,
-    inlined,
-    is_none,
-    kernel,
-    load,
-    on_lines,
-    plain,
-    store,
-    taken,
-    through,
-)
+from ._jit import align_stack, by_types, inlined, is_none, kernel, plain
 from .control import ACCEPTED, MOST_STEPS, RETRY, STEP_RATIO, Control, control_for, first_step
-from .design import Body, Constants, Design, DesignTable, Readings, constants_of, design_at, design_in, is_computable
+from .design import Design, DesignTable, Readings, design_at, design_in, is_computable
 from .dormand_prince import step
-from .dynamics import Acceleration, State, Switches, empty_soil, profile_of
+from .dynamics import empty_soil, profile_of
 from .events import NONE
 from .impact import (
     RUNNING,
     Clock,
-    Impact,
     ImpactNotes,
     Pace,
     Problem,
@@ -58,6 +35,28 @@ from .impact import (
     simulate_alone,
     stop_of,
     watch,
+)
+from .lanes import (
+    BELOW,
+    LANES,
+    Attempt,
+    constants_in_lane,
+    copy_start,
+    copy_step,
+    empty_groups,
+    load_acceleration,
+    load_constants,
+    load_impact,
+    load_state,
+    load_switches,
+    store_acceleration,
+    store_attempt,
+    store_clock,
+    store_constants,
+    store_modes,
+    store_motion,
+    store_pace,
+    store_state,
 )
 from .outcomes import (
     COARSER,
@@ -81,261 +80,14 @@ from .outcomes import (
     write_outcome,
 )
 from .pieces import (
-    BODY_SIZE,
-    COUNTS,
-    PIECE_SIZE,
     PRESSURE,
-    FewPieces,
-    GivenPiece,
-    Piece,
     PiecewiseTable,
     SoilProfile,
-    SoilSums,
-    constants_of_few,
     given_pieces,
     lanes_count,
     pieces_count,
-    with_soil,
 )
 from .settling import proof_is_possible
-
-LANES = 1 if IS_PLAIN else 8
-"""Designs that are integrated side by side: one vector of eight doubles. More of them hide no more latency and take
-more of the fastest memory (measured: 2 to 5 % slower with 16 or 32). Without the compiler there is nothing to gain."""
-
-
-class Attempt(NamedTuple):
-    """What is known of a lane's last step, beside where it ended."""
-
-    error: float
-    """Estimated error of the step [m/s]."""
-    plain: float
-    """1.0 where it has been accepted as it is."""
-    status: float
-    """RUNNING, or why the design that has been started here needs no step."""
-
-
-class Leaning(NamedTuple):
-    """What constants have of a boulder that leans, see `boulder_kernels.pieces.SoilConstants`."""
-
-    lean: float
-
-
-UNUSED = ("c_x", "c_y", "elements", "d_N")
-"""Constants that no motion in lanes depends on."""
-
-
-def numbers_of(names: tuple[str, ...]) -> np.dtype:
-    """Return the type of a record of the lanes' numbers under these names."""
-    numbers = np.dtype([(name, np.float64, (LANES,)) for name in names], align=True)
-    return np.dtype((np.record, numbers))
-
-
-@functools.cache
-def group_type(pieces: int, has_strength: bool, has_outline: bool) -> np.dtype:
-    """Return the type of a group of lanes.
-
-    Parameters
-    ----------
-    pieces
-        Number of pieces of the soil of a design, in `boulder_kernels.pieces.COUNTS`; 0 for uniform soils beside boxes.
-    has_strength
-        Whether the ultimate resistance of a piece may be other than proportional to the depth.
-    has_outline
-        Whether boulders are no boxes.
-    """
-    records: list[Any] = []
-    if pieces:  # first, since Numba takes a record that begins like another for a kind of it
-        # A piece begins where the one above it ends.
-        constant = ("low", *(() if has_strength else ("P_0",)), *(() if has_outline else ("w_0", "w_1")))
-        piece = tuple(name for name in Piece._fields if name not in constant)
-        records += [("lean", np.float64, (LANES,))] if has_outline else []
-        records += [("sums", numbers_of(SoilSums._fields))]
-        records += [("pieces", numbers_of(piece), (pieces,)), ("body", numbers_of(Body._fields))]
-        records += [("given", numbers_of(GivenPiece._fields), (pieces,))]
-    tuples = [*fields_of(Impact).items()]
-    tuples += [("y_end", State), ("k_end", Acceleration), ("attempt", Attempt), ("design", Design)]
-    records += [(name, numbers_of(each._fields)) for name, each in tuples]
-    records += [("constants", numbers_of(tuple(name for name in Constants._fields if name not in UNUSED)))]
-    return np.dtype((np.record, np.dtype(records, align=True)))
-
-
-_SOILS = (0, True, True), *product(COUNTS, (False, True), (False, True))
-GROUP_TYPES = tuple(numba.from_dtype(group_type(*soil)) for soil in _SOILS)
-"""Numba's types of all groups, made in the same order in every process and kept. Numba numbers record types as they are
-made, and names compiled code by these numbers. Code that two processes have compiled for two kinds of groups could have
-one name, and a process that loads both would run one in place of the other."""
-
-
-def empty_groups(pieces: int = 0, *, has_strength: bool = True, has_outline: bool = True) -> np.ndarray:
-    """Return two groups of lanes: where designs run, and where they are started. Arguments: see `group_type`.
-
-    Their vectors lie on whole lines of the fast memory.
-    """
-    kind = group_type(pieces, has_strength, has_outline)
-    return on_lines(2 * kind.itemsize).view(kind)
-
-
-def field_of(group: Any, name: str) -> Any:
-    """Return a field of a record or of its type, Numba's or NumPy's; None if there is none of this name."""
-    if isinstance(group, numba.types.Record):
-        return group.fields[name].type if name in group.fields else None
-    return group[name] if name in group.dtype.names else None
-
-
-def is_uniform(group: Any) -> bool:
-    """Return whether a group of lanes, or its type, is of uniform soils."""
-    return field_of(group, "pieces") is None
-
-
-@inlined
-def store_motion(group: Any, lane: int, i: Impact) -> None:
-    """Write what changes with every step of an impact into its lane."""
-    store(group.y, lane, i.y)
-    store(group.k, lane, i.k)
-    store(group.front, lane, i.front)
-    store(group.maxima, lane, i.maxima)
-    store(group.clock, lane, i.clock)
-
-
-@inlined
-def store_modes(group: Any, lane: int, i: Impact) -> None:
-    """Write what changes with the modes of an impact into its lane."""
-    store(group.modes, lane, i.modes)
-    store(group.switches, lane, i.switches)
-    store(group.factors, lane, i.factors)
-
-
-@inlined
-def load_piece(group: Any, m: int, lane: int) -> Piece:
-    """Return one piece of the soil of a lane; the ends of the soil are numbers that the compiler knows."""
-    pieces = group.pieces
-    p = load(pieces[m], lane, Piece)
-    low = pieces[m - 1].to[lane] if m > 0 else 0.0
-    to = p.to if m + 1 < len(pieces) else 1.0
-    return Piece(low, to, p.K, p.inverse_K, p.P_0, p.P_1, p.R, p.w_0, p.w_1)
-
-
-@inlined
-def load_given(group: Any, m: int, lane: int) -> GivenPiece:
-    """Return one piece as it is given."""
-    piece: GivenPiece = load(group.given[m], lane, GivenPiece)
-    return piece
-
-
-@inlined
-def load_next(above: Any, at: Any, m: int) -> Any:
-    """Return the pieces above, and one more."""
-    group, lane = at
-    return (*above, load_piece(group, m, lane))
-
-
-@inlined
-def load_next_given(above: Any, at: Any, m: int) -> Any:
-    """Return the pieces above as they are given, and one more."""
-    group, lane = at
-    return (*above, load_given(group, m, lane))
-
-
-load_all, load_all_given = through(load_next), through(load_next_given)
-
-
-@by_types
-def numbers_of_pieces(group: Any) -> Callable[..., tuple[int, ...]]:
-    """Return the numbers of the pieces of a soil, which the compiler knows."""
-    pieces = field_of(group, "pieces")
-    numbers = tuple(range(pieces.shape[0]))
-    return lambda group: numbers
-
-
-@inlined
-def load_numbers(group: Any, lane: int) -> Constants:
-    """Return the constants of a lane but for its soil."""
-    c: Constants = load(group.constants, lane, Constants)
-    return c
-
-
-@inlined
-def load_in_soil(group: Any, lane: int) -> Any:
-    """Return the constants of a lane whose soil is in pieces."""
-    soil = FewPieces(load(group.sums, lane, SoilSums), load_all((), (group, lane), numbers_of_pieces(group)))
-    return with_soil(load_numbers(group, lane), load(group, lane, Leaning).lean, soil)
-
-
-@by_types
-def load_constants(group: Any, lane: int) -> Callable[..., Any]:
-    """Return the constants of a lane."""
-    if is_uniform(group):
-        return lambda group, lane: load_numbers(group, lane)
-    return lambda group, lane: load_in_soil(group, lane)
-
-
-@inlined
-def store_in_soil(group: Any, lane: int, c: Any) -> None:
-    """Write constants whose soil is in pieces."""
-    store(group.constants, lane, c)
-    store(group, lane, Leaning(c.lean))
-    store(group.sums, lane, c.soil.sums)
-    for m in range(len(c.soil.pieces)):
-        store(group.pieces[m], lane, c.soil.pieces[m])
-
-
-@by_types
-def store_constants(group: Any, lane: int, c: Any) -> Callable[..., None]:
-    """Write the constants of a lane."""
-    if is_uniform(group):
-        return lambda group, lane, c: store(group.constants, lane, c)
-    return lambda group, lane, c: store_in_soil(group, lane, c)
-
-
-BELOW = len(Design._fields)
-"""Rows of a table of designs above what is given of the soil."""
-
-
-@inlined
-def store_pieces_given(group: Any, lane: int, a: np.ndarray, row: int) -> None:
-    """Write body and pieces of a design that is to be started, rows of a table."""
-    store(group.body, lane, taken(a, BELOW, row, Body))
-    for m in range(len(group.given)):
-        store(group.given[m], lane, taken(a, BELOW + BODY_SIZE + PIECE_SIZE * m, row, GivenPiece))
-
-
-@by_types
-def store_given(group: Any, lane: int, a: np.ndarray, row: int) -> Callable[..., None]:
-    """Write what is given of the soil of a design that is to be started, the rows of a table below its `Design`."""
-    if is_uniform(group):
-        return lambda group, lane, a, row: None
-    return lambda group, lane, a, row: store_pieces_given(group, lane, a, row)
-
-
-@by_types
-def constants_in_lane(group: Any, lane: int, design: Design, readings: Readings) -> Callable[..., Any]:
-    """Return the constants of a design that is being started."""
-    if is_uniform(group):
-        return lambda group, lane, design, readings: constants_of(design, readings, 0)
-    return lambda group, lane, design, readings: constants_of_few(
-        design, readings, load(group.body, lane, Body), load_all_given((), (group, lane), numbers_of_pieces(group))
-    )
-
-
-@inlined
-def copy_start(group: Any, lane: int, start: Any, other: int) -> None:
-    """Copy constants and impact from a lane of one group to a lane of another, or of the same."""
-    i = load(start, other, Impact)
-    store_constants(group, lane, load_constants(start, other))
-    store(group.pace, lane, i.pace)
-    store_motion(group, lane, i)
-    store_modes(group, lane, i)
-
-
-@inlined
-def copy_step(group: Any, lane: int, start: Any, other: int) -> None:
-    """Copy the end of a step, too."""
-    copy_start(group, lane, start, other)
-    store(group.y_end, lane, load(start.y_end, other, State))
-    store(group.k_end, lane, load(start.k_end, other, Acceleration))
-    store(group.attempt, lane, load(start.attempt, other, Attempt))
-
 
 EMPTY = -1
 """Row of a lane that holds no design."""
@@ -349,15 +101,15 @@ def attempt_steps(group: Any) -> None:
     align_stack()
     for lane in range(LANES):
         y_end, k_end, error = step(
-            load(group.y, lane, State),
-            load(group.k, lane, Acceleration),
+            load_state(group.y, lane),
+            load_acceleration(group.k, lane),
             group.clock.h[lane],
-            load(group.switches, lane, Switches),
+            load_switches(group.switches, lane),
             load_constants(group, lane),
         )
-        store(group.y_end, lane, y_end)
-        store(group.k_end, lane, k_end)
-        store(group.attempt, lane, Attempt(error, 0.0, group.attempt.status[lane]))
+        store_state(group.y_end, lane, y_end)
+        store_acceleration(group.k_end, lane, k_end)
+        store_attempt(group.attempt, lane, Attempt(error, 0.0, group.attempt.status[lane]))
 
 
 @kernel
@@ -366,10 +118,10 @@ def take_over_steps(group: Any) -> int:
     align_stack()
     others = 0
     for lane in range(LANES):
-        i, error, c = load(group, lane, Impact), group.attempt.error[lane], load_constants(group, lane)
-        y_end, k_end = load(group.y_end, lane, State), load(group.k_end, lane, Acceleration)
+        i, error, c = load_impact(group, lane), group.attempt.error[lane], load_constants(group, lane)
+        y_end, k_end = load_state(group.y_end, lane), load_acceleration(group.k_end, lane)
         plain, after = go_on(i, y_end, k_end, error, c)
-        store(group.attempt, lane, Attempt(error, 1.0 if plain else 0.0, RUNNING))
+        store_attempt(group.attempt, lane, Attempt(error, 1.0 if plain else 0.0, RUNNING))
         others += 0 if plain else 1
         if plain:
             store_motion(group, lane, after)
@@ -382,18 +134,18 @@ def compute_constants(group: Any, designs: np.ndarray, first: int, readings: Rea
     align_stack()
     # Loads from another array would keep the loop from being vectorised.
     for lane in range(LANES):
-        store(group.design, lane, design_in(designs, first + lane))
-        store_given(group, lane, designs, first + lane)
+        for number in range(len(group.given)):
+            group.given[number, lane] = designs[number, first + lane]
     for lane in range(LANES):
-        design = load(group.design, lane, Design)
+        design = design_in(group.given, lane)
         c = constants_in_lane(group, lane, design, readings)
         h, status = first_step(control, stop_of(control), c)
         status = RUNNING if status == ACCEPTED else status
         status = status if is_computable(c) else Status.INVALID.value
         status = Status.NO_CONTACT.value if design.H - design.d <= design.e_bumper else status
         store_constants(group, lane, c)
-        store(group.pace, lane, Pace(h, h, 0.0))
-        store(group.attempt, lane, Attempt(0.0, 0.0, status))
+        store_pace(group.pace, lane, Pace(h, h, 0.0))
+        store_attempt(group.attempt, lane, Attempt(0.0, 0.0, status))
 
 
 @kernel
@@ -403,7 +155,7 @@ def stand_still(group: Any, readings: Readings, control: Control) -> None:
     for lane in range(LANES):
         h = group.pace.h_touching[lane]
         i = first_touch(h, h, load_constants(group, lane), readings, control)
-        store(group.pace, lane, i.pace)
+        store_pace(group.pace, lane, i.pace)
         store_motion(group, lane, i)
     # In a loop of its own: with more stores in one the compiler vectorises neither.
     for lane in range(LANES):
@@ -416,9 +168,9 @@ def take_first_steps(group: Any, readings: Readings, control: Control) -> None:
     """Accept the first steps that end where the boulder begins to turn; leave the others undone."""
     align_stack()
     for lane in range(LANES):
-        i, error, c = load(group, lane, Impact), group.attempt.error[lane], load_constants(group, lane)
+        i, error, c = load_impact(group, lane), group.attempt.error[lane], load_constants(group, lane)
         turns, after = begin_to_turn(
-            i, load(group.y_end, lane, State), load(group.k_end, lane, Acceleration), error, c, readings, control
+            i, load_state(group.y_end, lane), load_acceleration(group.k_end, lane), error, c, readings, control
         )
         if turns:
             store_motion(group, lane, after)
@@ -429,17 +181,8 @@ def take_first_steps(group: Any, readings: Readings, control: Control) -> None:
 def start_designs(group: Any, designs: np.ndarray, first: int, readings: Readings, control: Control) -> None:
     """Put as many designs as there are lanes into a group, and take their first step where it ends as it should.
 
-    Parameters
-    ----------
-    group
-        The group.
-    designs, first
-        The designs of `LaneDesigns`, and the row of the design in the first lane.
-    readings, control
-        How they are simulated.
+    ``designs, first``: the designs of `LaneDesigns`, and the row of the design in the first lane.
 
-    Notes
-    -----
     A lane is left with the status RUNNING, or with the status of a design that needs no integration or allows none.
     """
     compute_constants(group, designs, first, readings, control)
@@ -448,7 +191,7 @@ def start_designs(group: Any, designs: np.ndarray, first: int, readings: Reading
     take_first_steps(group, readings, control)
 
 
-@inlined
+@kernel
 def next_design(
     groups: Any, rows: np.ndarray, lane: int, designs: np.ndarray, readings: Readings, control: Control, out: np.ndarray
 ) -> None:
@@ -467,20 +210,20 @@ def next_design(
         out[STATUS, row] = status
     rows[lane] = EMPTY
     # An empty lane stands still: its steps have no length, and their results are ignored.
-    store(running.clock, lane, Clock(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    store_clock(running.clock, lane, Clock(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 
 
 @kernel
 def follow_lane(group: Any, lane: int, readings: Readings, control: Control) -> int:
     """Find what follows from the step of a lane, see `boulder_kernels.impact.follow`; return its status."""
-    i, c, error = load(group, lane, Impact), load_constants(group, lane), group.attempt.error[lane]
-    y_end, k_end = load(group.y_end, lane, State), load(group.k_end, lane, Acceleration)
+    i, c, error = load_impact(group, lane), load_constants(group, lane), group.attempt.error[lane]
+    y_end, k_end = load_state(group.y_end, lane), load_acceleration(group.k_end, lane)
     followed = follow(i, y_end, k_end, error, c, readings, control)
     status, after = followed.status, followed.impact
     if status == Status.UNSTABLE.value and control.horizon <= MOST_STEPS * i.clock.h_full:
         h = RETRY * i.clock.h_full
         after = first_touch(h, h, c, readings, control)
-        store(group.pace, lane, after.pace)
+        store_pace(group.pace, lane, after.pace)
         status = RUNNING
     store_motion(group, lane, after)
     if followed.event > NONE or after.clock.t == 0.0:
@@ -493,7 +236,7 @@ def write_lane(
     group: Any, lane: int, status: int, t_limit: float, designs: np.ndarray, control: Control, out: np.ndarray, row: int
 ) -> Outcome:
     """Write the outcome of a lane into its row, and return it; a design that failed leaves its row NaN."""
-    o = outcome_of(load(group, lane, Impact), status, t_limit, control)
+    o = outcome_of(load_impact(group, lane), status, t_limit, control)
     if np.isnan(o.t_end):
         out[STATUS, row] = status
     else:
@@ -505,12 +248,12 @@ def write_lane(
 def watch_lane(groups: Any, w: ImpactNotes, control: Control, record: Record) -> ImpactNotes:
     """Note what there is of a step of the first lane, whose impact at its start lies in the group of starts."""
     running, before = groups[0], groups[1]
-    i, after = load(before, 0, Impact), load(running, 0, Impact)
+    i, after = load_impact(before, 0), load_impact(running, 0)
     if after.clock.t == 0.0:
         return nothing_watched()  # it starts again, by shorter steps
     if after.clock.t == i.clock.t:
         return w
-    y_end, k_end = load(running.y_end, 0, State), load(running.k_end, 0, Acceleration)
+    y_end, k_end = load_state(running.y_end, 0), load_acceleration(running.k_end, 0)
     return watch(w, i, y_end, k_end, after, load_constants(running, 0), control, record)
 
 
@@ -526,13 +269,9 @@ def run_lanes(
 ) -> Outcome:
     """Simulate every design of a table, and return the outcome of the last that has ended.
 
-    Parameters
-    ----------
-    designs, readings, control, record, out
-        The same as in `simulate_lanes`, with designs for whole groups.
-    groups, rows
-        The lanes, see `empty_groups`; the rows of the designs in them, EMPTY before they are
-        filled, and behind them 0.
+    ``designs, readings, control, record, out``: the same as in `simulate_lanes`, with designs for whole groups;
+    ``groups, rows``: the lanes, see `empty_groups`; the rows of the designs in them, EMPTY before they are filled, and
+    behind them 0.
     """
     for lane in range(LANES):
         next_design(groups, rows, lane, designs, readings, control, out)
@@ -586,23 +325,12 @@ def simulate_lanes(
 ) -> Outcome:
     """Simulate every design of a table in lanes, by a closed form of the soil.
 
-    Parameters
-    ----------
-    given
-        The designs.
-    readings
-        Which formulas are read as printed.
-    control
-        How they are simulated, its choice of soil ignored. One that does not stop at the limit is for one design.
-    record
-        Filled with the time history of one design at the times it names; for several, one that keeps nothing.
-    out
-        Where the outcomes go in the order of the designs, an array of `boulder_kernels.outcomes.empty_outcomes`.
+    ``control``: how they are simulated, its choice of soil ignored. One that does not stop at the limit is for one
+    design; ``record``: filled with the time history of one design at the times it names; for several, one that keeps
+    nothing; ``out``: where the outcomes go in the order of the designs, an array of
+    `boulder_kernels.outcomes.empty_outcomes`.
 
-    Returns
-    -------
-    Outcome
-        The outcome of the design that ended last.
+    Returns the outcome of the design that ended last.
     """
     rows = np.full(LANES + 1, EMPTY)
     rows[NEXT] = 0
@@ -639,14 +367,8 @@ def run_rows(
 ) -> Outcome:
     """Simulate designs one by one, in any soil, and return the last outcome.
 
-    Parameters
-    ----------
-    designs
-        Shape (15, n), at least one.
-    soils
-        Their soils; None for boxes in uniform soils.
-    readings, control, record, out
-        See `simulate_lanes`.
+    ``designs``: shape (15, n), at least one; ``soils``: their soils; None for boxes in uniform soils; ``readings,
+    control, record, out``: see `simulate_lanes`.
     """
     outcome = failed(Status.INVALID.value)
     for row in range(designs.shape[1]):
@@ -711,12 +433,9 @@ def solve_rows(
 def solve(table: DesignTable, readings: Readings, control: Control) -> tuple[np.ndarray, np.ndarray]:
     """Solve every design of a table once.
 
-    Returns
-    -------
-    out : ndarray, shape (11, n)
-        Rows in the order of `OutcomeTable`, with the errors of the steps of one solution.
-    second : ndarray, shape (n,)
-        Which second solution each of them needs, see `boulder_kernels.outcomes.StepErrors`.
+    Returns ``out``, shape (11, n): rows in the order of `OutcomeTable`, with the errors of the steps of one
+    solution; ``second``, shape (n,): which second solution each of them needs, see
+    `boulder_kernels.outcomes.StepErrors`.
     """
     out, soils = empty_outcomes(len(table.L)), None
     if isinstance(table, PiecewiseTable):

@@ -152,7 +152,7 @@ NAMES = """
 import re
 import sys
 import numba
-from boulder_kernels.table import group_type
+from boulder_kernels.lanes import group_type
 
 @numba.njit
 def first(group):

@@ -14,9 +14,10 @@ import boulder_kernels as bk
 from boulder_kernels import OutcomeTable, Status
 from boulder_kernels.dynamics import soil_potential
 from boulder_kernels.impact import simulate_alone
+from boulder_kernels.lanes import LANES
 from boulder_kernels.outcomes import STEP, T_END, empty_outcomes, outcome_table, step_errors, write_outcome
 from boulder_kernels.pieces import COUNTS, GivenPiece, PiecewiseTable, given_pieces, lanes_count
-from boulder_kernels.table import LANES, problem_at, some_rows
+from boulder_kernels.table import problem_at, some_rows
 
 from .samples import ALL_READINGS, control, layered_constants, random_designs, random_layers, same_bits, table_of
 

@@ -13,12 +13,11 @@ import boulder_kernels as bk
 from boulder_kernels.design import constants_of, design_in
 from boulder_kernels.heave import ROOM, Base, HeaveOptions, forces, heave_constants, prepare
 from boulder_kernels.impact import simulate_alone
+from boulder_kernels.lanes import LANES, empty_groups
 from boulder_kernels.second_opinion import potential_energy
 from boulder_kernels.table import (
-    LANES,
     attempt_steps,
     compute_constants,
-    empty_groups,
     run_lanes,
     stand_still,
     take_first_steps,

@@ -5,15 +5,15 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import boulder_kernels as bk
-from boulder_kernels._jit import load, store
 from boulder_kernels.control import BEHIND, RETRY, first_length, onset_of
 from boulder_kernels.design import Constants, Design, constants_of
 from boulder_kernels.dormand_prince import step
 from boulder_kernels.dynamics import SEATED, TURNING_FORWARD, Acceleration, State
 from boulder_kernels.events import AT_END, TOLERANCE, initial_modes
-from boulder_kernels.impact import RUNNING, Impact, begin_to_turn, enter_modes, first_touch, go_on
+from boulder_kernels.impact import RUNNING, begin_to_turn, enter_modes, first_touch, go_on
+from boulder_kernels.lanes import LANES, empty_groups, load_impact, store_state
 from boulder_kernels.pieces import PRESSURE, SUBGRADE, TO, uniform_layers
-from boulder_kernels.table import LANES, empty_groups, follow_lane, start_designs
+from boulder_kernels.table import follow_lane, start_designs
 from tests import oracle
 from tests.kernels.samples import layered_constants
 from tests.oracle import dynamics, events, restoring
@@ -122,7 +122,7 @@ def test_designs_enter_their_lanes_behind_the_onset() -> None:
         with np.errstate(divide="ignore", invalid="ignore"):
             start_designs(ws, np.stack(table_of([first] + [RWG] * (LANES - 1))), 0, CORRECTED, how)
         for lane, design in {0: first, LANES - 1: RWG if LANES > 1 else first}.items():
-            i = load(ws, lane, Impact)
+            i = load_impact(ws, lane)
             clock, turning = i.clock, i.modes.turning
             if design is RWG:
                 assert clock.t == pytest.approx(onset, rel=1e-12)
@@ -142,10 +142,10 @@ def test_a_design_whose_motion_is_no_number_is_started_again() -> None:
     how, groups = control(0.014, 1.0, LIMIT, stop_at_limit=True), empty_groups()
     ws = groups[0]
     start_designs(ws, np.stack(table_of([RWG] * LANES)), 0, CORRECTED, how)
-    store(ws.y_end, 0, State(*[np.nan] * 6))
+    store_state(ws.y_end, 0, State(*[np.nan] * 6))
     before, others = numbers_in(groups), np.arange(LANES) != 0
     assert follow_lane(ws, 0, CORRECTED, how) == RUNNING
-    i = load(ws, 0, Impact)
+    i = load_impact(ws, 0)
     assert (i.clock.t, i.clock.attempts, i.modes.turning) == (0.0, 0.0, SEATED)
     assert i.clock.h_full == i.pace.h_touching == RETRY * 0.014
     assert np.array_equal(numbers_in(groups)[:, others], before[:, others])

@@ -19,8 +19,9 @@ from boulder_kernels.dynamics import (
     soil_potential,
     soil_reaction,
 )
+from boulder_kernels.lanes import LANES
 from boulder_kernels.pieces import COUNTS, GivenPiece, PiecewiseTable, constants_of_few, given_pieces, uniform_layers
-from boulder_kernels.table import LANES, is_layered, is_paired, simulate_table, some_rows
+from boulder_kernels.table import is_layered, is_paired, simulate_table, some_rows
 from tests.kernels.samples import control, random_designs, random_layers, random_state, table_of
 from tests.kernels.test_lanes import PRESETS, assert_alike, assert_same, one_by_one
 from tests.kernels.test_soil import lines
