@@ -1,8 +1,8 @@
 """Which rule decides a row, which flags it has, and whether another solution has to decide it: for tables and pages.
 
-The rules are in order, the worst first; the first that applies decides the row. `boulder_sweep.judge.verdict` says what
-each means, and `boulder_sweep.judge.validity` what the flags mean. Every function here answers one question about one
-row; `consider` puts them together, and is called after each solution of a row.
+The rules are in order, the worst first; the first that applies decides the row. docs/model.md says what each means, and
+`boulder_sweep.judge.validity` what the flags mean. Every function here answers one question about one row; `consider`
+puts them together, and is called after each solution of a row.
 
 **Finer steps** decide rows that were refused for their time steps or are undecided for their error, and confirm late
 ones. A row is *late* if its motion goes on past the horizon. A shallow boulder may rock for seconds, and rocking

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._jit import align_stack, by_types, inlined, is_none, kernel, plain
+from ._jit import by_types, inlined, is_none, kernel, plain
 from .control import ACCEPTED, MOST_STEPS, RETRY, STEP_RATIO, Control, control_for, first_step
 from .design import Design, DesignTable, Readings, design_at, design_in, is_computable
 from .dormand_prince import step
@@ -98,7 +98,6 @@ NEXT = LANES
 @kernel
 def attempt_steps(group: Any) -> None:
     """Advance every lane by its step, in one vectorised loop."""
-    align_stack()
     for lane in range(LANES):
         y_end, k_end, error = step(
             load_state(group.y, lane),
@@ -115,7 +114,6 @@ def attempt_steps(group: Any) -> None:
 @kernel
 def take_over_steps(group: Any) -> int:
     """Accept the steps that are plain; mark and count the others."""
-    align_stack()
     others = 0
     for lane in range(LANES):
         i, error, c = load_impact(group, lane), group.attempt.error[lane], load_constants(group, lane)
@@ -131,7 +129,6 @@ def take_over_steps(group: Any) -> int:
 @kernel
 def compute_constants(group: Any, designs: np.ndarray, first: int, readings: Readings, control: Control) -> None:
     """Work out constants and steps of designs, and whether they can be simulated; arguments: see `start_designs`."""
-    align_stack()
     # Loads from another array would keep the loop from being vectorised.
     for lane in range(LANES):
         for number in range(len(group.given)):
@@ -151,7 +148,6 @@ def compute_constants(group: Any, designs: np.ndarray, first: int, readings: Rea
 @kernel
 def stand_still(group: Any, readings: Readings, control: Control) -> None:
     """Put every lane at the first touch."""
-    align_stack()
     for lane in range(LANES):
         h = group.pace.h_touching[lane]
         i = first_touch(h, h, load_constants(group, lane), readings, control)
@@ -166,7 +162,6 @@ def stand_still(group: Any, readings: Readings, control: Control) -> None:
 @kernel
 def take_first_steps(group: Any, readings: Readings, control: Control) -> None:
     """Accept the first steps that end where the boulder begins to turn; leave the others undone."""
-    align_stack()
     for lane in range(LANES):
         i, error, c = load_impact(group, lane), group.attempt.error[lane], load_constants(group, lane)
         turns, after = begin_to_turn(
