@@ -44,7 +44,7 @@ import threading
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any
 
 import llvmlite.binding
 import numba
@@ -445,11 +445,6 @@ def through(add: Callable[..., Any]) -> Callable[..., Any]:
         return lambda met, state, items: pass_on(add(met, state, items[0]), state, items[1:])
 
     return pass_on
-
-
-def fields_of(kind: Any) -> dict[str, Any]:
-    """Return the names of the fields of a named tuple and what they are: float, int, bool or another named tuple."""
-    return get_type_hints(kind)
 
 
 @numba.extending.intrinsic
