@@ -26,20 +26,20 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_type_hints
 
 import numba
 import numpy as np
 from llvmlite import ir
 from numba.core import cgutils
 
-from ._jit import exact_inlined, fields_of, inlined, overload
+from ._jit import exact_inlined, inlined, overload
 
 
 @functools.cache
 def record_type(kind: Any) -> np.dtype:
     """Return the type of a record with a number for each field of a named tuple, or a record where it is one itself."""
-    fields = fields_of(kind).items()
+    fields = get_type_hints(kind).items()
     return np.dtype(
         (np.record, [(name, record_type(each) if hasattr(each, "_fields") else np.float64) for name, each in fields])
     )
