@@ -210,7 +210,7 @@ def load_factors(g: Any, lane: int) -> GapFactors:
         g.corner_theta[lane],
         g.arm[lane],
         g.top[lane],
-        g.base[lane],
+        g["base"][lane],  # without the compiler, ``g.base`` is an attribute that every record of NumPy has
         g.limit[lane],
         g.tolerance[lane],
     )
@@ -258,7 +258,7 @@ def store_modes(group: Any, lane: int, i: Impact) -> None:
     to.rotation_theta[lane], to.rotation_omega[lane] = g.rotation_theta, g.rotation_omega
     to.couple_M[lane], to.couple_abs_M[lane], to.couple_limit[lane] = g.couple_M, g.couple_abs_M, g.couple_limit
     to.corner_0[lane], to.corner_theta[lane], to.arm[lane] = g.corner_0, g.corner_theta, g.arm
-    to.top[lane], to.base[lane], to.limit[lane], to.tolerance[lane] = g.top, g.base, g.limit, g.tolerance
+    to.top[lane], to["base"][lane], to.limit[lane], to.tolerance[lane] = g.top, g.base, g.limit, g.tolerance
 
 
 @inlined
