@@ -257,7 +257,7 @@ def sketch_of(
     dimensions = (
         upright(beside, 0.0, above, "above", above / 2 - 0.1),
         upright(beside, -depth, 0.0, "d =", low),
-        upright(last + 2.7, -depth, above, "H =", max(above / 2 - 0.1, 0.2)),
+        upright(last + 2.7, -depth, above, "H =", middle - 0.1),
         # Below the foot, where it is clear of the truck; the sides may lean.
         Dimension(edge, -depth - 0.2, last, -depth - 0.2, "L =", length, edge, -depth - 0.54, "start"),
         Dimension(-3.0, 0.0, -3.0, bumper, "bumper", bumper, -3.12, 0.12, "end"),

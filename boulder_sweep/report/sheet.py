@@ -195,9 +195,9 @@ def _checks(
     of: list[tuple[str, str, str, float | None]] = [
         ("rotation", "max_rotation_deg", "deg", criterion["max_rotation_deg"]),
         ("displacement", "max_displacement_m", "m", slides),
-        (f"cargo bed penetration, {criterion['rating']}", "penetration_m", "m", limit),
+        (f"penetration, rating {criterion['rating']}", "penetration_m", "m", limit),
         ("overlap, at least", "overlap_m", "m", overlap),
-        (f"peak force of the truck{', largest' * (len(design.rows) > 1)}", "peak_force_kN", "kN", None),
+        ("largest peak force" if len(design.rows) > 1 else "peak force of the truck", "peak_force_kN", "kN", None),
         ("acting above ground at", "impact_height_m", "m", None),
     ]
     lines: list[tuple[str, Cell, Cell, str]] = []
@@ -260,7 +260,8 @@ def _build(rows: ResultRows, row: Mapping[str, Any], design: Design, need: Need)
     found, lines = need.recommendation, list[tuple[str, Cell]]()
     if found is not None and found.design is design and not found.of_run:
         lines.append(("depth, at least", Measure(row[DEPTH], "m", up=1)))
-        lines += [("depth, at most", Measure(found.deepest_m, "m", up=-1))] if found.deepest_m else []
+        most = "robust to" if design.grade == "robust" else "at most"
+        lines += [(f"depth, {most}", Measure(found.deepest_m, "m", up=-1))] if found.deepest_m else []
     built = zip(("excavation", "backfill"), TO_BUILD[1:], strict=True)
     mass, density = row.get(BOULDER_MASS) or float(rows.mass().flat[0]), float(row["boulder_density_kg_m3"])
     rock = "".join(kind["name"] for kind in rows.settings.get("derived", {}).get("rock", ())) or "rock"

@@ -137,7 +137,7 @@ def test_the_limits_are_those_of_the_case_with_the_least_margin(needs: dict[str,
     worst = min(best.design.rows, key=lambda row: row["margin"])
     lines = {name: (computed, allowed, used) for name, computed, allowed, used in found.checks}
     assert lines["rotation"][:2] == (Measure(worst["max_rotation_deg"], "deg"), Measure(20.0, "deg"))
-    used = [int(line[2].split()[0]) for line in (lines["rotation"], lines["cargo bed penetration, P1"])]
+    used = [int(line[2].split()[0]) for line in (lines["rotation"], lines["penetration, rating P1"])]
     assert 100 - max(used) == round(100 * worst["margin"])
     assert f"friction angle φ′ {worst['friction_angle_deg']:g}°" in found.words["si"].governs
     assert len(found.cases["si"].rows) == len(best.design.rows) == 2
@@ -168,9 +168,9 @@ def test_what_a_run_that_ended_at_the_limit_says_is_marked_as_a_bound(tmp_path: 
     boulder_sweep.run(site(height="3.4 m", site="embedment_depth: 1.5 m"), tmp_path / "site.sweep")
     checks = {words: tuple(rest) for words, *rest in sheet(tmp_path / "site.sweep").checks}
     assert checks["rotation"] == (Measure(pytest.approx(20.0), "deg", "≥ "), Measure(20.0, "deg"), "≥ 100 %")
-    for name in ("displacement", "peak force of the truck"):
+    for name in ("displacement", "largest peak force"):
         assert checks[name][0].before == "≥ "
-    assert checks["cargo bed penetration, P1"] == ("none so far", Measure(1.0, "m"), "–")
+    assert checks["penetration, rating P1"] == ("none so far", Measure(1.0, "m"), "–")
     assert checks["overlap, at least"][0].before == ""
 
 
