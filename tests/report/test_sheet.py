@@ -168,7 +168,7 @@ def test_what_a_run_that_ended_at_the_limit_says_is_marked_as_a_bound(tmp_path: 
     boulder_sweep.run(site(height="3.4 m", site="embedment_depth: 1.5 m"), tmp_path / "site.sweep")
     checks = {words: tuple(rest) for words, *rest in sheet(tmp_path / "site.sweep").checks}
     assert checks["rotation"] == (Measure(pytest.approx(20.0), "deg", "≥ "), Measure(20.0, "deg"), "≥ 100 %")
-    for name in ("displacement", "largest peak force"):
+    for name in ("displacement", "peak force of the truck"):
         assert checks[name][0].before == "≥ "
     assert checks["penetration, rating P1"] == ("none so far", Measure(1.0, "m"), "–")
     assert checks["overlap, at least"][0].before == ""
@@ -201,7 +201,8 @@ def test_the_depth_to_build_is_a_least_and_a_greatest(needs: dict[str, Need], fi
     for name in ("depth", "chance", "never"):
         best, built = needs[name].recommendation, dict(sheet(files[name]).build)
         assert best is not None
-        depths = [built.get(f"depth, at {end}") for end in ("least", "most")]
+        most = "robust to" if best.design.grade == "robust" else "at most"
+        depths = [built.get(f"depth, {end}") for end in ("at least", most)]
         least = None if best.design is None else Measure(best.design.sizes["embedment_depth_m"], "m", up=1)
         assert depths == [least, None if best.deepest_m is None else Measure(best.deepest_m, "m", up=-1)]
         assert (best.deepest_m is None) == (name != "depth")
