@@ -15,6 +15,8 @@ from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from boulder_sweep.answers.keys import BOULDER_MASS, Ends, Key, key_of, margin_asked, share
 from boulder_sweep.answers.questions import Question
 from boulder_sweep.answers.recommendation import PREFERENCES, Recommendation, recommended
@@ -272,17 +274,27 @@ def _outcomes_of_answers(table: pa.Table) -> pa.Table:
     import pyarrow as pa
     import pyarrow.compute as pc
 
+    from boulder_sweep.store.part import number_array
+
+    def rows_with(column: str, *words: str) -> pa.Array:
+        """Return which rows have one of these words; comparing with a word by pyarrow imports pandas."""
+        other = np.array([word not in words for word in table[column].to_pylist()], dtype=bool)
+        return number_array(np.zeros(len(table)), other).is_valid()
+
     passes = table["passes_at"].is_valid()
-    undecided = pc.equal(table["found"].cast("string"), WORDS[UNKNOWN])
-    told = pc.is_in(table["verdict"].cast("string"), pa.array(["undecided", "error"]))
+    with_reason = pc.or_(passes, rows_with("verdict", "undecided", "error"))
+    with_chance = pc.or_(passes, rows_with("found", WORDS[UNKNOWN]))
     for index, name in enumerate(table.column_names):
-        if name in OUTCOME_COLUMNS:
-            where = pc.or_(passes, told) if name in ("verdict", "reason") else passes
-        elif name.startswith(("p_pass", "p_robust", "p_undecided")):
-            where = pc.or_(passes, undecided)
+        if name.startswith(("p_pass", "p_robust", "p_undecided")):
+            where = with_chance
+        elif name in OUTCOME_COLUMNS:
+            where = with_reason if name in ("verdict", "reason") else passes
         else:
             continue
-        table = table.set_column(index, table.field(index), pc.if_else(where, table[name], None))
+        column = table[name]
+        table = table.set_column(
+            index, table.field(index), pc.if_else(where, column, pa.nulls(len(table), column.type))
+        )
     return table
 
 

@@ -32,12 +32,11 @@ from boulder_sweep.cli.options import (
 )
 from boulder_sweep.cli.output import say, say_written, show, working
 from boulder_sweep.errors import EXIT_DONE, EXIT_SOME_ROWS_FAILED
-from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT
-from boulder_sweep.settings.problems import Position, Problem
 from boulder_sweep.text import counted
 
 if TYPE_CHECKING:
     from boulder_sweep.settings import Sweep
+    from boulder_sweep.settings.problems import Problem
 
 NEED_EXAMPLES = """\b
 Examples:
@@ -136,11 +135,9 @@ def need(
         sweep = at_values(sweep, at)
     refuse_unwritable(out, picture)
 
-    unused = _unused(sweep, question["most"] or question["least"] or EMBEDMENT[1])
-    told = [note for note in sweep.notes if not (unused and note.key.startswith("site.embedment"))]
-    told += [Problem(Position(grid), "not used: the depth is searched", BY_NAME[name].path) for name in unused]
+    notes_told = _notes(sweep, question["most"] or question["least"], grid)
     shares = {name: question[name] for name in ("margin", "probability")}
-    say_how = partial(say_notes, replace(sweep, notes=tuple(told)), units, **shares)
+    say_how = partial(say_notes, replace(sweep, notes=notes_told), units, **shares)
     with working(quiet, of="designs" if question["probability"] is None else "values") as progress:
         result = answer(sweep, **question, jobs=jobs, progress=progress, ready=None if quiet else say_how)
     if as_json:
@@ -159,13 +156,19 @@ def need(
     return EXIT_SOME_ROWS_FAILED if result.errors else EXIT_DONE
 
 
-def _unused(sweep: Sweep, word: str) -> list[str]:
-    """Return the embedments that a file gives in vain, since an embedment is searched and none is its range."""
+def _notes(sweep: Sweep, word: str | None, file: str) -> tuple[Problem, ...]:
+    """Return the notes of a file; of an embedment that it gives in vain, since one is searched, that it is not used."""
     from boulder_sweep.answers.keys import key_of
+    from boulder_sweep.settings.fields import BY_NAME, EMBEDMENT
+    from boulder_sweep.settings.problems import Position, Problem
 
     given = sweep.plan.given.keys() - {name for axis in sweep.axes for name in axis.columns}
-    is_searched = key_of(word).name in EMBEDMENT and not sweep.depth_sought
-    return [name for name in EMBEDMENT if name in given and is_searched]
+    unused = [name for name in EMBEDMENT if name in given and not sweep.depth_sought]
+    if not unused or (word and key_of(word).name not in EMBEDMENT):
+        return sweep.notes
+    told = [note for note in sweep.notes if not note.key.startswith("site.embedment")]
+    told += [Problem(Position(file), "not used: the depth is searched", BY_NAME[name].path) for name in unused]
+    return tuple(told)
 
 
 def _given(names: Sequence[str]) -> tuple[tuple[str, ...], ...]:

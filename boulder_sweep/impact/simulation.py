@@ -113,7 +113,7 @@ def simulate(
 def history_of(
     sweep: Sweep, design_id: int, evaluation: Evaluation, cases: list[Judged], sample_s: float = SAMPLE_S
 ) -> Trajectory:
-    """Return the time history of a design that can be computed, by how its row was simulated.
+    """Return the time history of a design that can be computed, by how its row was simulated (Eqs 53, 54, 55).
 
     The row is given as judged in each case: the history is of the one that decides. Raise ValueError where there would
     be too many samples, or `sample_s` is not positive.

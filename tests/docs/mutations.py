@@ -17,7 +17,7 @@ class Mutation(NamedTuple):
 
 _DESIGN, _SOIL = "kernels/boulder_kernels/design.py", "kernels/boulder_kernels/soil.py"
 _DYNAMICS = "kernels/boulder_kernels/dynamics.py"
-_WALL, _TRAJECTORY = "boulder_sweep/crash_tests/rigid_wall.py", "boulder_sweep/impact/trajectory.py"
+_WALL, _HISTORY = "boulder_sweep/crash_tests/rigid_wall.py", "boulder_sweep/impact/simulation.py"
 _DESIGNS = "boulder_sweep/designs.py"
 _GROUND = "kernels/boulder_kernels/ground.py"
 _PIECES = "kernels/boulder_kernels/pieces.py"
@@ -74,8 +74,8 @@ MUTATIONS = (
     Mutation((49,), _WALL, "x = m / c * (v_0 - v) + v_0 * odd", "x = m / c * (v_0 - v)"),
     Mutation((50, 51), _WALL, "/ (2.0 * self.damper_N_s_m)", "/ self.damper_N_s_m"),
     Mutation((52,), _DYNAMICS, "s.net * M + couple_moment", "M + couple_moment"),
-    Mutation((53, 54, 55), _TRAJECTORY, "+ up * np.sin(theta)", "- up * np.sin(theta)"),
-    Mutation((53, 54, 55), _TRAJECTORY, "x_b - along *", "x_b + along *"),
+    Mutation((53, 54, 55), _HISTORY, "+ up * np.sin(theta)", "- up * np.sin(theta)"),
+    Mutation((53, 54, 55), _HISTORY, "x_b - along *", "x_b + along *"),
     Mutation((101,), _GROUND, "return 3.0 * K_p", "return 2.0 * K_p"),
     Mutation((102,), _GROUND, "5.0 * W / d", "5.0 * d / W"),
     Mutation((102,), _GROUND, "min(K_p * K_p, K_p * R)", "K_p * R"),

@@ -191,7 +191,7 @@ def test_the_first_sheet_of_a_run_is_the_recommendation_of_its_page(result, tmp_
     assert [best[0].value, other[0].value] == ["→", None]
     assert shown["depth m"] == pytest.approx(design.sizes["embedment_depth_m"], abs=5e-4)
     assert shown["dig m³"] == pytest.approx(design.excavated_m3, abs=0.05)
-    margins = [shown["φ′ 36 deg"], shown["φ′ 40 deg"]]
+    margins = [shown["φ′ 36°"], shown["φ′ 40°"]]
     assert margins == pytest.approx([row["margin"] for row in design.rows], abs=5e-4)
     assert shown["least margin"] == min(margins)
 
