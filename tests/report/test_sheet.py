@@ -201,7 +201,7 @@ def test_the_depth_to_build_is_a_least_and_a_greatest(needs: dict[str, Need], fi
     for name in ("depth", "chance", "never"):
         best, built = needs[name].recommendation, dict(sheet(files[name]).build)
         assert best is not None
-        most = "robust to" if best.design.grade == "robust" else "at most"
+        most = "robust to" if best.design is not None and best.design.grade == "robust" else "at most"
         depths = [built.get(f"depth, {end}") for end in ("at least", most)]
         least = None if best.design is None else Measure(best.design.sizes["embedment_depth_m"], "m", up=1)
         assert depths == [least, None if best.deepest_m is None else Measure(best.deepest_m, "m", up=-1)]
